@@ -304,6 +304,7 @@ class Study:
 
 
 def _load() -> None:
+    from wm_drake.studies.balancer.options import BALANCER
     from wm_drake.studies.calibration.options import CALIBRATE
     from wm_drake.studies.drive.options import DRIVE
     from wm_drake.studies.gasket.options import GASKET
@@ -319,6 +320,7 @@ def _load() -> None:
     from wm_drake.studies.verdict.options import VERDICT
 
     studies = (
+        BALANCER,
         CALIBRATE,
         DESIGN,
         DRIVE,

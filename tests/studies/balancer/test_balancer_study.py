@@ -1,0 +1,233 @@
+"""The study of rings of balls: closed forms of its parts, and what it finds in a small study."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import wm_drake as wm
+from wm_drake.errors import InputError
+from wm_drake.parameters import Load, MachineParameters, SpinProfile, load_machine
+from wm_drake.simulation.balance import moments_of_load, rings_of
+from wm_drake.simulation.cases import Case
+from wm_drake.studies.balancer.page import BalancerResult, answer, facts_of, lock_below
+from wm_drake.studies.balancer.study import (
+    HOLD,
+    Curve,
+    Findings,
+    Pair,
+    Release,
+    capacities_of,
+    capacity_of,
+    curve_of,
+    from_release,
+    is_within,
+    locked,
+    picked_up_from,
+    run_up,
+    with_factors,
+    without_rings,
+)
+
+RPM = np.pi / 30.0
+SPEEDS = RPM * np.array([100.0, 200.0, 300.0])
+
+
+def pair_of(free, held, mass=0.5, **factors):
+    """Return a pair with amplitudes in mm; the last one is that at the highest speed."""
+    curves = [
+        Curve(SPEEDS, 1e-3 * np.array(sizes[:-1]), 1e-3 * sizes[-1]) for sizes in (free, held)
+    ]
+    return Pair(mass, 0.0, *curves, **factors)
+
+
+def findings_of(loads, releases=()):
+    parameters = load_machine("ball_rings")
+    base = loads[0]
+    return Findings(
+        parameters,
+        2.0,
+        40.0,
+        tuple(loads),
+        base,
+        (base,),
+        tuple(releases),
+        base.locked,
+        {-0.16: 0.1, 0.16: 0.1},
+        0.235,
+        9,
+    )
+
+
+def test_capacity_of_a_ring_is_the_sum_of_its_balls():
+    ring = rings_of(load_machine("ball_rings"))["front_ring"]
+    half = np.arcsin(0.5 * 0.025 / 0.225)  # of the angle between neighbours
+    expected = 0.064 * 0.225 * np.sin(8.0 * half) / np.sin(half)
+    assert capacity_of(ring) == pytest.approx(expected)
+    assert ring.first_angles.size == 8
+    assert np.abs(np.exp(1j * ring.first_angles).sum()) * 0.064 * 0.225 == pytest.approx(expected)
+
+
+def test_capacity_in_the_planes_of_the_rings():
+    parameters = load_machine("ball_rings")
+    one = capacity_of(rings_of(parameters)["front_ring"])
+    capacities = capacities_of(parameters)
+    assert capacities == pytest.approx({-0.16: one, 0.16: one})
+    assert is_within(capacities, 1.99 * one, 0.0)
+    assert not is_within(capacities, 1.2 * one, 0.16)  # all of it in one plane
+    (only,) = capacities_of(
+        parameters.model_copy(update={"elements": {"a": rings_of(parameters)["front_ring"]}})
+    ).values()
+    assert only == pytest.approx(one)
+
+
+def test_a_slow_ball_hangs_in_the_lower_half_of_its_race_until_it_is_picked_up():
+    """Below m g R/d its place against the tub is at rest at m g R sin(angle) = d W; above not."""
+    parameters = load_machine("ball_rings")
+    speed = picked_up_from(parameters)
+    assert speed == pytest.approx(0.064 * 9.81 * 0.225 / 0.03)
+    one = {**parameters.elements["front_ring"].model_dump(), "balls": 1, "rolling_resistance": 0.0}
+    tree = parameters.model_dump(exclude_unset=True) | {"elements": {"ring": one}}
+    machine = wm.build_machine(MachineParameters.model_validate(tree))
+    turned = []
+    for part in (0.8, 1.3):
+        profile = SpinProfile(time=(0.0, 8.0), speed=(part * speed, part * speed))
+        empty = Load(unbalances=())
+        record = wm.simulate(machine, Case("", empty, profile))
+        in_tub = record.ball_ring_angle.values[:, 0, 0] + record.drum_angle.values
+        turned.append(np.unwrap(in_tub))
+    assert np.ptp(turned[0][-800:]) < 0.02
+    # carried along from the bottom, and positive as the drum turns
+    assert turned[0][-1] % (2.0 * np.pi) == pytest.approx(np.pi + np.arcsin(0.8), abs=0.02)
+    assert np.ptp(turned[1][-800:]) > 2.0 * np.pi
+
+
+def test_locked_balls_add_mass_and_no_unbalance():
+    parameters = load_machine("ball_rings")
+    load, plain = parameters.loads["back"], without_rings(parameters)
+    held = locked(load, parameters)
+    assert not plain.elements
+    before, after = (
+        moments_of_load(Case("", each, parameters.profile), plain) for each in (load, held)
+    )
+    np.testing.assert_allclose(after, before, atol=1e-15)
+    masses = [sum(u.mass for u in each.unbalances) for each in (load, held)]
+    assert masses[1] - masses[0] == pytest.approx(16.0 * 0.064)
+
+
+def test_factors_change_all_rings():
+    changed = rings_of(with_factors(load_machine("ball_rings"), 0.5, 3.0))
+    assert [(r.ball_mass, r.damping) for r in changed.values()] == [(0.032, 0.09)] * 2
+
+
+def test_a_run_up_has_a_region_for_each_range_of_speed():
+    profile = run_up(400.0 * RPM, 20.0 * RPM)
+    assert profile.duration == pytest.approx(20.0 + HOLD)
+    *ranges, last = profile.regions
+    begins = [profile.speed_at(region.begin) / RPM for region in ranges]
+    assert begins == pytest.approx(np.arange(25.0, 400.0, 25.0))
+    assert (last.begin, last.end) == pytest.approx((20.0 + 0.5 * HOLD, 20.0 + HOLD))
+    released = from_release(300.0 * RPM, 400.0 * RPM, 20.0 * RPM)
+    assert released.speed[0] == pytest.approx(300.0 * RPM)
+    assert len(released.regions) == 2
+
+
+def test_a_run_that_diverged_is_worse_than_any_other():
+    sizes = np.array([[[1.0, 2.0], [3.0, np.nan]], [[1.0, 2.0], [3.0, 4.0]]])
+    table = xr.Dataset(
+        {
+            "region_amplitude": (("run", "region", "sensor"), sizes),
+            "diverged": ("run", ["at 3 s", ""]),
+        }
+    )
+    assert np.isinf(curve_of(table, 0, SPEEDS[:1]).level)
+    assert curve_of(table, 1, SPEEDS[:1]) == Curve(SPEEDS[:1], np.array([2.0]), 4.0)
+
+
+@pytest.mark.parametrize(
+    ("free", "held", "rpm"),
+    [
+        ((2.0, 2.0, 1.0, 0.1), (1.0, 1.0, 2.0, 2.0), 300.0),
+        ((0.5, 2.0, 1.0, 0.1), (1.0, 1.0, 2.0, 2.0), 300.0),
+        ((0.5, 0.5, 1.0, 0.1), (1.0, 1.0, 2.0, 2.0), 100.0),
+        ((2.0, 2.0, 1.0, 3.0), (1.0, 1.0, 2.0, 2.0), np.inf),
+    ],
+)
+def test_balls_pay_from_the_speed_above_which_they_are_never_worse(free, held, rpm):
+    assert pair_of(free, held).pays_from / RPM == pytest.approx(rpm)
+
+
+def test_the_words_follow_the_numbers():
+    good = pair_of((4.0, 2.0, 1.0, 0.1), (1.0, 1.0, 2.0, 2.0))
+    beyond = pair_of((4.0, 2.0, 1.0, 3.0), (1.0, 1.0, 2.0, 2.0), mass=1.0)
+    releases = [
+        Release(200.0 * RPM, 3e-3, 2e-3, 1e-4, 2e-3),
+        Release(300.0 * RPM, 1e-3, 2e-3, 1e-4, 2e-3),
+    ]
+    found = findings_of([good, beyond], releases)
+    assert good.worst == (4.0, pytest.approx(100.0 * RPM))
+    assert lock_below(found) == pytest.approx(
+        300.0 * RPM
+    )  # the load beyond capacity does not count
+    text, facts = answer(found), dict(facts_of(found))
+    assert (
+        "lower the amplitude with 1 of 2 loads: with 0.5 kg at 0 mm from 2.0\u00a0mm to 0.10"
+        in text
+    )
+    assert "with 2 of 2 loads the largest amplitude is larger" in text
+    assert "Lock the balls below 300\u00a0rpm" in text
+    assert facts["Release"].startswith("at 300\u00a0rpm or above")
+    assert (
+        "are 1 of 2 loads, of which 3.0\u00a0mm to 3.0" in facts["Capacity"]
+    )
+    bad = findings_of([pair_of((4.0, 2.0, 1.0, 3.0), (1.0, 1.0, 2.0, 2.0))], releases[:1])
+    assert "No speed to release them" in answer(bad)
+    assert "none of the tried" in dict(facts_of(bad))["Release"]
+    assert BalancerResult(bad).as_json()["lock_below_rpm"] is None
+    calm = findings_of([pair_of((0.5, 0.5, 1.0, 0.1), (1.0, 1.0, 2.0, 2.0))])
+    assert "larger with none of them" in answer(calm)
+    assert "Release" not in dict(facts_of(calm))
+
+
+@pytest.fixture(scope="module")
+def result():
+    return wm.run_study("balancer", quick=True, quiet=True)
+
+
+def test_balls_help_at_speed_and_hurt_in_the_run_up(result):
+    """The planted physics: balls add to the unbalance below the resonances, cancel it above."""
+    tables = result.tables()
+    loads, curve = tables["loads"], tables["curve"]
+    assert (loads.level_free_mm < 0.1 * loads.level_locked_mm).all()
+    assert (loads.worst_quotient > 1.2).all()
+    assert loads.pays_from_rpm.between(200.0, 325.0).all()
+    same = curve.from_rpm < 75.0  # locked balls are as good as none, up to their mass
+    np.testing.assert_allclose(curve.locked_mm[same], curve.without_rings_mm[same], rtol=0.1)
+    (release,) = tables["releases"].itertuples()
+    assert release.after_free_mm < release.after_locked_mm
+    assert release.level_free_mm < 0.1 * release.level_locked_mm
+    assert result.failures() == []
+
+
+def test_more_damping_passes_and_less_damping_changes_the_run_up(result):
+    rings = result.tables()["rings"]
+    assert list(rings.damping_percent) == [30.0, 100.0]
+    assert rings.peak_free_mm.nunique() == 2
+    # the locked balls of both are the same run
+    assert rings.peak_locked_mm.nunique() == 1
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"machine": "reference"}, "no element of kind ball_ring"),
+        ({"mass": "0 kg"}, "--mass: '0 kg' is not above 0"),
+        ({"place": "1 kg"}, "--place"),
+        ({"high": "50 rpm"}, "--to: is below 100 rpm"),
+        ({"release": "1300 rpm"}, "--release: is not below the highest speed, 1200 rpm"),
+        ({"ball_mass": "0.001 %"}, "step"),
+        ({"mass": ",".join(f"{0.1 + 0.01 * i:.2f}" for i in range(30)) + " kg"}, "has 30 values"),
+    ],
+)
+def test_options_that_cannot_be(changes, message):
+    with pytest.raises(InputError, match=message.replace("(", r"\(")):
+        wm.run_study("balancer", quiet=True, **changes)

@@ -1,0 +1,60 @@
+"""Options of the study of rings of balls, and its declaration."""
+
+from typing import TYPE_CHECKING
+
+from wm_drake.studies.study import Options, Study, Task, option
+
+if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
+    from wm_drake.model.machine import Machine
+
+
+class BalancerOptions(Options):
+    """Options of the study of rings of balls."""
+
+    machine: str = option(
+        "ball_rings", "Name of a shipped machine with rings of balls, or machine file.", "NAME|FILE"
+    )
+    mass: str = option("0.15,0.3,0.5,0.7 kg", "Unbalance masses at the wall.", "MASSES")
+    place: str = option(
+        "-110,-55,0,55,110 mm",
+        "Places of the unbalance along the drum, to the rear from its mid-depth.",
+        "LENGTHS",
+    )
+    ball_mass: str = option(
+        "25,50,100,150 %", "Masses of the balls, of those of the file.", "PARTS"
+    )
+    damping: str = option(
+        "3,10,30,100,300 %", "Dampings of the races, of those of the file.", "PARTS"
+    )
+    release: str = option(
+        "200,250,300,400,600 rpm",
+        "Speeds at which locked balls are released in further runs.",
+        "SPEEDS",
+    )
+    high: str | None = option(
+        None, "Highest speed. Default: that of the spin profile of the machine.", "SPEED", "--to"
+    )
+    rate: str = option("20 rpm/s", "Rate of the run-up.", "RATE")
+
+
+def _begin(options: BalancerOptions, machine: "Machine") -> Task:
+    from wm_drake.studies.balancer.study import BalancerTask
+
+    return BalancerTask(options, machine)
+
+
+BALANCER = Study(
+    "balancer",
+    "Say from which speed rings of balls pay, and where they hurt.",
+    BalancerOptions,
+    _begin,
+    quick={
+        "mass": "0.4 kg",
+        "place": "0,110 mm",
+        "ball_mass": "100 %",
+        "damping": "30,100 %",
+        "release": "300 rpm",
+        "high": "400 rpm",
+        "rate": "40 rpm/s",
+    },
+)
