@@ -15,7 +15,6 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from wm_drake.parameters.damper_laws import DamperNumbers, StvSpongeDamper
 from wm_drake.parameters.types import FloatArray
@@ -29,6 +28,7 @@ from wm_drake.studies.identification.drift import (
     printed_table,
 )
 from wm_drake.studies.validation import page
+from wm_drake.studies.validation.page import NOT_COMPARABLE, listed, verdict
 from wm_drake.studies.validation.rows import coulomb_rows
 
 MM = 1e-3
@@ -46,7 +46,6 @@ CASES = {
 """Frequency [Hz] and amplitude [mm] of each case of sections 4.2 and 4.3; misprint C4."""
 RIG = "`wm-drake rig damper --component mstv_damper --matrix C`"
 SCRIPT = "this script"
-HOLDS, FAILS, OPEN = "holds", "**does not hold**", "not comparable"
 
 
 def with_stv(velocity: float, **changes: float) -> StvSpongeDamper:
@@ -106,16 +105,6 @@ class Runs:
         states = steady_deformations(bench, packed, np.full(len(omega), amplitude * MM), omega)
         step = 2.0 * np.pi / (states.shape[1] - 1)
         return np.asarray(np.gradient(states, step, axis=1) * omega[:, None])
-
-
-def verdict(is_so: object) -> str:
-    """Return a verdict in words."""
-    return HOLDS if is_so else FAILS
-
-
-def listed(values: ArrayLike, unit: str, factor: float = 1.0) -> str:
-    """Return numbers as text."""
-    return ", ".join(f"{factor * value:.3g}" for value in np.ravel(values)) + unit
 
 
 def test_lines(runs: Runs) -> list[list[str]]:
@@ -195,7 +184,7 @@ def test_lines(runs: Runs) -> list[list[str]]:
             verdict(np.all(np.diff(friction) < 0.0)),
             RIG,
         ],
-        ["Figs. 4 to 7: measured curves", "pictures", "no numbers are printed", OPEN, ""],
+        ["Figs. 4 to 7: measured curves", "pictures", "no numbers are printed", NOT_COMPARABLE, ""],
     ]
 
 
@@ -251,7 +240,7 @@ def case_lines(runs: Runs) -> tuple[list[list[str]], list[list[str]]]:
             "4.3, Figs. 15 to 18: STV has a larger error than MSTV (STV beside MSTV)",
             "larger than MSTV",
             listed([of_stv[f, 0.3] for f in (1.0, 3.0, 6.67, 10.0)], ""),
-            OPEN,
+            NOT_COMPARABLE,
             SCRIPT,
         ],
         [
@@ -265,14 +254,14 @@ def case_lines(runs: Runs) -> tuple[list[list[str]], list[list[str]]]:
             "4.2, 4.3: MSTV agrees with the tests, less so in BC and DA",
             "pictures",
             "no numbers are printed",
-            OPEN,
+            NOT_COMPARABLE,
             "",
         ],
         [
             "Fig. 14: loops of MSTV are very similar to Fig. 7",
             "pictures",
             "no numbers are printed",
-            OPEN,
+            NOT_COMPARABLE,
             "",
         ],
     ]

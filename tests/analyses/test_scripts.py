@@ -14,7 +14,7 @@ LONG = {  # more than five seconds
     "calibrate_reference.py", "check_spin_of_tubes.py", "choose_step.py",
     "compare_ball_balancer.py", "compare_dampers.py", "spin_up_fmu.py",
     "compare_designs.py", "compare_mujoco.py", "compare_searches.py", "compare_speed.py",
-    "fit_coulomb_to_mstv.py", "write_paper_b.py", "write_validation.py",
+    "fit_coulomb_to_mstv.py", "write_paper_a.py", "write_paper_b.py", "write_validation.py",
 }  # fmt: skip
 SCRIPTS = [
     pytest.param(path.name, marks=[pytest.mark.slow] if path.name in LONG else [])
@@ -32,10 +32,11 @@ def test_script_runs_quickly_and_writes_its_output(script, tmp_path):
     assert done.returncode == 0, done.stderr
     assert out.read_text().strip() in done.stdout
     assert script in (ANALYSES / "README.md").read_text()
-    if script == "write_paper_c.py":
+    if script in ("write_paper_a.py", "write_paper_c.py"):
         rows = verdicts(out.read_text())
         assert len(rows) > 15
-        assert rows <= verdicts((ANALYSES.parent / "docs" / "paper-c.md").read_text())
+        page = ANALYSES.parent / "docs" / f"{script[6:13].replace('_', '-')}.md"
+        assert rows <= verdicts(page.read_text())
 
 
 def verdicts(page):

@@ -176,9 +176,7 @@ def test_the_words_follow_the_numbers():
     assert "with 2 of 2 loads the largest amplitude is larger" in text
     assert "Lock the balls below 300\u00a0rpm" in text
     assert facts["Release"].startswith("at 300\u00a0rpm or above")
-    assert (
-        "are 1 of 2 loads, of which 3.0\u00a0mm to 3.0" in facts["Capacity"]
-    )
+    assert "are 1 of 2 loads, of which 3.0\u00a0mm to 3.0" in facts["Capacity"]
     bad = findings_of([pair_of((4.0, 2.0, 1.0, 3.0), (1.0, 1.0, 2.0, 2.0))], releases[:1])
     assert "No speed to release them" in answer(bad)
     assert "none of the tried" in dict(facts_of(bad))["Release"]

@@ -38,12 +38,15 @@ METHOD = (
 def rig_page(result: "RigResult", facts: Facts) -> str:
     """Return the page as text of one self-contained HTML file."""
     run = result.run
+    shown = measures_shown(run, result.printed)
     return SectionedPage(
         f"Bench test: {run.title}",
         f"{_summary(run)} {result.effect}".strip(),
         [
             Section("loops", "Loops", tuple(_pictures(run))),
-            Section("measures", "Derived quantities", tables=(measures_shown(run, result.printed),)),
+            Section(
+                "measures", "Derived quantities", tables=(measures_shown(run, result.printed),)
+            ),
             Section("parameters", "Parameters", tables=(_numbers(run),)),
         ],
         [("Component", run.title), ("Loops", str(len(run.loops))), *facts.rows()],

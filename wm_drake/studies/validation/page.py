@@ -6,7 +6,9 @@ from pathlib import Path
 from textwrap import fill
 from typing import Any
 
+import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
 from wm_drake.report.provenance import now, program
 from wm_drake.studies.validation.rows import FITTED, MISSED, PREDICTED, Row, counts
@@ -40,6 +42,9 @@ VERIFICATION = (
     "marker."
 )
 
+HOLDS, FAILS, NOT_COMPARABLE = "holds", "**does not hold**", "not comparable"
+"""Verdicts on a statement of a paper."""
+
 BEGIN, END = "<!-- validation: begin -->\n", "<!-- validation: end -->"
 
 
@@ -55,6 +60,16 @@ def write(text: str, out: Path | None, page: Path | None) -> None:
         out.write_text(text, encoding="utf-8")
     if page:
         page.write_text(renewed(page.read_text(encoding="utf-8"), text), encoding="utf-8")
+
+
+def verdict(is_so: object) -> str:
+    """Return whether a statement holds, in words."""
+    return HOLDS if is_so else FAILS
+
+
+def listed(values: ArrayLike, unit: str, factor: float = 1.0) -> str:
+    """Return numbers as text, with three digits."""
+    return ", ".join(f"{factor * value:.3g}" for value in np.ravel(values)) + unit
 
 
 def origin(command: str, notes: Sequence[str]) -> str:
