@@ -44,9 +44,7 @@ def rig_page(result: "RigResult", facts: Facts) -> str:
         f"{_summary(run)} {result.effect}".strip(),
         [
             Section("loops", "Loops", tuple(_pictures(run))),
-            Section(
-                "measures", "Derived quantities", tables=(measures_shown(run, result.printed),)
-            ),
+            Section("measures", "Derived quantities", tables=(shown,)),
             Section("parameters", "Parameters", tables=(_numbers(run),)),
         ],
         [("Component", run.title), ("Loops", str(len(run.loops))), *facts.rows()],
