@@ -16,6 +16,7 @@ from wm_drake.model.build import build_machine
 from wm_drake.parameters import SpinProfile, load_component, load_machine, quantities
 from wm_drake.parameters.designs import load_design
 from wm_drake.parameters.free import FreeFile, load_free
+from wm_drake.parameters.gasket_drawing import load_gasket_drawing
 from wm_drake.parameters.tolerances import load_limits, load_tolerances
 from wm_drake.report.diagram import mermaid
 from wm_drake.simulation.measures import measure
@@ -138,6 +139,7 @@ OTHERS = [
     (page("bench-to-machine"), 0, load_component),
     (page("calibrate"), 0, load_free),
     (page("designs"), 0, load_design),
+    (page("gasket-drawing"), 0, load_gasket_drawing),
     (page("tolerances"), 0, load_tolerances),
     (page("tolerances"), 1, load_limits),
 ]

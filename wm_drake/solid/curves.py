@@ -224,7 +224,7 @@ class Mesh:
         around: Elements around half the ring.
     """
 
-    meridian: int = 14
+    meridian: int = 20
     around: int = 8
 
 

@@ -31,7 +31,7 @@ class CurvesOptions(Options):
         "suspended group are at 1.3 to 4 Hz.",
         "FREQUENCY",
     )
-    elements: int = option(14, "Elements along the meridian.", "N", ge=2, le=60)
+    elements: int = option(20, "Elements along the meridian.", "N", ge=2, le=60)
     around: int = option(8, "Elements around half the ring.", "N", ge=2, le=40)
 
 
