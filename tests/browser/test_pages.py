@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from accessibility import serious_faults
 from hand_made_records import case_result, spin_result
 
 from wm_drake.parameters import GASKET_FACTORS, levels_of, load_factors, load_machine
@@ -95,6 +96,21 @@ def opened(browser, path, width=1400, *, dark=False):
     browser.run("Pictures.all()")
 
 
+@pytest.mark.parametrize("kind", [spin_page, gasket_page])
+def test_page_has_no_serious_fault_of_accessibility(browser, pages, kind):
+    opened(browser, pages(kind))
+    assert serious_faults(browser) == []
+
+
+def test_a_page_that_is_only_loaded_shows_every_picture(browser, pages):
+    """Programs that print a page or take a picture of it do so when it is loaded."""
+    browser.size(1400)
+    browser.open(pages(spin_page))  # waits for the event load
+    missing = "return document.querySelectorAll('figure[data-picture]:not([data-drawn])').length"
+    assert browser.run(missing) == 0
+    assert browser.run("return document.querySelectorAll('iframe').length") == 0
+
+
 def test_folded_sections_open_by_a_link_and_on_paper(browser, pages):
     opened(browser, pages(gasket_page))
     closed = "return document.querySelectorAll('details:not([open])').length"
@@ -111,6 +127,7 @@ def test_machine_page_turns_and_names_parts(browser, machine, tmp_path):
     page = tmp_path / "machine.html"
     page.write_text(machine_page(machine, []), encoding="utf-8")
     browser.open(page)
+    assert serious_faults(browser) == []
     spring = "document.querySelector('g[data-name=left] path.spring')"
     before = browser.run(f"return {spring}.getAttribute('d')")
     browser.run("document.querySelectorAll('.views button')[1].click()")

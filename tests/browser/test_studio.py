@@ -9,6 +9,7 @@ from urllib.parse import unquote
 
 import numpy as np
 import pytest
+from accessibility import serious_faults
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
@@ -161,6 +162,10 @@ def test_error_stands_at_its_value_and_the_curve_stays(page):
     assert not page.find(ROW.format(STIFFNESS, ".problem")).is_displayed()
     # the browser itself notes the status 422 of the refused request
     assert [m for m in page.errors() if "422" not in m] == []
+
+
+def test_the_studio_has_no_serious_fault_of_accessibility(page):
+    assert serious_faults(page) == []
 
 
 def test_gasket_is_taken_out(page):

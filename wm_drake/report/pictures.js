@@ -299,9 +299,32 @@ const Pictures = (() => {
       again();
     });
     document.documentElement.dataset.pictures = "ready";
+    await drawRest();
   }
 
+  /* Draws what is not in view yet, one picture at a time, so that a saved or printed page is whole. */
+  async function drawRest() {
+    for (const figure of figures()) {
+      if (!drawn.has(figure)) {
+        show(figure);
+        await new Promise(resolve => setTimeout(resolve, 5));
+      }
+    }
+  }
+
+  /* An open document inside: the page counts as loading, for programs that print it when it is loaded. */
+  function held() {
+    const frame = document.createElement("iframe");
+    frame.hidden = true;
+    frame.title = "none";
+    document.body.append(frame);
+    frame.contentDocument.open();
+    return () => { frame.contentDocument.close(); frame.remove(); };
+  }
+
+  const release = held();
   const started = begin();
+  started.finally(release).catch(() => {});
   started.catch(error => {
     for (const figure of figures()) figure.querySelector(".plot").textContent = `This picture needs a newer browser: ${error.message}`;
   });

@@ -101,7 +101,9 @@ def heat_map_figure(screening: Screening, words: Words) -> Figure:
     if 0 < mains < rows:
         marks.append(Rule(mains - 0.5, "x", color="#ffffff", width=7.0))
     x = named(name for _, name in labels)
-    y = named(words.term(str(name)) for name in shown.index)
+    # symbols for interactions: their words would take half of a narrow page
+    terms = map(str, shown.index)
+    y = named(t.replace(":", " × ") if ":" in t else words.term(t) for t in terms)
     plain = Axis(has_grid=False, has_line=False)
     panel = Panel(
         marks=tuple(marks),
