@@ -9,6 +9,7 @@ import pytest
 from accessibility import serious_faults
 from hand_made_records import case_result, spin_result
 
+from wm_drake import build_machine
 from wm_drake.parameters import GASKET_FACTORS, levels_of, load_factors, load_machine
 from wm_drake.report.figure import MARK, MEASURED, Axis, Figure, Line, Panel, Rule, Span, in_grid
 from wm_drake.report.page import picture, render
@@ -123,9 +124,9 @@ def test_folded_sections_open_by_a_link_and_on_paper(browser, pages):
     assert (count > 3, browser.run(closed)) == (True, 0)
 
 
-def test_machine_page_turns_and_names_parts(browser, machine, tmp_path):
+def test_machine_page_turns_and_names_parts(browser, tmp_path):
     page = tmp_path / "machine.html"
-    page.write_text(machine_page(machine, []), encoding="utf-8")
+    page.write_text(machine_page(build_machine("reference"), []), encoding="utf-8")
     browser.open(page)
     assert serious_faults(browser) == []
     spring = "document.querySelector('g[data-name=left] path.spring')"

@@ -82,5 +82,6 @@ function input(field) {
   if (field.kind === 'boolean') return make('input', {type: 'checkbox', 'data-option': field.name});
   if (field.kind === 'text') return make('input', shown);
   const limits = Object.fromEntries([['min', field.ge], ['max', field.le]].filter(([, limit]) => limit !== undefined).map(([name, limit]) => [name, String(limit)]));
-  return make('input', {type: 'number', step: field.kind === 'integer' ? '1' : 'any', ...shown, ...limits});
+  const {autocomplete, ...others} = shown;  // only for texts
+  return make('input', {type: 'number', step: field.kind === 'integer' ? '1' : 'any', ...others, ...limits});
 }
