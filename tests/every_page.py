@@ -82,6 +82,7 @@ KINDS = {
         "--model", "main", "--load", "back", "--response", "mount_force_peak", "--response", "amplitude",
     ),
     "gasket_curves": _one("sections.html", "gasket", "curves", "folded", "--quick", "--axial", "8 mm"),
+    "gasket_geometry": _one("sections.html", "study", "gasket-geometry", "--quick"),
     "gasket_damping": Kind(
         "sections.html",
         (

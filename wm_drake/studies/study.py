@@ -310,6 +310,7 @@ def _load() -> None:
     from wm_drake.studies.gasket.options import GASKET
     from wm_drake.studies.gasket_curves.options import GASKET_CURVES
     from wm_drake.studies.gasket_damping.options import GASKET_DAMPING
+    from wm_drake.studies.gasket_geometry.options import GASKET_GEOMETRY
     from wm_drake.studies.modes.options import MODES
     from wm_drake.studies.pareto.options import DESIGN
     from wm_drake.studies.spin.options import SPIN
@@ -327,6 +328,7 @@ def _load() -> None:
         GASKET,
         GASKET_CURVES,
         GASKET_DAMPING,
+        GASKET_GEOMETRY,
         MODES,
         RESPONSE,
         SPIN,

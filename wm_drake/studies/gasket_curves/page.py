@@ -6,7 +6,8 @@ from wm_drake.report.sections import Section, SectionedPage
 from wm_drake.report.table import Column, Table, line
 from wm_drake.solid.curves import AXIAL, RADIAL, TILT, TWIST
 from wm_drake.studies.gasket_curves.figures import curves_figure, rings_figure, sections_figure
-from wm_drake.studies.gasket_curves.study import CurvesResult, coupling
+from wm_drake.studies.gasket_curves.machine import coupling
+from wm_drake.studies.gasket_curves.study import CurvesResult
 from wm_drake.studies.gasket_curves.tables import AXES, values_table
 from wm_drake.studies.rig.units import units_of
 from wm_drake.studies.study import Facts

@@ -13,13 +13,17 @@ import pandas as pd
 from wm_drake.errors import WmDrakeError, input_error
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters, machine_yaml
-from wm_drake.parameters.elements import Bushing
 from wm_drake.parameters.files import machine_tree, yaml_text
 from wm_drake.parameters.gasket_drawing import GasketDrawing, load_gasket_drawing
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
-from wm_drake.solid.curves import AXIAL, MOTIONS, RADIAL, TILT, TWIST, Curve, Gasket, Mesh
+from wm_drake.solid.curves import MOTIONS, Curve, Gasket, Mesh
 from wm_drake.solid.deformed import Deformed, deformed, folds_touch, wrinkles
+from wm_drake.studies.gasket_curves.machine import (
+    damping_per_stiffness,
+    stiffness_of,
+    with_gasket,
+)
 from wm_drake.studies.gasket_curves.options import CurvesOptions
 from wm_drake.studies.inputs import quantities_of
 from wm_drake.studies.run import Executor
@@ -165,11 +169,11 @@ class CurvesTask(Task):
             )
         self.drawing = load_gasket_drawing(options.file)
         self.values = {
-            motion.name: _values(getattr(options, motion.name), motion.rotates, options.points,
+            motion.name: curve_values(getattr(options, motion.name), motion.rotates, options.points,
                                  f"--{motion.name}")
             for motion in MOTIONS
         }  # fmt: skip
-        self.frequency = _positive(options.frequency, Unit("Hz", "Hz"), "--frequency")
+        self.frequency = positive(options.frequency, Unit("Hz", "Hz"), "--frequency")
         self.mesh = Mesh(options.elements, options.around)
         self.gasket = Gasket(self.drawing, self.mesh)
 
@@ -183,7 +187,7 @@ class CurvesTask(Task):
         name, options = self.options.file, self.options
         machine = with_gasket(
             self.machine,
-            {motion: checked.curve for motion, checked in curves.items()},
+            stiffness_of({motion: checked.curve for motion, checked in curves.items()}),
             damping_per_stiffness(self.drawing, self.frequency),
             f"wm-drake gasket curves {name}, {options.elements} by {options.around} elements",
         )
@@ -216,75 +220,17 @@ def _first(values: FloatArray, holds: Sequence[bool]) -> FloatArray:
     return np.array([side[0] if len(side) else math.nan for side in sides])
 
 
-def _values(text: str, rotates: bool, points: int, option: str) -> list[float]:
+def curve_values(text: str, rotates: bool, points: int, option: str) -> list[float]:
     """Return the values of a curve above 0. [m or rad]"""
     unit = Unit("rad", "deg") if rotates else Unit("m", "mm")
-    largest = _positive(text, unit, option)
+    largest = positive(text, unit, option)
     parts = np.append(NEAR_REST, np.arange(1, points + 1) / points)
     return (largest * parts).tolist()
 
 
-def _positive(text: str, unit: Unit, option: str) -> float:
+def positive(text: str, unit: Unit, option: str) -> float:
     """Return a number above 0 in SI."""
     numbers = quantities_of(text, unit, option)
     if len(numbers) != 1 or not 0.0 < numbers[0] < math.inf:
         raise input_error(f"'{text}': allowed is one number above 0", where=option)
     return numbers[0]
-
-
-def damping_per_stiffness(drawing: GasketDrawing, frequency: float) -> float:
-    """Return the damping of an axis by its stiffness.
-
-        c / k = tan(delta) / (2 pi f)
-
-    A dashpot with this coefficient dissipates what the rubber does at the frequency f. [s]
-    """
-    return drawing.rubber.loss_factor / (2.0 * math.pi * frequency)
-
-
-def coupling(curves: dict[str, Curve]) -> float:
-    """Return the moment about z per displacement along x, and force per angle: their mean. [N]
-
-    Both are equal because the forces have a potential. The moment is about the moved rim's centre.
-    """
-    moment = curves[RADIAL.name].slope_at_rest(TILT.component)
-    force = curves[TILT.name].slope_at_rest(RADIAL.component)
-    return 0.5 * (moment + force)
-
-
-def with_gasket(
-    machine: MachineParameters, curves: dict[str, Curve], damping: float, source: str
-) -> MachineParameters:
-    """Return a machine whose gasket has the curves of a drawing.
-
-    A turn about the axis maps x to -z and z to x, so the coupling of z with the angle about x has
-    the other sign than that of x with the angle about z.
-
-    Args:
-        machine: Machine with a gasket, whose two frames stay.
-        curves: Curves by the names of the motions.
-        damping: Damping of an axis by its stiffness. [s]
-        source: Source of the numbers.
-    """
-    assert machine.gasket is not None
-    axes = {"x": (RADIAL, TILT), "y": (AXIAL, TWIST), "z": (RADIAL, TILT)}
-    values: dict[str, Any] = {}
-    for axis, motions in axes.items():
-        for kind, motion in zip(("", "rotational_"), motions, strict=True):
-            table = curves[motion.name].table
-            values[f"{kind}stiffness_{axis}"] = table
-            values[f"{kind}damping_{axis}"] = damping * table.nominal_stiffness
-    both = coupling(curves)
-    values |= {"cross_stiffness_x_about_z": both, "cross_stiffness_z_about_x": -both}
-    frames = {name: getattr(machine.gasket, name) for name in ("tub_frame", "housing_frame")}
-    sources = {key: text for key, text in machine.sources.items() if not key.startswith("gasket.")}
-    sources |= {f"gasket.{key}": source for key in values}
-    return machine.model_copy(
-        update={
-            "name": f"{machine.name}_with_drawn_gasket",
-            "gasket": Bushing(**frames, **values),
-            "sources": sources,
-            "measured": (),
-            "published": (),
-        }
-    )

@@ -7,7 +7,8 @@ import pandas as pd
 
 from wm_drake.report.formatting import plain
 from wm_drake.solid.curves import AXIAL, RADIAL, TILT, TWIST, Motion
-from wm_drake.studies.gasket_curves.study import CurvesResult, coupling
+from wm_drake.studies.gasket_curves.machine import coupling
+from wm_drake.studies.gasket_curves.study import CurvesResult
 from wm_drake.studies.rig.units import units_of
 
 AXES: dict[str, tuple[Motion, str]] = {

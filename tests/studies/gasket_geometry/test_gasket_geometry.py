@@ -1,0 +1,87 @@
+"""Study of drawings: the surface finds what is planted, drawings change as said, refusals."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import wm_drake as wm
+from wm_drake.errors import InputError
+from wm_drake.parameters.gasket_drawing import load_gasket_drawing
+from wm_drake.studies.gasket_geometry.drawings import changed, factors_of
+from wm_drake.studies.gasket_geometry.surface import fit
+
+
+def test_surface_of_degree_two_is_found_and_its_variance_is_shared():
+    """1 + 3 x1 + 2 x2^2 + x1 x3: the variances are 9/3, 4 * 4/45 and 1/9."""
+    levels = np.random.default_rng(1).uniform(-1.0, 1.0, (27, 4))
+    x1, x2, x3, _ = levels.T
+    surface = fit(levels, 1.0 + 3.0 * x1 + 2.0 * x2**2 + x1 * x3)
+    assert surface.degree == 2
+    fresh = np.random.default_rng(2).uniform(-1.0, 1.0, (9, 4))
+    planted = 1.0 + 3.0 * fresh[:, 0] + 2.0 * fresh[:, 1] ** 2 + fresh[:, 0] * fresh[:, 2]
+    assert surface.at(fresh) == pytest.approx(planted, rel=1e-9)
+    parts = np.array([3.0, 16.0 / 45.0, 0.0, 0.0, 1.0 / 9.0])
+    assert surface.contributions() == pytest.approx(parts / parts.sum(), abs=1e-9)
+
+
+def test_few_runs_give_a_plane():
+    levels = np.random.default_rng(1).uniform(-1.0, 1.0, (8, 4))
+    surface = fit(levels, 2.0 + levels @ [1.0, 0.0, -2.0, 0.0])
+    assert surface.degree == 1
+    assert surface.contributions() == pytest.approx([0.2, 0.0, 0.8, 0.0, 0.0], abs=1e-9)
+
+
+def test_factors_change_the_drawing():
+    drawing = load_gasket_drawing("bellows")
+    factors = factors_of(drawing)
+    same = changed(drawing, factors, np.array([0.0, 0.0, 1.0, 0.0]))
+    assert same.meridian == drawing.meridian
+    assert same.rubber == drawing.rubber
+    other = changed(drawing, factors, np.array([1.0, 1.0, 0.0, -1.0]))
+    assert other.meridian[2].thickness == pytest.approx(1.15 * 2.5e-3)
+    assert other.meridian[2].radius == pytest.approx(0.160 + 1.12 * 0.025)
+    assert [point.radius for point in other.meridian[:2]] == pytest.approx([0.16, 0.16])
+    assert other.meridian[2].fillet == pytest.approx(0.92 * 0.01)
+    assert other.rubber.shore_a == 34.0
+    wide = (replace(factors[0], half=900.0), *factors[1:])
+    with pytest.raises(InputError, match=r"at thickness 1e\+03 %, depth 100 %.*too sharp"):
+        changed(drawing, wide, np.array([1.0, 0.0, 0.0, 0.0]))
+
+
+def test_thicker_and_harder_walls_are_stiffer_and_the_best_drawing_is_verified(tmp_path):
+    out = tmp_path / "out"
+    result = wm.run_study("gasket-geometry", quick=True, quiet=True, out=out)
+    for name in ("radial_N_per_mm", "axial_N_per_mm", "twist_Nm_per_rad", "tilt_Nm_per_rad"):
+        thickness, _, _, hardness = result.surfaces[name].coefficients[1:5]
+        assert thickness > 0.0
+        assert hardness > 0.0
+    bending, shear = (
+        result.surfaces[name].contributions() for name in ("axial_N_per_mm", "twist_Nm_per_rad")
+    )
+    assert bending[0] > 1.5 * shear[0]  # bending goes with the cube of the thickness
+    assert result.kinds == ["design"] * 6 + ["fresh"] * 2 + ["best"]
+    assert result.errors("twist_Nm_per_rad") < 10.0
+    best = load_gasket_drawing(out / "best.yaml")
+    assert best.rubber.shore_a == pytest.approx(result.best.rubber.shore_a)
+    for point, other in zip(best.meridian, result.best.meridian, strict=True):
+        assert point.thickness == pytest.approx(other.thickness, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("nosuch", "no shipped gasket drawing"),
+        ("soft.yaml", "rubber.shore_a: needs shore_a"),
+        ("folded --set gasket=null", "the machine has no gasket"),
+        ("folded --load nosuch", "neither a load of machine"),
+    ],
+)
+def test_wrong_input_is_refused(wm_drake, words, message):
+    text = "meridian:\n- {radius: 160 mm, y: 0 mm, thickness: 2 mm}\n- {radius: 160 mm, y: 30 mm, thickness: 2 mm}\n"
+    Path("soft.yaml").write_text(f"{text}rubber: {{c1: 0.3 MPa}}\n")
+    ended = wm_drake(f"study gasket-geometry {words} --out out")
+    assert (ended.code, ended.out) == (2, "")
+    assert message in ended.err
+    assert not Path("out").exists()

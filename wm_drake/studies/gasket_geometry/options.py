@@ -1,0 +1,60 @@
+"""Options of the study of drawings of a gasket, and its declaration."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from wm_drake.studies.study import LOADS, PROFILE, SEED, Options, Study, Task, option
+
+if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
+    from wm_drake.model.machine import Machine
+
+
+class GeometryOptions(Options):
+    """Options of the study of drawings of a gasket."""
+
+    file: str = option(
+        "folded",
+        "Shipped gasket drawing (folded, bellows), or a YAML file with shore_a.",
+        "NAME|FILE",
+        "argument",
+    )
+    drawings: int = option(27, "Drawings of the design.", "N", ge=6, le=400)
+    fresh: int = option(4, "Fresh drawings that test the response surfaces.", "N", ge=2, le=100)
+    load: tuple[str, ...] = LOADS
+    profile: Path | None = PROFILE
+    axial: str = option("10 mm", "Largest displacement along the axis, both ways.", "LENGTH")
+    radial: str = option("10 mm", "Largest displacement across the axis.", "LENGTH")
+    twist: str = option("3 deg", "Largest angle about the axis.", "ANGLE")
+    tilt: str = option("3 deg", "Largest angle about an axis across.", "ANGLE")
+    frequency: str = option(
+        "2.5 Hz", "Frequency at which the damping has the loss factor of the rubber.", "FREQUENCY"
+    )
+    elements: int = option(14, "Elements along the meridian.", "N", ge=2, le=60)
+    around: int = option(6, "Elements around half the ring.", "N", ge=2, le=40)
+    seed: int = SEED
+
+
+def _begin(options: GeometryOptions, machine: "Machine") -> Task:
+    from wm_drake.studies.gasket_geometry.study import GeometryTask
+
+    return GeometryTask(options, machine)
+
+
+GASKET_GEOMETRY = Study(
+    "gasket-geometry",
+    "Vary the drawing of a gasket: wall, folds, hardness; find what moves the tub least.",
+    GeometryOptions,
+    _begin,
+    quick={
+        "drawings": 6,
+        "fresh": 2,
+        "load": ("middle",),
+        "elements": 4,
+        "around": 2,
+        "axial": "2 mm",
+        "radial": "1 mm",
+        "twist": "0.5 deg",
+        "tilt": "0.2 deg",
+    },
+    has_cluster=False,
+)

@@ -1,0 +1,306 @@
+"""The study: a design of drawings, finite elements of each, runs, surfaces, the best drawing."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from wm_drake.batch import sources_version
+from wm_drake.batch.ledger import Ledger, key_of
+from wm_drake.errors import WmDrakeError, input_error
+from wm_drake.model.build import build_machine
+from wm_drake.model.machine import Machine
+from wm_drake.parameters import MachineParameters
+from wm_drake.parameters.elements import ForceTable, TorqueTable
+from wm_drake.parameters.files import yaml_text
+from wm_drake.parameters.gasket_drawing import GasketDrawing, load_gasket_drawing
+from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import Unit
+from wm_drake.simulation.cases import Case
+from wm_drake.solid.curves import MOTIONS, Gasket, Mesh
+from wm_drake.studies.gasket_curves.machine import (
+    GasketStiffness,
+    damping_per_stiffness,
+    stiffness_of,
+    with_gasket,
+)
+from wm_drake.studies.gasket_curves.study import curve_values, positive
+from wm_drake.studies.gasket_geometry.drawings import Factor, changed, factors_of
+from wm_drake.studies.gasket_geometry.options import GeometryOptions
+from wm_drake.studies.gasket_geometry.surface import Surface, fit
+from wm_drake.studies.inputs import selected_cases
+from wm_drake.studies.run import Executor
+from wm_drake.studies.study import Facts, Result, Task
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+MEASURES = ("amplitudes", "gap", "extremes")
+"""Measures of the runs."""
+
+POINTS = 3
+"""Points of a curve on each side, beside the one near rest."""
+
+CANDIDATES = 4096
+"""Drawings among which the best is chosen on the response surface."""
+
+RESPONSES = {
+    "radial_N_per_mm": "radial stiffness, N/mm",
+    "axial_N_per_mm": "axial stiffness, N/mm",
+    "twist_Nm_per_rad": "twist stiffness, N m/rad",
+    "tilt_Nm_per_rad": "tilt stiffness, N m/rad",
+    "smallest_gap_mm": "smallest gap, mm",
+    "largest_amplitude_mm": "largest amplitude of a sensor, mm",
+    "largest_gasket_force_N": "largest gasket force, N",
+}
+"""Responses of a drawing: words by names."""
+
+GAP = "smallest_gap_mm"
+"""Response that the best drawing makes largest."""
+
+
+@dataclass(frozen=True)
+class GeometryResult(Result):
+    """Result of the study.
+
+    Attributes:
+        name: Name or file of the drawing.
+        factors: Factors.
+        levels: Levels of all drawings: those of the design, fresh ones, the best. (n, factors)
+        responses: Their responses by name. (n,) each
+        design: Number of drawings of the design.
+        surfaces: Response surfaces by name.
+        best: The best drawing.
+        loads: Names of the loads.
+    """
+
+    name: str
+    factors: tuple[Factor, ...]
+    levels: FloatArray
+    responses: dict[str, FloatArray]
+    design: int
+    surfaces: dict[str, Surface]
+    best: GasketDrawing
+    loads: tuple[str, ...]
+
+    @property
+    def kinds(self) -> list[str]:
+        """What each drawing is for."""
+        fresh = len(self.levels) - self.design - 1
+        return ["design"] * self.design + ["fresh"] * fresh + ["best"]
+
+    def errors(self, name: str) -> float:
+        """Return the RMS error of a surface on fresh drawings, by the response's range. [%]"""
+        fresh = slice(self.design, -1)
+        response = self.responses[name]
+        error = self.surfaces[name].at(self.levels[fresh]) - response[fresh]
+        spread = float(np.ptp(response[: self.design]))
+        return 100.0 * float(np.sqrt(np.mean(error**2))) / spread if spread else 0.0
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Return the drawings with their responses, and what the factors contribute."""
+        from wm_drake.studies.gasket_geometry.tables import contributions_table, drawings_table
+
+        return {"drawings": drawings_table(self), "contributions": contributions_table(self)}
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the tables for JSON."""
+        from wm_drake.studies.gasket_geometry.tables import as_plain_data
+
+        return as_plain_data(self)
+
+    def terminal(self) -> "Iterable[Table | str]":
+        """Return what the factors contribute, and the best drawing."""
+        from wm_drake.studies.gasket_geometry.page import contributions_shown, summary
+
+        return [contributions_shown(self).terminal(f"Gasket {self.name}"), summary(self)]
+
+    def page(self, facts: Facts) -> str:
+        """Return the page."""
+        from wm_drake.studies.gasket_geometry.page import geometry_page
+
+        return geometry_page(self, facts)
+
+    def write(self, folder: Path) -> None:
+        """Write the tables and the best drawing."""
+        super().write(folder)
+        (folder / "best.yaml").write_text(yaml_text(drawing_tree(self.best)), encoding="utf-8")
+
+
+def drawing_tree(drawing: GasketDrawing) -> dict[str, Any]:
+    """Return a drawing as the tree of its file."""
+    length = Unit("m", "mm")
+    points = [
+        {
+            name: length.text(round(getattr(point, name), 6))
+            for name in ("radius", "y", "thickness", "fillet")
+        }
+        for point in drawing.meridian
+    ]
+    rubber = {"shore_a": str(drawing.rubber.shore_a), "loss_factor": drawing.rubber.loss_factor}
+    if drawing.rubber.bulk_modulus is not None:
+        rubber["bulk_modulus"] = Unit("Pa", "MPa").text(drawing.rubber.bulk_modulus)
+    return {"about": drawing.about, "meridian": points, "rubber": rubber}
+
+
+class GeometryTask(Task):
+    """The study with checked options."""
+
+    def __init__(self, options: GeometryOptions, machine: Machine) -> None:
+        """Read the drawing, make the design, and check that each of its drawings can be built.
+
+        Raises:
+            InputError: an option, the drawing or a drawing of the design is wrong.
+        """
+        from scipy.stats.qmc import LatinHypercube
+
+        self.options, self.machine = options, machine.parameters
+        if self.machine.gasket is None:
+            raise input_error(
+                "the machine has no gasket, whose frames the new one takes", key="machine"
+            )
+        self.drawing = load_gasket_drawing(options.file)
+        self.factors = factors_of(self.drawing)
+        self.cases = selected_cases(self.machine, options.load, True, options.profile)
+        self.frequency = positive(options.frequency, Unit("Hz", "Hz"), "--frequency")
+        self.values = {
+            motion.name: curve_values(
+                getattr(options, motion.name), motion.rotates, POINTS, f"--{motion.name}"
+            )
+            for motion in MOTIONS
+        }
+        self.mesh = Mesh(options.elements, options.around)
+        sampler = LatinHypercube(len(self.factors), rng=options.seed)
+        parts = [sampler.random(count) for count in (options.drawings, options.fresh, CANDIDATES)]
+        self.design, self.fresh, self.candidates = (2.0 * part - 1.0 for part in parts)
+        for levels in (*self.design, *self.fresh):
+            Gasket(changed(self.drawing, self.factors, levels), self.mesh)
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """Return what determines the runs beside the machine."""
+        options = self.options
+        return {
+            "drawing": self.drawing,
+            "mesh": self.mesh,
+            "values": self.values,
+            "profile": self.cases[0].profile,
+            "loads": [case.load for case in self.cases],
+            "seed": str(options.seed),
+        }
+
+    def run(self, executor: Executor) -> GeometryResult:
+        """Compute all drawings, fit the surfaces, and verify the best drawing."""
+        assert executor.ledger is not None
+        levels = np.concatenate([self.design, self.fresh])
+        stiffness = []
+        with executor.progress(len(levels), "drawings") as progress:
+            for number, at in enumerate(levels):
+                stiffness.append(self._stiffness(executor.ledger, at))
+                progress(number + 1)
+        responses = self._responses(executor, levels, stiffness)
+        count = len(self.design)
+        surfaces = {
+            name: fit(self.design, response[:count]) for name, response in responses.items()
+        }
+        best = self._best(surfaces)
+        verified = self._responses(executor, best[None], [self._stiffness(executor.ledger, best)])
+        return GeometryResult(
+            self.options.file,
+            self.factors,
+            np.vstack([levels, best]),
+            {name: np.append(responses[name], verified[name]) for name in responses},
+            count,
+            surfaces,
+            changed(self.drawing, self.factors, best),
+            tuple(case.name for case in self.cases),
+        )
+
+    def _best(self, surfaces: dict[str, Surface]) -> FloatArray:
+        """Return the levels of the candidate with the largest gap that can be built."""
+        order = np.argsort(-surfaces[GAP].at(self.candidates))
+        for at in order:
+            try:
+                Gasket(changed(self.drawing, self.factors, self.candidates[at]), self.mesh)
+            except WmDrakeError:
+                continue
+            return np.asarray(self.candidates[at])
+        raise WmDrakeError("no drawing of the range can be built")
+
+    def _stiffness(self, ledger: Ledger, levels: FloatArray) -> GasketStiffness:
+        """Return the curves of a drawing, from the ledger if it has them.
+
+        Raises:
+            WmDrakeError: a curve ends early.
+        """
+        drawing = changed(self.drawing, self.factors, levels)
+        key = key_of(drawing=drawing, mesh=self.mesh, values=self.values, sources=sources_version())
+        if key not in ledger:
+            gasket, curves = Gasket(drawing, self.mesh), {}
+            for motion in MOTIONS:
+                curve = gasket.curve(motion, self.values[motion.name], lambda _: None)
+                if curve.stopped:
+                    raise WmDrakeError(
+                        f"{curve.stopped}, in the drawing with {self._text(levels)}; choose "
+                        "smaller ranges of motion. Finished drawings are kept"
+                    )
+                curves[motion.name] = curve
+            made = stiffness_of(curves)
+            tables = {name: np.array(table.curve) for name, table in made.tables.items()}
+            ledger.put(key, {**tables, "coupling": made.coupling})
+        kept = ledger.get(key).values
+        return GasketStiffness(
+            {motion.name: _table(motion.rotates, kept[motion.name]) for motion in MOTIONS},
+            float(kept["coupling"]),
+        )
+
+    def _text(self, levels: FloatArray) -> str:
+        return ", ".join(
+            f"{factor.name} {factor.value(level):.3g} {factor.unit}"
+            for factor, level in zip(self.factors, levels.tolist(), strict=True)
+        )
+
+    def _responses(
+        self, executor: Executor, levels: FloatArray, stiffness: Sequence[GasketStiffness]
+    ) -> dict[str, FloatArray]:
+        """Return the responses of drawings: stiffness, then worst of all loads. (n,) each"""
+        machines = [self._machine(at, one) for at, one in zip(levels, stiffness, strict=True)]
+        cases = [
+            Case(case.name, case.load, case.profile, parameters=machine)
+            for machine in machines
+            for case in self.cases
+        ]
+        table = executor.simulate(build_machine(machines[0]), MEASURES, cases)
+        shape = (len(machines), len(self.cases), -1)
+
+        def of_runs(name: str) -> FloatArray:
+            return np.asarray(table[name].values, dtype=float).reshape(shape)
+
+        slopes = {
+            name: np.array([one.tables[name].nominal_stiffness for one in stiffness])
+            for name in (motion.name for motion in MOTIONS)
+        }
+        force = np.linalg.norm(of_runs("gasket_force"), axis=-1)
+        return {
+            "radial_N_per_mm": 1e-3 * slopes["radial"],
+            "axial_N_per_mm": 1e-3 * slopes["axial"],
+            "twist_Nm_per_rad": slopes["twist"],
+            "tilt_Nm_per_rad": slopes["tilt"],
+            GAP: 1e3 * of_runs("smallest_gap").min(axis=(1, 2)),
+            "largest_amplitude_mm": 1e3 * of_runs("amplitude").max(axis=(1, 2)),
+            "largest_gasket_force_N": force.max(axis=1),
+        }
+
+    def _machine(self, levels: FloatArray, stiffness: GasketStiffness) -> MachineParameters:
+        drawing = changed(self.drawing, self.factors, levels)
+        damping = damping_per_stiffness(drawing, self.frequency)
+        return with_gasket(self.machine, stiffness, damping, "gasket-geometry")
+
+
+def _table(rotates: bool, curve: FloatArray) -> ForceTable | TorqueTable:
+    """Return a table of its abscissas and ordinates. (2, n)"""
+    x, y = map(tuple, curve.tolist())
+    return TorqueTable(angle=x, torque=y) if rotates else ForceTable(displacement=x, force=y)
