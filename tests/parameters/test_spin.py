@@ -69,6 +69,7 @@ def test_points(tmp_path):
         ("time: [0, 2]\nspeed: (0, 1) rpm", "has no unit"),
         ("time: (0, 2) s", "speed: is missing"),
         ("steps: 5", "a profile is either"),
+        ("steps: [{hold_until: 1 s}]\n'2020-13-45': x", "unknown key '2020-13-45'; a profile"),
         ("steps: [{hold_until: 1 s}]\ntime: (0, 1) s", "a profile is either"),
         ("steps: [{ramp_to: 5 rpm}]", "a step is"),
         ("steps: [{ramp_to: 5 rpm, rate: 1 rpm/s, hold_until: 9 s}]", "a step is"),

@@ -13,6 +13,7 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema
 
+from wm_drake.errors import shortened
 from wm_drake.parameters import units as u
 from wm_drake.parameters.elements import Frozen
 from wm_drake.parameters.problems import problems_of
@@ -220,9 +221,11 @@ class SpinProfile(Frozen):
             return data
         steps, others = data.get("steps"), set(data) - {"steps", "regions", "band"}
         if others or not isinstance(steps, list):
+            unknown = sorted(str(key) for key in others - {"time", "speed"})
+            named = f"unknown key '{shortened(unknown[0], 40)}'; " if unknown else ""
             raise ValueError(
-                "a profile is either {steps: [...]} or {time: (...) s, speed: (...) rpm}; regions "
-                "and band are optional"
+                f"{named}a profile is either {{steps: [...]}} or {{time: (...) s, speed: (...) "
+                "rpm}; regions and band are optional"
             )
         points, stairs = [(0.0, 0.0)], list[dict[str, str]]()
         for index, entry in enumerate(steps):
