@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rubber_walls import C1, SHEAR, antisymmetric, drawing
 
-from wm_drake.parameters.gasket_drawing import GasketDrawing, MeridianPoint, Rubber
 from wm_drake.solid import curves, equilibrium
 from wm_drake.solid.curves import AXIAL, RADIAL, TILT, TWIST, Gasket, Mesh, curve
 from wm_drake.solid.deformed import deformed, folds_touch, wrinkles
@@ -14,17 +14,7 @@ from wm_drake.solid.element import UNKNOWNS, element_energy, write_element
 from wm_drake.solid.equilibrium import Solver
 from wm_drake.solid.mesh import half_ring, wedge
 
-C1 = 0.3e6
-SHEAR = 2.0 * C1
-"""Shear modulus of a Neo-Hookean rubber of constant C1. [Pa]"""
 YEOH = np.array([0.3e6, 0.05e6, 0.02e6])
-
-
-def drawing(*corners, bulk=500.0 * SHEAR, **rubber):
-    """Return a drawing through corners (radius, y, thickness). [m]"""
-    constants = {"c1": C1, "bulk_modulus": bulk} | rubber
-    points = (MeridianPoint(radius=r, y=y, thickness=t) for r, y, t in corners)
-    return GasketDrawing(meridian=tuple(points), rubber=Rubber(**constants))
 
 
 def bush(inner, outer, length, bulk=500.0 * SHEAR):
@@ -197,20 +187,12 @@ def test_x_and_z_are_alike_and_the_coupling_has_a_potential(wave):
         tilt.slope_at_rest(RADIAL.component), rel=1e-5
     )
     ring = half_ring(wave[0], 4, 4)
-    across = replace(ring, locked=_antisymmetric(ring))  # displacement along z, plane z = 0
+    across = replace(ring, locked=antisymmetric(ring))  # displacement along z, plane z = 0
     solver, along_z = Solver(across, wave[0].rubber), np.zeros((len(ring.moved), 3))
     along_z[:, 2] = 1e-5
     solved = solver.solve(along_z, solver.at_rest())
     force = 2.0 * solved.forces[ring.moved, 2].sum()
     assert force / 1e-5 == pytest.approx(radial.slope_at_rest(), rel=1e-6)
-
-
-def _antisymmetric(ring):
-    """Return the locked directions of motions along z: x and y in the plane z = 0."""
-    locked = np.zeros_like(ring.locked)
-    plane = ring.locked[:, 2]
-    locked[plane, 0] = locked[plane, 1] = True
-    return locked
 
 
 def test_axial_and_twist_of_a_wedge_are_those_of_half_a_ring(wave):
