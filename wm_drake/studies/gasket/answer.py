@@ -40,9 +40,10 @@ def setting_text(proposal: Proposal, words: Words) -> str:
 
 def _change_text(change: Change, words: Words) -> str:
     nominal = next(iter(change.factor.nominal.values()))
-    value = change.text.replace("*", " ")
-    before = f" in place of {nominal}" if nominal and not value.endswith("%") else ""
-    return f"{words.factor(change.factor.name)} {value}{before}"
+    if change.text.endswith("%"):
+        return f"{words.factor(change.factor.name)} {change.text} of its table"
+    before = f" in place of {nominal}" if nominal else ""
+    return f"{words.factor(change.factor.name)} {change.text.replace('*', ' ')}{before}"
 
 
 def answer(proposal: Proposal, words: Words) -> str:
