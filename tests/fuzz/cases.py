@@ -19,6 +19,7 @@ from wm_drake.parameters.components import COMPONENTS_FOLDER
 from wm_drake.parameters.designs import DESIGNS_FOLDER
 from wm_drake.parameters.factors import GASKET_FACTORS
 from wm_drake.parameters.files import CYCLES_FOLDER, MACHINES_FOLDER
+from wm_drake.parameters.gasket_drawing import shipped_gaskets
 from wm_drake.parameters.tolerances import TOLERANCES_FOLDER
 
 
@@ -376,6 +377,7 @@ SHIPPED = {
     "factors": GASKET_FACTORS,
     "tolerance": TOLERANCES_FOLDER / "laundry.yaml",
     "design file": DESIGNS_FOLDER / "gasket.yaml",
+    "drawing": shipped_gaskets()["folded"],
 }
 TEXTS = {
     "limits": "limits:\n- {quantity: gap, at_least: 0 mm, allowed_share: 0.1 %}\n",
@@ -439,6 +441,7 @@ def commands(file: str) -> dict[str, list[str]]:
         "signals": ["record", "orders", file],
         "tolerance": ["study", "tolerance", file, "--samples", "16"],
         "limits": ["study", "tolerance", "--samples", "16", "--limits", file],
+        "drawing": ["gasket", "curves", file, "--quick"],
         "design file": ["study", "design", file, "--evaluations", "8", "--population", "4"],
     }
 
