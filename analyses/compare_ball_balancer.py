@@ -31,6 +31,8 @@ HEAVY = np.deg2rad(224.0)
 """Phase of the static unbalance, Table 2, where both balls lie at the start. [rad]"""
 OUTSIDE = ((0.0, 1250.0), (2550.0, 6000.0))
 """Ranges of speed outside the resonances. [rpm]"""
+FIRST = 2550.0
+"""First speed above the resonances. [rpm]"""
 
 
 def rig(damping: float, gravity: float = 9.81) -> MachineParameters:
@@ -93,13 +95,15 @@ def summary(damping: float, compared: pd.DataFrame) -> str:
     """Return the errors outside the resonances and the agreement inside them, in a line."""
     outside = np.any([compared.speed_rpm.between(*ends) for ends in OUTSIDE], axis=0)
     errors = 100.0 * np.abs(compared.ours_max / compared.paper_max - 1.0)[outside]
+    beyond = errors[compared.speed_rpm[outside] != FIRST]
     ours, paper = (
         compared[f"{who}_max"] < 1.05 * compared[f"{who}_min"] for who in ("ours", "paper")
     )
     same = (ours == paper)[~outside]
     return (
         f"race damping {damping:g}: outside the resonances median {errors.median():.1f} %, "
-        f"largest {errors.max():.1f} % ({len(errors)} speeds); inside, the same kind of motion "
+        f"largest {errors.max():.1f} %, without {FIRST:g} rpm {beyond.max():.1f} % ({len(errors)} "
+        f"speeds); inside, the same kind of motion "
         f"(steady or not) at {same.sum()} of {len(same)} speeds"
     )
 
