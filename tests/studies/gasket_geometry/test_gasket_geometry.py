@@ -61,8 +61,10 @@ def test_thicker_and_harder_walls_are_stiffer_and_the_best_drawing_is_verified(t
         result.surfaces[name].contributions() for name in ("axial_N_per_mm", "twist_Nm_per_rad")
     )
     assert bending[0] > 1.5 * shear[0]  # bending goes with the cube of the thickness
-    assert result.kinds == ["design"] * 6 + ["fresh"] * 2 + ["best"]
+    assert result.kinds == ["design"] * 6 + ["fresh"] * 2 + ["best of surface"]
     assert result.errors("twist_Nm_per_rad") < 10.0
+    gap = result.responses["smallest_gap_mm"]
+    assert gap[result.best_at] == gap.max()
     best = load_gasket_drawing(out / "best.yaml")
     assert best.rubber.shore_a == pytest.approx(result.best.rubber.shore_a)
     for point, other in zip(best.meridian, result.best.meridian, strict=True):

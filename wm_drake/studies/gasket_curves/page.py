@@ -122,7 +122,7 @@ def values_shown(result: CurvesResult) -> Table:
         )
         groups.append(line(row["axis"].replace("_", " "), cells))
     header = (
-        "axis", "unit of stiffness", "stiffness at rest", "first 20 %", "damping, s times it",
+        "axis", "unit of stiffness", "stiffness at rest", "first 20 %", "damping, times s",
         "secant at the negative end", "at the positive end",
     )  # fmt: skip
     caption = (

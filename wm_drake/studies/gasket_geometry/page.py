@@ -15,8 +15,9 @@ METHOD = (
     "The drawings are a Latin hypercube of the factors. Finite elements give the curves of each, "
     "and the machine runs all loads with each gasket. The responses are fitted with polynomials of "
     "degree two (degree one if there are few drawings). The error is that on fresh drawings, by "
-    "the range of the response in the design. The best drawing has the largest gap on the surface; "
-    "it is computed and run itself. There is no contact between folds."
+    "the range of the response in the design. The drawing with the largest gap on the surface is "
+    "computed and run too; the best drawing is that with the largest gap of all that were run. "
+    "There is no contact between folds."
 )
 
 
@@ -51,14 +52,18 @@ def summary(result: GeometryResult) -> str:
     """Return the result in a few sentences."""
     best = ", ".join(
         f"{factor.words} {significant(factor.value(level), 3)} {factor.unit}"
-        for factor, level in zip(result.factors, result.levels[-1].tolist(), strict=True)
+        for factor, level in zip(
+            result.factors, result.levels[result.best_at].tolist(), strict=True
+        )
     )
-    gap, expected = result.responses[GAP][-1], float(result.surfaces[GAP].at(result.levels[-1:])[0])
+    gap = result.responses[GAP]
+    expected = float(result.surfaces[GAP].at(result.levels[-1:])[0])
     middle = float(result.surfaces[GAP].at(np.zeros((1, len(result.factors))))[0])
     return (
-        f"Best drawing: {best}. Its run has a smallest gap of {number(gap, 2)} mm (surface: "
-        f"{number(expected, 2)} mm); in the middle of the ranges the surface has "
-        f"{number(middle, 2)} mm. Error of the surface of the gap on fresh drawings: "
+        f"Best drawing that was run: {best}. Its smallest gap is {number(gap[result.best_at], 2)} "
+        f"mm; in the middle of the ranges the surface has {number(middle, 2)} mm. The drawing with "
+        f"the largest gap on the surface, {number(expected, 2)} mm, has {number(gap[-1], 2)} mm "
+        f"when it is run. Error of the surface of the gap on fresh drawings: "
         f"{number(result.errors(GAP))} % of the range."
     )
 

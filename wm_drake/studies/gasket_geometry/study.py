@@ -69,11 +69,12 @@ class GeometryResult(Result):
     Attributes:
         name: Name or file of the drawing.
         factors: Factors.
-        levels: Levels of all drawings: those of the design, fresh ones, the best. (n, factors)
+        levels: Levels of all drawings: those of the design, fresh ones, that with the largest gap
+            on the surface. (n, factors)
         responses: Their responses by name. (n,) each
         design: Number of drawings of the design.
         surfaces: Response surfaces by name.
-        best: The best drawing.
+        best: The drawing whose runs have the largest gap.
         loads: Names of the loads.
     """
 
@@ -90,7 +91,12 @@ class GeometryResult(Result):
     def kinds(self) -> list[str]:
         """What each drawing is for."""
         fresh = len(self.levels) - self.design - 1
-        return ["design"] * self.design + ["fresh"] * fresh + ["best"]
+        return ["design"] * self.design + ["fresh"] * fresh + ["best of surface"]
+
+    @property
+    def best_at(self) -> int:
+        """Number of the drawing whose runs have the largest gap."""
+        return int(np.argmax(self.responses[GAP]))
 
     def errors(self, name: str) -> float:
         """Return the RMS error of a surface on fresh drawings, by the response's range. [%]"""
@@ -206,16 +212,19 @@ class GeometryTask(Task):
         surfaces = {
             name: fit(self.design, response[:count]) for name, response in responses.items()
         }
-        best = self._best(surfaces)
-        verified = self._responses(executor, best[None], [self._stiffness(executor.ledger, best)])
+        proposed = self._best(surfaces)
+        made = self._stiffness(executor.ledger, proposed)
+        verified = self._responses(executor, proposed[None], [made])
+        levels = np.vstack([levels, proposed])
+        every = {name: np.concatenate([responses[name], verified[name]]) for name in responses}
         return GeometryResult(
             self.options.file,
             self.factors,
-            np.vstack([levels, best]),
-            {name: np.append(responses[name], verified[name]) for name in responses},
+            levels,
+            every,
             count,
             surfaces,
-            changed(self.drawing, self.factors, best),
+            changed(self.drawing, self.factors, levels[int(np.argmax(every[GAP]))]),
             tuple(case.name for case in self.cases),
         )
 
