@@ -1,9 +1,10 @@
 /* Returns what is wrong with the order of a page: the answer in words and numbers, then pictures,
-   then tables, then how it was made. A table that belongs to a control is not a table of results. */
+   then tables, then how it was made. A table that belongs to the answer (what to change, what to do) or
+   to a control is not a table of results. */
 const faults = [];
 const summary = document.querySelector("main > .summary"), made = document.getElementById("run");
 const figures = [...document.querySelectorAll("main figure")];
-const tables = [...document.querySelectorAll("main table:not(.goals):not(.control)")];
+const tables = [...document.querySelectorAll("main table:not(.goals):not(.control)")].filter(table => !table.closest(".answer, #what-to-do"));
 const before = (a, b) => Boolean(a.compareDocumentPosition(b) & Node.DOCUMENT_POSITION_FOLLOWING);
 if (!summary || !/\d/.test(summary.textContent) || !/[.]$/.test(summary.textContent.trim())) faults.push("no answer with numbers");
 if (!made || !made.querySelector("dl")) faults.push("nothing says how the page was made");
