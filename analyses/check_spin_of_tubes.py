@@ -23,8 +23,9 @@ from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters, SpinProfile
 from wm_drake.parameters.spin import Region
 from wm_drake.parameters.unbalance_cases import UnbalanceCase
+from wm_drake.simulation.band import HIGH_PASS_HZ
 from wm_drake.simulation.outputs import point_displacements
-from wm_drake.simulation.vibration import HIGH_PASS_HZ, high_passed, region_rms, relative_error
+from wm_drake.simulation.vibration import high_passed, region_rms, relative_error
 
 PERIOD = 5e-3
 """Sampling period. [s]"""

@@ -6,13 +6,12 @@ from scipy.signal import butter, find_peaks, sosfiltfilt
 
 from wm_drake.batch import simulate_many
 from wm_drake.parameters import SpinProfile
+from wm_drake.simulation.band import band_warnings, pass_band
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.displacements import (
     amplitudes,
-    band_warnings,
     filtered,
     filtered_displacement,
-    pass_band,
 )
 from wm_drake.simulation.runs import simulate
 

@@ -25,7 +25,7 @@ from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters
 from wm_drake.simulation.cases import Case, notice_jumping_friction
 from wm_drake.simulation.measures import MEASURES
-from wm_drake.simulation.runs import checked_step
+from wm_drake.simulation.steps import checked_step
 
 CASES_PER_WORK_ITEM = 32
 """Number of cases that are sent together.

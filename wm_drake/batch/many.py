@@ -21,7 +21,7 @@ from wm_drake.simulation.cases import Case, case_of, notice_jumping_friction
 from wm_drake.simulation.feet import cabinet_of
 from wm_drake.simulation.measures import MEASURES, Variable
 from wm_drake.simulation.measures.labels import LABELS
-from wm_drake.simulation.runs import checked_integrator, checked_step
+from wm_drake.simulation.steps import checked_integrator, checked_step
 
 PAUSE = 2e-5
 """Pause after each case that is prepared. [s]"""

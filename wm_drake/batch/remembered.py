@@ -17,7 +17,7 @@ from wm_drake.parameters import MachineParameters
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.records import versions
-from wm_drake.simulation.runs import checked_step
+from wm_drake.simulation.steps import checked_step
 
 _ROOMS_AFTER = ("cli", "batch/ledger.py", "report", "rigs", "studies")
 """Parts of the package that do not influence the result of a run."""

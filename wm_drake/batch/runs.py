@@ -29,9 +29,10 @@ from wm_drake.engines.trajectory import (
 from wm_drake.model.scene import Gap, Scene
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
+from wm_drake.simulation.band import pass_band
 from wm_drake.simulation.cabinet import floor_forces
 from wm_drake.simulation.cases import Case
-from wm_drake.simulation.displacements import amplitudes, filtered_lanes, pass_band
+from wm_drake.simulation.displacements import amplitudes, filtered_lanes
 from wm_drake.simulation.feet import cabinet_of
 from wm_drake.simulation.histories import measure_samples_lanes, poses_of_runs
 from wm_drake.simulation.measures import MEASURES, Run

@@ -20,7 +20,7 @@ from wm_drake.errors import InputError
 from wm_drake.model.machine import Machine
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
-from wm_drake.simulation.runs import checked_integrator, checked_step
+from wm_drake.simulation.steps import checked_integrator, checked_step
 
 LARGEST_DIFFERENCE = 0.02
 """Largest difference of amplitudes that needs no warning, by the largest amplitude of the run."""

@@ -85,7 +85,7 @@ def machine_show(
     The output has bodies, elements, preloads, the equilibrium and the natural frequencies.
     """
     from wm_drake.model.build import build_machine
-    from wm_drake.simulation.runs import checked_step
+    from wm_drake.simulation.steps import checked_step
     from wm_drake.studies.description.description import as_text, describe
 
     parameters = load_parameters(file, sets)

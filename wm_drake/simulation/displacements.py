@@ -11,89 +11,20 @@ from wm_drake.compiler.kept import kept
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.engines.compiled.packing import aligned
 from wm_drake.model.scene import REPLAY_RATE
-from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
+from wm_drake.simulation.band import (
+    FILTER_ORDER,
+    LEAST_UPPER_EDGE,
+    LOWER_EDGE,
+    PADDING_PERIODS,
+    pass_band,
+)
 from wm_drake.simulation.outputs import point_positions
 from wm_drake.simulation.records import Record, profile_of, sample_period
 from wm_drake.simulation.signals import filter_both_ways, largest_peaks
 
-LOWER_EDGE = 0.5
-"""Lower edge of the pass band without one in the profile. [Hz]
-
-Slower motion, such as the shift of the mean at a change of speed, does not count as vibration. It
-is also the lower edge in [B] section 2.2.
-"""
-
-LEAST_UPPER_EDGE = 20.0
-"""Smallest upper edge of the pass band without one in the profile. [Hz]
-
-An assumption: slow machines keep the orders that their friction causes. It is also the upper edge
-in [B] section 2.2, where the drum turns at up to 400 rpm.
-"""
-
-ORDERS_PASSED = 2.5
-"""Smallest ratio of the upper band edge to the highest drum frequency: two orders pass.
-
-An assumption; in [B] the ratio is 3.
-"""
-
-HIGHEST_PART = 0.45
-"""Largest ratio of an upper band edge to the sampling frequency."""
-
-FILTER_ORDER = 4
-"""Order of the Butterworth filter ([B] section 2.2).
-
-The filter runs forwards and backwards, so that it shifts no phase.
-"""
-
-PADDING_PERIODS = 2.5
-"""Length by which displacements are mirrored at both ends, in periods of the lower band edge.
-
-With the padding that scipy chooses, a record that ends at a resonance would show peaks that are a
-third too large near its end.
-"""
-
 REPLAY_SPAN = 8.0
 """Length of a replay. [s]"""
-
-
-def pass_band(profile: SpinProfile, period: float) -> tuple[float, float]:
-    """Return the pass band of the displacements of a run. [Hz]
-
-    It is that of the profile. A profile without one has a band up to `ORDERS_PASSED` times the
-    highest drum frequency, since 20 Hz would cut the motion at 1200 rpm in half.
-
-    Args:
-        profile: Spin profile of the run.
-        period: Time between samples. [s]
-    """
-    low, high = profile.band or (
-        LOWER_EDGE,
-        max(LEAST_UPPER_EDGE, ORDERS_PASSED * _highest_frequency(profile)),
-    )
-    return low, max(min(high, HIGHEST_PART / period), 1.001 * low)
-
-
-def _highest_frequency(profile: SpinProfile) -> float:
-    """Return the highest frequency of drum revolutions. [Hz]"""
-    return max(map(abs, profile.speed)) / (2.0 * np.pi)
-
-
-def band_warnings(profile: SpinProfile, period: float) -> list[str]:
-    """Return a warning if the pass band of displacements cuts the highest speed of a profile."""
-    low, high = pass_band(profile, period)
-    highest = _highest_frequency(profile)
-    if low <= highest <= high or highest == 0.0:
-        return []
-    remedy = (
-        "remove profile.band or widen it"
-        if profile.band and not low <= highest <= profile.band[1]
-        else "choose a shorter output_period"
-    )
-    return [
-        f"the pass band of displacements, {low:g} to {high:.3g} Hz, cuts the highest drum speed, "
-        f"{60.0 * highest:.4g} rpm or {highest:.3g} Hz, so amplitudes are too small; {remedy}"
-    ]
 
 
 def band_of(record: Record) -> tuple[float, float]:

@@ -16,15 +16,9 @@ from wm_drake.compiler.compilation import generic
 from wm_drake.compiler.vectors import rotation_from_rpy
 from wm_drake.parameters import Sensor, SpinProfile
 from wm_drake.parameters.types import FloatArray
+from wm_drake.simulation.band import HIGH_PASS_HZ, PADDING_PERIODS, RMS_FILTER_ORDER
 from wm_drake.simulation.outputs import point_displacements
 from wm_drake.simulation.records import Record
-
-HIGH_PASS_HZ = 0.5
-"""Corner frequency of the filter: the lower band edge of [B] section 2.2.
-
-Slower motion does not count as vibration. There is no upper band edge, because the RMS includes all
-drum speeds.
-"""
 
 DRIFT_HZ = 0.1
 """Corner frequency of the filter that removes the drift after each integration.
@@ -32,14 +26,8 @@ DRIFT_HZ = 0.1
 It is a fifth of `HIGH_PASS_HZ`, so that it does not change the motion above that frequency.
 """
 
-ORDER = 4
-"""Order of the Butterworth filters, which run forwards and backwards and so shift no phase."""
-
 FEWEST = 16
 """Smallest number of samples that is filtered; results for fewer samples are NaN."""
-
-PADDING_PERIODS = 2.5
-"""Length of the padding at both ends before filtering, in periods of the corner frequency."""
 
 
 def region_displacements(
@@ -196,7 +184,9 @@ def high_passed(signal: FloatArray, period: float, corner_hz: float) -> FloatArr
 def _high_pass(period: float, corner_hz: float) -> FloatArray:
     from scipy.signal import butter  # slow to import: accelerations
 
-    return np.asarray(butter(ORDER, corner_hz, btype="highpass", fs=1.0 / period, output="sos"))
+    return np.asarray(
+        butter(RMS_FILTER_ORDER, corner_hz, btype="highpass", fs=1.0 / period, output="sos")
+    )
 
 
 def region_rms(signal: FloatArray, period: float, profile: SpinProfile) -> FloatArray:

@@ -149,8 +149,8 @@ def machine_warnings(parameters: "MachineParameters", profile: Path | None = Non
         parameters: The machine.
         profile: File of the option `--profile`.
     """
+    from wm_drake.simulation.band import band_warnings
     from wm_drake.simulation.cases import UNUSED_PHASE_ERROR
-    from wm_drake.simulation.displacements import band_warnings
 
     unused = [UNUSED_PHASE_ERROR] if parameters.imperfections.phase_error else []
     chosen = profile_of(parameters, profile)
@@ -241,7 +241,7 @@ def built_with_problems(
     from wm_drake.model.scene import Scene
     from wm_drake.parameters import located, machine_path, measured_amplitudes, published_results
     from wm_drake.parameters.files import check_tables
-    from wm_drake.simulation.runs import checked_step
+    from wm_drake.simulation.steps import checked_step
 
     with located_in(file):
         check_tables(parameters)

@@ -434,7 +434,7 @@ def _warnings(
 
 def _stepping(machine: "Machine | None") -> tuple[float, str]:
     """Return step size and integrator of a machine; (0, "") without one. [s]"""
-    from wm_drake.simulation.runs import checked_integrator, checked_step
+    from wm_drake.simulation.steps import checked_integrator, checked_step
 
     if machine is None:
         return 0.0, ""

@@ -26,7 +26,7 @@ from wm_drake.parameters import (
 from wm_drake.parameters.variation import value_at
 from wm_drake.simulation.cases import Case, case_of
 from wm_drake.simulation.mounts import mount_names
-from wm_drake.simulation.runs import checked_integrator, checked_step
+from wm_drake.simulation.steps import checked_integrator, checked_step
 from wm_drake.studio.numbers import Slider, sliders_of
 from wm_drake.studio.shared_values import SharedValues
 from wm_drake.studio.state import DESCRIBED, State

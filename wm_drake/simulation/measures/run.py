@@ -11,7 +11,8 @@ from wm_drake.model.scene import Gap, Scene
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.cabinet import Cabinet
 from wm_drake.parameters.types import FloatArray
-from wm_drake.simulation.displacements import amplitudes, filtered, pass_band
+from wm_drake.simulation.band import pass_band
+from wm_drake.simulation.displacements import amplitudes, filtered
 from wm_drake.simulation.feet import foot_measures
 
 Need: TypeAlias = Literal["sensors", "shapes", "tub", "mounts", "feet", "springs"]

@@ -29,7 +29,7 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.simulation.balance import in_planes, rings_of
 from wm_drake.simulation.cases import Case
-from wm_drake.simulation.runs import checked_step
+from wm_drake.simulation.steps import checked_step
 from wm_drake.studies.balancer.options import BalancerOptions
 from wm_drake.studies.inputs import quantities_of
 from wm_drake.studies.run import Executor

@@ -24,9 +24,13 @@ from wm_drake.parameters import (
 )
 from wm_drake.parameters.rubber import RubberBranches
 from wm_drake.parameters.types import FloatArray
-from wm_drake.simulation.displacements import FILTER_ORDER, PADDING_PERIODS, pass_band
-from wm_drake.simulation.vibration import HIGH_PASS_HZ
-from wm_drake.simulation.vibration import ORDER as RMS_ORDER
+from wm_drake.simulation.band import (
+    FILTER_ORDER,
+    HIGH_PASS_HZ,
+    PADDING_PERIODS,
+    RMS_FILTER_ORDER,
+    pass_band,
+)
 from wm_drake.studies.description.modal import natural_modes
 from wm_drake.studies.description.schema import VERSION
 
@@ -197,7 +201,7 @@ def _numerics(parameters: MachineParameters) -> dict[str, Any]:
         "displacement_filter": f"Butterworth band-pass of order {FILTER_ORDER}, {both_ways}; ends "
         f"mirrored over {PADDING_PERIODS / band[0]:g} s",
         "displacement_band_hz": list(band),
-        "rms_filter": f"Butterworth high-pass of order {RMS_ORDER}, {both_ways}",
+        "rms_filter": f"Butterworth high-pass of order {RMS_FILTER_ORDER}, {both_ways}",
         "rms_high_pass_hz": HIGH_PASS_HZ,
     }
 

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from wm_drake.engines.trajectory import COORDINATES
 from wm_drake.parameters.types import FloatArray
@@ -113,6 +112,8 @@ def names_of(shares: FloatArray) -> list[str]:
     Args:
         shares: Participation of the six coordinates in up to six modes. (modes, 6)
     """
+    from scipy.optimize import linear_sum_assignment  # slow to import: names of modes
+
     modes, coordinates = linear_sum_assignment(-shares)
     words = [NAMES[coordinate] for coordinate in COORDINATES]
     names = {int(mode): words[c] for mode, c in zip(modes, coordinates, strict=True)}

@@ -23,7 +23,8 @@ from wm_drake.simulation.measures import Measures, measure
 from wm_drake.simulation.measures.as_json import as_json
 from wm_drake.simulation.mounts import POINT
 from wm_drake.simulation.records import Record, save_record
-from wm_drake.simulation.runs import DEFAULT_ENGINE, DivergenceWarning, checked_step, simulate
+from wm_drake.simulation.runs import DEFAULT_ENGINE, DivergenceWarning, simulate
+from wm_drake.simulation.steps import checked_step
 from wm_drake.studies.spin.processes import can_start_processes, map_in_processes
 from wm_drake.studies.study import Facts, Result
 

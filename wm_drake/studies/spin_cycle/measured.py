@@ -14,7 +14,8 @@ from wm_drake.parameters.lab_files import SUFFIXES, is_lab_file
 from wm_drake.parameters.lab_signals import ACCELERATION, lab_signals
 from wm_drake.parameters.time_stamps import with_distinct_times
 from wm_drake.parameters.types import FloatArray
-from wm_drake.simulation.vibration import HIGH_PASS_HZ, high_passed, integrated_twice, region_rms
+from wm_drake.simulation.band import HIGH_PASS_HZ
+from wm_drake.simulation.vibration import high_passed, integrated_twice, region_rms
 from wm_drake.studies.spin_cycle.study import DIMS
 
 RMS_COLUMNS = ["case", "region", "sensor", "axis", "rms_mm"]

@@ -20,7 +20,7 @@ from wm_drake.parameters.tolerances import (
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.measures.responses import Response, chosen_responses, has_gap, measures_of
-from wm_drake.simulation.runs import checked_step
+from wm_drake.simulation.steps import checked_step
 from wm_drake.studies.inputs import (
     existing_file,
     problems_of_file,

@@ -30,7 +30,7 @@ from wm_drake.simulation.measures.responses import (
     known_responses,
     measures_of,
 )
-from wm_drake.simulation.runs import checked_step
+from wm_drake.simulation.steps import checked_step
 from wm_drake.studies.inputs import problems_of_option, profile_of, selected_cases
 from wm_drake.studies.study import Task
 from wm_drake.studies.tolerance.options import ToleranceOptions
