@@ -75,11 +75,18 @@ PERCENTS = named(("0", "1", "5", "10", "25", "50", "100 %"), (0, 1, 5, 10, 25, 5
 """Ticks of the colour scale of contributions."""
 
 
-def heat_map_figure(screening: Screening, words: Words) -> Figure:
-    """Return the contributions in percent: one row per term, one column per load and response."""
+def heat_map_figure(screening: Screening, words: Words, loads: Sequence[str] = ()) -> Figure:
+    """Return the contributions in percent: one row per term, one column per load and response.
+
+    Args:
+        screening: Result of the study.
+        words: Names for reading.
+        loads: Loads to show; all if empty. The rows are those of all loads.
+    """
+    loads = list(loads) or screening.loads
     table = contributions(screening).fillna(0.0)
-    shown = table[table.max(axis=1) >= SMALLEST_PERCENT]
-    values, labels = shown.to_numpy(), list(screening.tables)
+    shown = table[table.max(axis=1) >= SMALLEST_PERCENT][loads]
+    values, labels = shown.to_numpy(), [label for label in screening.tables if label[0] in loads]
     rows, columns = values.shape
     longest = max(len(name) for _, name in labels)
     # the square root makes small contributions visible
@@ -90,7 +97,7 @@ def heat_map_figure(screening: Screening, words: Words) -> Figure:
             color = "#ffffff" if value > 40.0 else MARK
             marks.append(Text(column, row, number(value, 0), color=color))
     rise = 24.0 + (7.0 * longest if longest > 4 else 0.0)
-    for index, load in enumerate(screening.loads):
+    for index, load in enumerate(loads):
         first = len(screening.names) * index
         middle = first + 0.5 * (len(screening.names) - 1)
         above = Text(middle, 1.0, f"load {load}", is_bold=True, in_data=(True, False), up="bottom")

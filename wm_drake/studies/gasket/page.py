@@ -125,7 +125,7 @@ class GasketResult(Result):
             [
                 self._what_to_do(),
                 Section("findings", "Findings of the study", remarks=findings, is_folded=True),
-                Section("contributions", "Contributions", (_heat_map(screening, words),)),
+                Section("contributions", "Contributions", _heat_maps(screening, words)),
                 Section("explore", "Explore the fitted model", body=self._explorer(models)),
                 *self._load_sections(models),
                 Section(
@@ -255,18 +255,23 @@ def _by_kind(screening: Screening, words: Words) -> dict[str, list[str]]:
     return kinds
 
 
-def _heat_map(screening: Screening, words: Words) -> Picture:
+def _heat_maps(screening: Screening, words: Words) -> list[Picture]:
+    """Return the contributions, two loads in a picture: more do not fit on paper."""
     caption = (
         "Contribution of each term to the variance of each response, in percent: main effects "
         "above, interactions below. The symbols of the responses are explained under Run details. "
         f"Terms that contribute less than {figures.SMALLEST_PERCENT:g} % to every response are "
         "not shown. The colour scale follows the square root of the percentage."
     )
-    return picture(
-        figures.heat_map_figure(screening, words),
-        "Heat map of contributions; the numbers are in the tables below.",
-        caption,
-    )
+    pairs = [screening.loads[i : i + 2] for i in range(0, len(screening.loads), 2)]
+    return [
+        picture(
+            figures.heat_map_figure(screening, words, pair),
+            f"Heat map of contributions, {', '.join(pair)}; the numbers are in the tables below.",
+            caption,
+        )
+        for pair in pairs
+    ]
 
 
 def _spreads(screening: Screening, words: Words) -> list[Picture]:
