@@ -46,6 +46,9 @@ STUDIES = (
     ("study", "spin-identify", "--quick"),
     ("study", "tolerance", "--quick", "--samples", "64"),
     ("calibrate", "--quick", "--free", "free.yaml"),
+    ("verdict", "--quick"),
+    ("study", "balancer", "--quick"),
+    ("study", "gasket-geometry", "--quick", "--drawings", "6", "--fresh", "2", "--load", "middle"),
 )
 """Studies with a ledger, all that can be resumed, in small sizes; they are killed."""
 
