@@ -125,13 +125,13 @@ def _surface(ring: Ring, u: FloatArray) -> FloatArray:
 
 
 def _mesh_lines(places: FloatArray) -> Iterator[FloatArray]:
-    """Yield the lines of a mesh in the plane of the view, each with a gap behind it. (n, 2) [m]"""
+    """Yield the lines of a mesh in the plane of the view, to and fro along its edges. (n, 2) [m]"""
     x, y, z = np.moveaxis(places, -1, 0)
     right = x * math.cos(YAW) + y * math.sin(YAW)
     away = -x * math.sin(YAW) + y * math.cos(YAW)
     seen = np.stack([right, z * math.cos(ELEVATION) + away * math.sin(ELEVATION)], axis=-1)
-    gap = np.full((1, 2), np.nan)
-    along = range(0, seen.shape[0], max(1, seen.shape[0] // 20))
-    for line in (*(seen[i] for i in along), *(seen[:, j] for j in range(seen.shape[1]))):
-        yield line
-        yield gap
+    along = seen[:: max(1, seen.shape[0] // 20)]
+    for lines in (along, np.swapaxes(seen, 0, 1)):
+        for number, line in enumerate(lines):
+            yield line[:: -1 if number % 2 else 1]
+        yield np.full((1, 2), np.nan)
