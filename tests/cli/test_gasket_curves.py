@@ -4,12 +4,15 @@ import json
 import math
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
 import wm_drake as wm
 from wm_drake.parameters import load_machine
+from wm_drake.parameters.gasket_drawing import load_gasket_drawing, tension_stress
 from wm_drake.solid import curves as solid_curves
+from wm_drake.solid.rubber import energy
 
 SMALL = ("--quick", "--points", "2", "--twist", "2 deg", "--tilt", "1 deg")
 
@@ -72,6 +75,33 @@ def test_python_and_json_give_the_same(wm_drake):
     assert by_axis["x"] == by_axis["z"]
 
 
+def test_constants_are_fitted_to_a_tension_test(wm_drake):
+    planted = (0.3e6, -0.01e6, 0.002e6)
+    stretch = [0.8, 1.0, 1.2, 1.6, 2.0, 2.4, 2.8]
+    stress = 1e-6 * tension_stress(np.array(stretch), planted)
+    listed = ", ".join(f"{value!r}" for value in stress.tolist())
+    rubber = f"{{test: {{stretch: {stretch}, stress: '({listed}) MPa'}}}}"
+    Path("mine.yaml").write_text(drawing(rubber=rubber))
+    fitted = load_gasket_drawing("mine.yaml").rubber
+    np.testing.assert_allclose(fitted.constants, planted, rtol=1e-9)
+    assert fitted.test.deviation < 1e-12
+    ended = wm_drake("gasket", "curves", "mine.yaml", *SMALL, "--out", "out")
+    assert ended.code == 0, ended.err
+    page = Path("out/report.html").read_text(encoding="utf-8")
+    assert "root mean square of fit less test" in page
+
+
+def test_stress_in_tension_is_the_slope_of_the_energy():
+    constants, stretch, step = np.array([0.3e6, -0.01e6, 0.002e6]), 1.7, 1e-5
+
+    def energy_at(length):
+        across = length**-0.5
+        return energy(np.diag([length, across, across]), constants)
+
+    slope = (energy_at(stretch + step) - energy_at(stretch - step)) / (2.0 * step)
+    assert tension_stress(np.array([stretch]), constants)[0] == pytest.approx(slope, rel=1e-8)
+
+
 CROSSING = (
     "- {radius: 160 mm, y: 0 mm, T}\n- {radius: 160 mm, y: 40 mm, T, fillet: 4 mm}\n"
     "- {radius: 180 mm, y: 40 mm, T, fillet: 4 mm}\n- {radius: 180 mm, y: 20 mm, T, fillet: 4 mm}\n"
@@ -91,6 +121,18 @@ THIN = (
         ({"rubber": "{c1: 0.3 MPa, c2: -0.1 MPa}"}, "the rubber is unstable: its force falls"),
         ({"rubber": "{shore_a: 40, c1: 0.3 MPa}"}, "needs either shore_a or c1"),
         ({"rubber": "{shore_a: 40 mm}"}, "shore_a"),
+        (
+            {"rubber": "{test: {stretch: [1, 1.5, 2], stress: '(0, 0.4) MPa'}}"},
+            "needs as many stretches as stresses; has 3 and 2",
+        ),
+        (
+            {"rubber": "{test: {stretch: [1, 1.5, 2], stress: '(0, 0.4, 0.6) MPa'}}"},
+            "has 2 stretches beside 1; 3 constants need at least 4",
+        ),
+        (
+            {"rubber": "{test: {stretch: [1.2, 1.5, 2], stress: '(-1, -2, -3) MPa', terms: 1}}"},
+            "the rubber is unstable",
+        ),
         (
             {"points": "- {radius: 1 mm, y: 0 mm, T}\n- {radius: 1 mm, y: 9 mm, T}\n"},
             "reaches the axis",

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated
@@ -29,13 +29,77 @@ _Positive = Annotated[u.Length, Field(gt=0.0)]
 _Pressure = Annotated[float, u.Unit("Pa", "MPa")]
 
 
+def tension_stress(stretch: FloatArray, constants: Sequence[float]) -> FloatArray:
+    """Return the stress of rubber in tension, force over first cross-section. [Pa]
+
+        s = 2 (L - L^-2) (c1 + 2 c2 x + 3 c3 x^2),    x = L^2 + 2/L - 3
+
+    Yeoh (1993) without change of volume, the sides free of stress.
+
+    Args:
+        stretch: Length over first length [L].
+        constants: Constants of Yeoh [c1, c2, c3]. [Pa]
+    """
+    return np.asarray(_tension_terms(stretch) @ np.asarray(constants))
+
+
+def _tension_terms(stretch: FloatArray) -> FloatArray:
+    """Return the stress in tension per constant of Yeoh. (n, 3)"""
+    x = stretch**2 + 2.0 / stretch - 3.0
+    return 2.0 * (stretch - stretch**-2.0)[:, None] * np.stack([x**0, 2.0 * x, 3.0 * x**2], axis=1)
+
+
+class TensionTest(Frozen):
+    """Tension test of a strip of the rubber, to which the constants of Yeoh are fitted.
+
+    Attributes:
+        stretch: Length over first length, at each point.
+        stress: Force over first cross-section, at each point.
+        terms: Number of constants that are fitted: c1, then c2, then c3.
+    """
+
+    stretch: tuple[Annotated[float, u.PureNumber(), Field(gt=0.05, lt=20.0)], ...]
+    stress: Annotated[tuple[float, ...], u.Unit("Pa", "MPa")]
+    terms: Annotated[int, Field(ge=1, le=3)] = 3
+
+    @model_validator(mode="after")
+    def _can_be_fitted(self) -> "TensionTest":
+        if len(self.stretch) != len(self.stress):
+            raise ValueError(
+                f"needs as many stretches as stresses; has {len(self.stretch)} and "
+                f"{len(self.stress)}"
+            )
+        loaded = len({stretch for stretch in self.stretch if abs(stretch - 1.0) > 1e-6})
+        if loaded <= self.terms:
+            raise ValueError(
+                f"has {loaded} stretches beside 1; {self.terms} constants need at least "
+                f"{self.terms + 1}"
+            )
+        return self
+
+    @property
+    def constants(self) -> tuple[float, float, float]:
+        """Constants of Yeoh with the smallest sum of squared differences of the stress. [Pa]"""
+        terms = _tension_terms(np.array(self.stretch))[:, : self.terms]
+        fitted = np.linalg.lstsq(terms, np.array(self.stress), rcond=None)[0]
+        c1, c2, c3 = (*fitted.tolist(), 0.0, 0.0)[:3]
+        return c1, c2, c3
+
+    @property
+    def deviation(self) -> float:
+        """Root mean square of fitted less measured stress, by the largest measured one."""
+        error = tension_stress(np.array(self.stretch), self.constants) - np.array(self.stress)
+        return float(np.sqrt(np.mean(error**2)) / np.max(np.abs(self.stress)))
+
+
 class Rubber(Frozen):
-    """Rubber: a hardness, or constants of Yeoh.
+    """Rubber: a hardness, constants of Yeoh, or a tension test.
 
     Attributes:
         shore_a: Hardness Shore A, 20 to 80. Young's modulus follows from Gent, Rubber Chemistry and
             Technology 31 (1958) 896: E = 0.0981 (56 + 7.62336 s) / (0.137505 (254 - 2.54 s)) MPa.
         c1, c2, c3: Constants of Yeoh; Neo-Hookean with c1 alone, whose shear modulus is 2 c1.
+        test: Tension test, in place of a hardness or constants.
         bulk_modulus: Bulk modulus; 500 times the shear modulus if not given.
         loss_factor: Ratio of loss to storage modulus at the frequency of the resonances.
     """
@@ -44,23 +108,22 @@ class Rubber(Frozen):
     c1: Annotated[_Pressure, Field(gt=0.0)] | None = None
     c2: _Pressure = 0.0
     c3: _Pressure = 0.0
+    test: TensionTest | None = None
     bulk_modulus: Annotated[_Pressure, Field(gt=0.0)] | None = None
     loss_factor: Annotated[float, u.PureNumber(), Field(ge=0.0, le=2.0)] = 0.0
 
     @model_validator(mode="after")
     def _is_one_rubber(self) -> "Rubber":
-        if (self.shore_a is None) == (self.c1 is None):
-            raise ValueError("needs either shore_a or c1")
-        if self.shore_a is not None and (self.c2 or self.c3):
-            raise ValueError("c2 and c3 belong to c1, not to shore_a")
+        if sum(given is not None for given in (self.shore_a, self.c1, self.test)) != 1:
+            raise ValueError("needs either shore_a or c1 or test")
+        if self.c1 is None and (self.c2 or self.c3):
+            raise ValueError("c2 and c3 belong to c1, not to shore_a or test")
         return self
 
     @model_validator(mode="after")
     def _is_stable(self) -> "Rubber":
-        c1, c2, c3 = self.constants
         stretch = np.linspace(1.0 / STIFFEST_STRETCH, STIFFEST_STRETCH, 201)
-        x = stretch**2 + 2.0 / stretch - 3.0
-        force = (stretch - stretch**-2.0) * (c1 + 2.0 * c2 * x + 3.0 * c3 * x**2)
+        force = tension_stress(stretch, self.constants)
         if not np.all(np.diff(force) > 0.0):
             at = stretch[int(np.argmin(np.diff(force)))]
             raise ValueError(
@@ -75,6 +138,8 @@ class Rubber(Frozen):
         """Constants of Yeoh. [Pa]"""
         if self.c1 is not None:
             return self.c1, self.c2, self.c3
+        if self.test is not None:
+            return self.test.constants
         assert self.shore_a is not None
         s = self.shore_a
         young = 1e6 * 0.0981 * (56.0 + 7.62336 * s) / (0.137505 * (254.0 - 2.54 * s))

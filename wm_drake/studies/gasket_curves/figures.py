@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from wm_drake.parameters.gasket_drawing import Rubber, tension_stress
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report.figure import (
     MEASURED,
@@ -15,6 +16,7 @@ from wm_drake.report.figure import (
     Line,
     Mark,
     Panel,
+    Points,
     Rule,
     in_grid,
 )
@@ -63,6 +65,22 @@ def curves_figure(curves: dict[str, Curve]) -> Figure:
         x, y = Axis(label=unit.label("displacement")), Axis(label=unit.force_label)
         panels.append(Panel(title=TITLES[name], marks=marks, x=x, y=y))
     return Figure(panels=in_grid(panels, 2), height=230.0)
+
+
+def rubber_figure(rubber: Rubber) -> Figure | None:
+    """Draw the tension test of a rubber and the fitted curve; None without a test."""
+    if rubber.test is None:
+        return None
+    measured = np.array(rubber.test.stretch)
+    stretch = np.linspace(min(1.0, measured.min()), measured.max(), 100)
+    curve = 1e-6 * tension_stress(stretch, rubber.constants)
+    stress = 1e-6 * np.array(rubber.test.stress)
+    marks = (
+        Line(stretch, curve, color=OURS, key="fit"),
+        Points(measured, stress, color=MEASURED, key="test"),
+    )
+    panel = Panel(marks=marks, x=Axis(label="stretch"), y=Axis(label="stress, MPa"))
+    return Figure(panels=(panel,), height=240.0, keys=("test", "fit"))
 
 
 def sections_figure(curves: dict[str, Curve]) -> Figure:

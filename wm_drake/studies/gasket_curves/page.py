@@ -5,7 +5,12 @@ from wm_drake.report.page import picture
 from wm_drake.report.sections import Section, SectionedPage
 from wm_drake.report.table import Column, Table, line
 from wm_drake.solid.curves import AXIAL, RADIAL, TILT, TWIST
-from wm_drake.studies.gasket_curves.figures import curves_figure, rings_figure, sections_figure
+from wm_drake.studies.gasket_curves.figures import (
+    curves_figure,
+    rings_figure,
+    rubber_figure,
+    sections_figure,
+)
 from wm_drake.studies.gasket_curves.machine import coupling
 from wm_drake.studies.gasket_curves.study import CurvesResult
 from wm_drake.studies.gasket_curves.tables import AXES, values_table
@@ -65,6 +70,7 @@ def curves_page(result: CurvesResult, facts: Facts) -> str:
             Section("curves", "Curves", (drawn,)),
             Section("cuts", "Cuts through the wall", (sections,)),
             Section("rings", "Deformed ring", (rings,)),
+            *_rubber_section(result),
             Section("values", "Stiffness and damping", tables=(values_shown(result),)),
             Section("checks", "Checks", tables=(_checks_shown(result),)),
             Section("files", "Files", links=links),
@@ -74,6 +80,20 @@ def curves_page(result: CurvesResult, facts: Facts) -> str:
         about="From the drawing and the rubber to the numbers of a machine file.",
         method=METHOD,
     ).html()
+
+
+def _rubber_section(result: CurvesResult) -> list[Section]:
+    """Return the section of the tension test; none without one."""
+    rubber = result.drawing.rubber
+    figure = rubber_figure(rubber)
+    if figure is None or rubber.test is None:
+        return []
+    deviation = f"{significant(100.0 * rubber.test.deviation, 2)} %"
+    about = (
+        "Stress of the rubber in tension, force over first cross-section, over the stretch. The "
+        f"root mean square of fit less test is {deviation} of the largest stress."
+    )
+    return [Section("rubber", "Rubber", (picture(figure, "Stress over stretch.", about),))]
 
 
 def summary(result: CurvesResult) -> str:
