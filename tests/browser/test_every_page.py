@@ -26,6 +26,8 @@ def test_page_is_in_order_and_nothing_is_cut_off(browser, tmp_path, name):
         browser.media(dark=is_dark)
         browser.run(DRAW)
         assert browser.run(LAYOUT) == [], f"{width} pixels"
+    browser.run("location.hash = '#everything'")  # only what is open is printed
+    browser.wait("return !document.querySelector('details:not([open])')")
     browser.size(A4)
     browser.media(media="print")
     browser.run("dispatchEvent(new Event('beforeprint'))")

@@ -1,5 +1,7 @@
 """Report pages in a real browser: controls work, names are text, print and dark colours."""
 
+import base64
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -112,7 +114,7 @@ def test_a_page_that_is_only_loaded_shows_every_picture(browser, pages):
     assert browser.run("return document.querySelectorAll('iframe').length") == 0
 
 
-def test_folded_sections_open_by_a_link_and_on_paper(browser, pages):
+def test_folded_sections_open_by_a_link(browser, pages):
     opened(browser, pages(gasket_page))
     closed = "return document.querySelectorAll('details:not([open])').length"
     count = browser.run(closed)
@@ -120,8 +122,32 @@ def test_folded_sections_open_by_a_link_and_on_paper(browser, pages):
     browser.wait(f"return document.querySelectorAll('details:not([open])').length === {count - 1}")
     drawn = "return !!document.querySelector('#load-1 figure[data-drawn] .main-svg')"
     browser.wait(drawn)
-    browser.run("dispatchEvent(new Event('beforeprint'))")
-    assert (count > 3, browser.run(closed)) == (True, 0)
+    browser.find("a[href='#everything']").click()
+    browser.wait("return !document.querySelector('details:not([open])')")
+    assert count > 3
+
+
+def sheets(browser):
+    """Return the number of sheets of A4 on which the page is printed."""
+    a4 = {"paperWidth": 8.27, "paperHeight": 11.69, "preferCSSPageSize": True}
+    data = browser.driver.execute_cdp_cmd("Page.printToPDF", a4)["data"]
+    return len(re.findall(rb"/Type\s*/Page\b", base64.b64decode(data)))
+
+
+def test_what_is_folded_is_not_printed_and_the_paper_says_so(browser, pages):
+    opened(browser, pages(gasket_page))
+    few = sheets(browser)
+    visible = "return getComputedStyle(document.querySelector(arguments[0])).display !== 'none'"
+    browser.media(media="print")
+    parts = (".on-paper", "#load-1", "#explore", "#contributions")
+    assert [browser.run(visible, part) for part in parts] == [True, False, False, True]
+    browser.run("location.hash = '#load-1'")
+    browser.wait(visible, "#load-1")
+    browser.run("location.hash = '#everything'")
+    browser.wait("return !document.querySelector('details:not([open])')")
+    assert [browser.run(visible, part) for part in parts] == [False, True, True, True]
+    browser.media()
+    assert few <= 12 < sheets(browser)
 
 
 def test_machine_page_turns_and_names_parts(browser, tmp_path):

@@ -257,6 +257,7 @@ const Pictures = (() => {
   const clicked = (figure, action) => { pictureOf(figure).clicked = action; };
 
   const figures = () => [...document.querySelectorAll("figure[data-picture]")];
+  const isOpen = figure => !figure.closest("details:not([open])");
   const again = () => figures().filter(figure => drawn.has(figure)).forEach(show);
 
   /* The library is packed in the page (gzip, Base64); a browser unpacks it once. */
@@ -275,9 +276,12 @@ const Pictures = (() => {
     plotly = window.Plotly;
   }
 
-  /* Opens what is folded: all of it for paper, a section that a link leads to. */
+  /* Opens the section that the address names, or all of them; what is folded is not printed. */
   const unfold = part => part.querySelectorAll("details").forEach(fold => { fold.open = true; });
-  const atLink = () => { const part = document.getElementById(location.hash.slice(1)); if (part) unfold(part); };
+  function atLink() {
+    const name = location.hash.slice(1), part = name === "everything" ? document : document.getElementById(name);
+    if (part) unfold(part);
+  }
 
   async function begin() {
     addEventListener("hashchange", atLink);
@@ -292,7 +296,7 @@ const Pictures = (() => {
     let waiting = 0;
     addEventListener("resize", () => { clearTimeout(waiting); waiting = setTimeout(again, 120); });
     dark.addEventListener("change", again);
-    addEventListener("beforeprint", () => { isPrinting = true; unfold(document); figures().forEach(show); });
+    addEventListener("beforeprint", () => { isPrinting = true; figures().filter(isOpen).forEach(show); });
     addEventListener("afterprint", () => {
       isPrinting = false;
       drawn.forEach(picture => { picture.total = null; });
