@@ -35,7 +35,12 @@ from wm_drake.simulation.measures import MEASURES, Variable
 from wm_drake.simulation.measures.labels import LABELS
 from wm_drake.simulation.records import Record
 from wm_drake.studies.inputs import friction_warnings
-from wm_drake.studies.spin.figures import ORBIT_REVOLUTIONS, axis_path_mm, orbit_window
+from wm_drake.studies.spin.figures import (
+    ORBIT_REVOLUTIONS,
+    axis_path_mm,
+    have_one_orbit,
+    orbit_window,
+)
 from wm_drake.studio.machines import OpenMachine, is_same
 from wm_drake.studio.state import State
 
@@ -331,7 +336,8 @@ def _orbits(record: Record, largest: int) -> list[dict[str, Any]]:
     depths = record.sensor_point.values[:, 1]
     window = orbit_window(record, largest, ORBIT_REVOLUTIONS)
     orbits = []
-    for y in (float(depths.min()), float(depths.max())):
+    front, rear = float(depths.min()), float(depths.max())
+    for y in (front,) if have_one_orbit(front, rear) else (front, rear):
         path = axis_path_mm(record, y)[window] / MM_PER_M
         orbits.append({"y": y * MM_PER_M, "x": _whole(path[:, 0]), "z": _whole(path[:, 2])})
     return orbits

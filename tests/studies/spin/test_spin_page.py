@@ -21,6 +21,7 @@ from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import number, percent
 from wm_drake.report.scripts import packed_plotly
 from wm_drake.report.table import readable
+from wm_drake.studies.spin.figures import orbits_figure
 from wm_drake.studies.spin.page import amplitude_table, spin_page, warnings_of
 from wm_drake.studies.spin.panels import revolution_starts, simplified_indices
 from wm_drake.studies.spin.study import CaseResult, Files, SpinResult
@@ -396,3 +397,11 @@ def test_slack_springs_are_warned_of(machine: MachineParameters) -> None:
     assert "smallest tension of each spring" in spin_page(result).lower()
     taut = spin_result(machine, [case_result(machine)])
     assert not any("slack" in text for text in warnings_of(taut))
+
+
+def test_sensors_in_one_plane_have_one_orbit(machine: MachineParameters) -> None:
+    record = case_result(machine).record
+    apart, together = orbits_figure(record, -0.1, 0.1), orbits_figure(record, 0.1, 0.1)
+    assert [len(figure.panels) for figure in (apart, together)] == [2, 1]
+    titles = [panel.title for panel in together.panels]
+    assert titles == ["y = 100 mm"]

@@ -43,6 +43,9 @@ BoolArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 ORBIT_REVOLUTIONS = 6.0
 """Number of drum revolutions that an orbit shows, with the largest amplitude in the middle."""
 
+SAME_PLANE = 0.5e-3
+"""Distance below which the planes of two sensors have one orbit. [m]"""
+
 LONGEST_ORBIT = 8.0
 """Longest time that an orbit shows; it matters for a drum that hardly turns. [s]"""
 
@@ -106,14 +109,16 @@ def gasket_figure(record: Record) -> Figure:
 def orbits_figure(record: Record, y_front: float, y_rear: float) -> Figure:
     """Return the paths of two points of the drum axis in the x-z plane, seen from the front.
 
-    The paths cover the drum revolutions around the largest amplitude of all sensors.
+    The paths cover the drum revolutions around the largest amplitude of all sensors. Points less
+    than half a millimetre apart have one path.
 
     Args:
         record: A record with at least two samples.
         y_front: Position of the front point on the drum axis, < 0 in front of mid-depth. [m]
         y_rear: Position of the rear point on the drum axis. [m]
     """
-    paths = [axis_path_mm(record, y) for y in (y_front, y_rear)]
+    titles = _depths(y_front, y_rear)
+    paths = [axis_path_mm(record, y) for y in (y_front, y_rear)[: len(titles)]]
     largest = moment_of_largest_amplitude(record)
     windows = [orbit_window(record, largest, turns) for turns in (ORBIT_REVOLUTIONS, 1.0)]
     x_limit, z_limit = orbit_limits([path[windows[0]] for path in paths])
@@ -125,7 +130,7 @@ def orbits_figure(record: Record, y_front: float, y_rear: float) -> Figure:
     keys = (f"{time[0]:.1f} s to {time[-1]:.1f} s", "revolution around it", moment)
     panels = [
         Panel(title=title, marks=_orbit(path, windows, largest, keys), x=x, y=z, is_square=True)
-        for path, title in zip(paths, _depths(y_front, y_rear), strict=True)
+        for path, title in zip(paths, titles, strict=True)
     ]
     keys_shown = (*keys[::-1], "rest position")
     return Figure(panels=in_grid(panels, 2), height=455.0 * z_limit / x_limit, keys=keys_shown)
@@ -196,7 +201,15 @@ def orbit_limits(paths: Sequence[FloatArray]) -> tuple[float, float]:
     return x_limit, max(z_size, 0.4 * x_limit)
 
 
+def have_one_orbit(y_front: float, y_rear: float) -> bool:
+    """Return whether two positions on the drum axis are so close that one orbit shows both. [m]"""
+    return abs(y_rear - y_front) < SAME_PLANE
+
+
 def _depths(y_front: float, y_rear: float) -> list[str]:
+    """Return a title for each orbit that is drawn."""
+    if have_one_orbit(y_front, y_rear):
+        return [f"y = {number(y_front * MM_PER_M, 0)} mm"]
     return [
         f"{where}, y = {number(y * MM_PER_M, 0)} mm"
         for where, y in (("front", y_front), ("rear", y_rear))

@@ -22,6 +22,7 @@ from wm_drake.studies.spin.figures import (
     envelopes_figure,
     gaps_figure,
     gasket_figure,
+    have_one_orbit,
     orbits_figure,
 )
 from wm_drake.studies.spin.floor import floor_section, floor_warnings
@@ -318,18 +319,17 @@ def _orbits_picture(case: CaseResult) -> Picture | None:
     if case.record.sizes["time"] < 2:
         return None
     depths = case.record.sensor_point.sel(axis="y")
+    ends = float(depths.min()), float(depths.max())
+    is_one = have_one_orbit(*ends)
+    planes = "plane of the sensors" if is_one else "planes of the foremost and the rearmost sensor"
     caption = (
-        "Path of the drum axis in the planes of the foremost and the rearmost sensor, seen from "
-        "the front of the machine. Dot and dark line: the moment of the largest amplitude of all "
-        "sensors, and the drum revolution around it. Pale line: the revolutions before and after."
+        f"Path of the drum axis in the {planes}, seen from the front of the machine. Dot and dark "
+        "line: the moment of the largest amplitude of all sensors, and the drum revolution around "
+        "it. Pale line: the revolutions before and after."
     )
-    alternative = (
-        "Orbits of the drum axis, front and rear, around the largest amplitude, "
-        f"load {case_title(case)}."
-    )
-    return picture(
-        orbits_figure(case.record, float(depths.min()), float(depths.max())), alternative, caption
-    )
+    orbits = "Orbit of the drum axis" if is_one else "Orbits of the drum axis, front and rear"
+    alternative = f"{orbits}, around the largest amplitude, load {case_title(case)}."
+    return picture(orbits_figure(case.record, *ends), alternative, caption)
 
 
 def _gasket_picture(case: CaseResult) -> Picture | None:

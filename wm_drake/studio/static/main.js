@@ -279,7 +279,10 @@ function showForces() {
 function showOrbits() {
   const both = [...answer.orbits, ...(ghost?.orbits ?? [])];
   const limit = roundUp(Math.max(0.1, ...both.flatMap((of) => [...of.x, ...of.z]).map((v) => Math.abs(v) / 1000)));
+  const names = answer.orbits.length < 2 ? ['drum axis'] : ['front', 'rear']; // one: all sensors in one plane
   panels.orbits.forEach((panel, index) => {
+    panel.title = names[index];
+    panel.svg.style.display = answer.orbits[index] ? '' : 'none';
     if (answer.orbits[index]) panel.show(answer.orbits[index], ghost?.orbits?.[index], limit);
   });
 }
