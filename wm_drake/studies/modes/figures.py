@@ -29,7 +29,7 @@ from wm_drake.report.figure import (
 from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number
 from wm_drake.simulation.outputs import point_positions
 from wm_drake.studies.modes.sensitivity import Sensitivity
-from wm_drake.studies.modes.shapes import Mode
+from wm_drake.studies.modes.shapes import UNDAMPED, Mode
 from wm_drake.studies.modes.study import ORDERS, SLIDING, STUCK, MachineModes
 
 VIEWS = (("front", 0, 2), ("side", 1, 2), ("top", 0, 1))
@@ -146,13 +146,23 @@ def amplitude_figure(result: MachineModes) -> Figure:
     panels = []
     for label, quantity in (("frequency, Hz", "frequency_hz"), ("damping ratio", "damping_ratio")):
         marks: list[Mark] = [
-            Line(MM_PER_M * mode.amplitude, getattr(mode, quantity), color=color, key=mode.name)
+            Line(
+                MM_PER_M * mode.amplitude,
+                _without_rounding(getattr(mode, quantity)),
+                color=color,
+                key=mode.name,
+            )
             for color, mode in zip(COLOURS, result.over_amplitude, strict=False)
         ]
         marks.append(Rule(MM_PER_M * result.amplitude, "y", color=MARK, dash="dotted"))
         x, y = Axis(label="amplitude, mm", is_log=True), Axis(label=label, range=(0.0, None))
         panels.append(Panel(name=label.split(",")[0], marks=tuple(marks), x=x, y=y))
     return Figure(panels=in_grid(panels, 2), height=310.0)
+
+
+def _without_rounding(values: FloatArray) -> FloatArray:
+    """Return values with 0 in place of errors of rounding, which would set the scale of an axis."""
+    return np.where(np.abs(values) > UNDAMPED, values, 0.0)
 
 
 def shapes_figure(modes: list[Mode], outlines: Mapping[str, Outline]) -> Figure:
@@ -171,7 +181,8 @@ def shapes_figure(modes: list[Mode], outlines: Mapping[str, Outline]) -> Figure:
             panel = replace(view_panel(tuple(marks), reach), y=view_axis(reach, label))
             if not row:
                 hertz, ratio = number(mode.frequency_hz, 2), number(mode.damping_ratio, 3)
-                panel = replace(panel, title=mode.name, subtitle=f"{hertz} Hz\nζ {ratio}")
+                damping = f"ζ {ratio}" if abs(mode.damping_ratio) > UNDAMPED else "undamped"
+                panel = replace(panel, title=mode.name, subtitle=f"{hertz} Hz\n{damping}")
             panels.append(panel)
     return Figure(panels=in_grid(panels, len(modes)), height=900.0 / len(modes))
 
@@ -260,7 +271,8 @@ def sensitivity_figure(result: MachineModes, name: str, quantity: str) -> Figure
     panels = []
     for index, mode in enumerate(modes):
         chosen = strongest(relative, quantity, index)
-        values = [factor * float(getattr(entry, quantity)[index]) for entry in chosen]
+        changes = np.array([getattr(entry, quantity)[index] for entry in chosen])
+        values = [factor * float(change) for change in _without_rounding(changes)]
         colors = tuple(OURS if value >= 0.0 else MEASURED for value in values)
         bars = Bars(range(len(chosen)), values, colors=colors, is_across=True)
         names = named(_short(entry.key) for entry in chosen)

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +11,7 @@ import pandas as pd
 
 from wm_drake.engines.trajectory import COORDINATES
 from wm_drake.model.scene import Scene
-from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number, plain
+from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, listed, number, plain
 from wm_drake.report.page import Picture, picture
 from wm_drake.report.sections import Section, SectionedPage
 from wm_drake.report.table import Column, Group, Row, Table, line, table_of
@@ -22,7 +23,8 @@ from wm_drake.studies.modes.figures import (
     sensitivity_figure,
     shapes_figure,
 )
-from wm_drake.studies.modes.shapes import Mode
+from wm_drake.studies.modes.nearness import Nearness, about_nearness, nearness, parts
+from wm_drake.studies.modes.shapes import UNDAMPED, Mode
 from wm_drake.studies.modes.study import (
     AMPLITUDE,
     SLIDING,
@@ -36,11 +38,17 @@ from wm_drake.studies.study import Facts, Result
 if TYPE_CHECKING:
     from rich import table as terminal
 
+
+def damping_text(ratio: float) -> str:
+    """Return a damping ratio for reading; a word where there is none but errors of rounding."""
+    return number(ratio, 4) if abs(ratio) > UNDAMPED else "undamped"
+
+
 MODE = {
     "mode": Column("mode"),
     "name": Column("name"),
     "frequency_Hz": Column("frequency", "Hz", 3),
-    "damping_ratio": Column("damping ratio", decimals=4),
+    "damping_ratio": Column("damping ratio", form=damping_text),
     "order": Column("order"),
     "rpm": Column("speed", "rpm", 1),
 }
@@ -62,10 +70,32 @@ class ModesResult(Result):
 
     float_format = "%.8g"
 
+    @cached_property
+    def scene(self) -> Scene:
+        """Shapes of the machine."""
+        return Scene(self.modes.parameters)
+
+    @cached_property
+    def gaps(self) -> dict[str, Nearness | None]:
+        """How near the modes bring the tub to the housing, by linearisation."""
+        result = self.modes
+        return {
+            name: nearness(self.scene, result.rest_pose, result.modes[name], result.amplitude)
+            for name in (SLIDING, STUCK)
+        }
+
+    def summary(self) -> str:
+        """Return one paragraph about the modes."""
+        sentences = [summary(self.modes), about_damping(self.modes)]
+        sliding = self.gaps[SLIDING]
+        if sliding is not None:
+            sentences.append(about_nearness(sliding))
+        return " ".join(filter(None, sentences))
+
     def tables(self) -> dict[str, pd.DataFrame]:
         """Return modes, amplitudes, Campbell diagram and sensitivities."""
         return {
-            "modes": modes_frame(self.modes),
+            "modes": self._modes_frame(),
             "amplitudes": amplitudes_frame(self.modes),
             "campbell": campbell_frame(self.modes),
             "sensitivities": sensitivities_frame(self.modes),
@@ -86,6 +116,11 @@ class ModesResult(Result):
             "load": result.load,
             "gasket": result.gasket,
             "amplitude_mm": MM_PER_M * result.amplitude,
+            "smallest_gap_mm": {
+                name: {mode: MM_PER_M * gap.distance for mode, gap in near.of_mode.items()}
+                for name, near in self.gaps.items()
+                if near is not None
+            },
             "modes": {
                 name: frame.drop(columns="friction").to_dict("records")
                 for name, frame in linearisations(result).groupby("friction", sort=False)
@@ -104,12 +139,12 @@ class ModesResult(Result):
         title = f"Modes of machine '{result.parameters.name}'"
         columns = ["friction", "name", "frequency_Hz", "damping_ratio"]
         shown = table_of(frame[columns], columns={**MODE, "name": Column("mode")})
-        return [shown.terminal(title), summary(result)]
+        return [shown.terminal(title), self.summary()]
 
     def page(self, facts: Facts) -> str:
         """Return the page: frequencies, shapes, sensitivities, tables."""
         result = self.modes
-        outlines = Scene(result.parameters).tub_outlines()
+        outlines = self.scene.tub_outlines()
         shapes = [
             picture(
                 shapes_figure(result.modes[name], outlines),
@@ -130,13 +165,14 @@ class ModesResult(Result):
         tables = (natural_modes_table(result), _critical_table(result), _participation(result))
         return SectionedPage(
             f"Modes of machine {result.parameters.name}",
-            summary(result),
+            self.summary(),
             [
                 Section("campbell", "Frequencies over speed and amplitude", over_speed),
                 Section("shapes", "Mode shapes", [*shapes, energy], links=self._links()),
                 Section("sensitivity", "Sensitivity: what moves a mode", causes),
                 Section("modes", "Modes", tables=tables[:1]),
                 Section("critical", "Critical speeds", tables=tables[1:2]),
+                Section("gaps", "Gap to the housing", tables=self._gap_tables()),
                 Section("participation", "Participation", tables=tables[2:]),
             ],
             [
@@ -148,6 +184,42 @@ class ModesResult(Result):
             facts.warnings,
             method=AXES,
         ).html()
+
+    def _modes_frame(self) -> pd.DataFrame:
+        """Return the modes with the smallest gap over the cycle of each."""
+        frame = modes_frame(self.modes)
+        if any(near is None for near in self.gaps.values()):
+            return frame
+        column = [
+            MM_PER_M * near.of_mode[mode.name].distance
+            for name in (STUCK, SLIDING)  # order of the rows
+            for mode in self.modes.modes[name]
+            if (near := self.gaps[name]) is not None
+        ]
+        return frame.assign(smallest_gap_mm=column)
+
+    def _gap_tables(self) -> list[Table]:
+        """Return the table of the smallest gap in each mode; none without shapes to measure."""
+        groups = tuple(
+            Group(
+                TITLES[name],
+                tuple(
+                    Row((mode, parts(gap), MM_PER_M * gap.distance), kind="ours" * is_nearest)
+                    for mode, gap in near.of_mode.items()
+                    for is_nearest in [mode == near.nearest]
+                ),
+            )
+            for name, near in self.gaps.items()
+            if near is not None
+        )
+        caption = (
+            "Smallest distance between tub and housing over the cycle of each mode, all at an "
+            f"amplitude of {number(MM_PER_M * self.modes.amplitude, 1)} mm, with angles times "
+            "250 mm. Bold: the mode that brings them nearest. How large a mode becomes in a run "
+            "depends on load and speed."
+        )
+        columns = ("linearisation", "mode", "between", Column("smallest gap", "mm", 2))
+        return [Table(caption, columns, groups, text_columns=3)] if groups else []
 
     def _links(self) -> list[tuple[str, str]]:
         """Return the files of the animations, and their titles."""
@@ -216,6 +288,21 @@ def summary(result: MachineModes) -> str:
     )
 
 
+def about_damping(result: NaturalModes) -> str:
+    """Return the sentence on modes without damping; "" if all modes have some."""
+    when = {SLIDING: "while friction slides", STUCK: "while it sticks"}
+    cases = []
+    for name, words in when.items():
+        modes = result.modes[name]
+        undamped = [mode.name for mode in modes if abs(mode.damping_ratio) <= UNDAMPED]
+        if undamped:
+            which = "all modes" if len(undamped) == len(modes) else listed(undamped)
+            cases.append(f"{which} {words}")
+    if not cases:
+        return ""
+    return f"Undamped, as no damper and no gasket dissipates energy in them: {listed(cases)}."
+
+
 def natural_modes_table(result: NaturalModes) -> Table:
     """Return the table of natural frequencies and damping ratios of all linearisations."""
     amplitude = number(MM_PER_M * result.amplitude, 1)
@@ -242,7 +329,7 @@ def natural_modes_table(result: NaturalModes) -> Table:
     columns = tuple(
         column
         for when in ("sticks", f"{amplitude} mm", "slides")
-        for column in (Column(when, "Hz", 3), Column(f"{when}, damping ratio", decimals=4))
+        for column in (Column(when, "Hz", 3), Column(f"{when}, damping ratio", form=damping_text))
     )
     return Table(caption, ("mode", *columns), tuple(groups))
 

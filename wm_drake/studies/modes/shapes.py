@@ -24,6 +24,9 @@ down."""
 ANGLE_ARM = 0.25
 """Length that converts angles to displacements in a mode shape: about the radius of the tub. [m]"""
 
+UNDAMPED = 1e-9
+"""Damping ratio below which a mode has no damping but errors of rounding."""
+
 _POSITIONS, _VELOCITIES = slice(0, 6), slice(6, 12)
 """Tub's positions and velocities among the free numbers of the state."""
 
@@ -40,8 +43,8 @@ class Mode:
         shape: Motion of T: roll, pitch, yaw, x, y, z. The largest component is 1 after angles are
             multiplied by `ANGLE_ARM`. (6,) complex [rad, m]
         participation: Of each coordinate of the tub, as in `shape`; the sum is 1. (6,)
-        strain_energy, dissipation: Part of each element. The sum is 1. Preload may make the energy
-            of a spring negative. (elements,)
+        strain_energy, dissipation: Part of each element. The sum is 1; of the dissipation of an
+            undamped mode, 0. Preload may make the energy of a spring negative. (elements,)
     """
 
     name: str
@@ -81,7 +84,7 @@ def modes_of(spectrum: Spectrum, wrench_slopes: FloatArray) -> list[Mode]:
                 shape_of(vector),
                 shares[index],
                 _share(strain),
-                _share(dissipated),
+                _share(dissipated * (abs(spectrum.damping_ratio[index]) > UNDAMPED)),
             )
         )
     return modes

@@ -75,6 +75,7 @@ class MachineModes(NaturalModes):
     """All modes of a machine.
 
     Attributes:
+        rest_pose: Equilibrium: roll, pitch, yaw, x, y, z. (6,) [rad, m]
         gasket: Whether the gasket is in place.
         elements: Names of the elements on the tub, in the order of the shares of a mode.
         over_amplitude: Each mode over its amplitude.
@@ -85,6 +86,7 @@ class MachineModes(NaturalModes):
             at the sensors, as `simulate_many` returns them. None if not computed.
     """
 
+    rest_pose: FloatArray
     gasket: bool
     elements: list[str]
     over_amplitude: list[AmplitudeMode]
@@ -169,6 +171,7 @@ def modes(
         natural,
         amplitude,
         _values_at(over, amplitude),
+        linear[STUCK].equilibrium[:6],
         gasket,
         linear[STUCK].names,
         over,
