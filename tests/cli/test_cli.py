@@ -125,7 +125,15 @@ def test_spin_prints_one_json_object(plain):
     case = plain.case
     assert set(case) == {
         *("load", "gasket", "amplitudes_mm", "detergent_box_mm", "gasket_force_N"),
-        *("gasket_moment_Nm", "mount_force_N", "cabinet_wrench", "feet", "walk", "motor"),
+        *(
+            "gasket_moment_Nm",
+            "mount_force_N",
+            "cabinet_wrench",
+            "feet",
+            "walk",
+            "motor",
+            "balance",
+        ),
         *("smallest_gap_mm", "smallest_spring_tension_N", "critical_rpm", "diverged", "wall_s"),
         "displacement_band_hz",
     }

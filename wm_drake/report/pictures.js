@@ -322,8 +322,10 @@ const Pictures = (() => {
     frame.hidden = true;
     frame.title = "none";
     document.body.append(frame);
-    frame.contentDocument.open();
-    return () => { frame.contentDocument.close(); frame.remove(); };
+    const inside = frame.contentDocument; // none in a sandbox, as in the studio
+    if (!inside) { frame.remove(); return () => {}; }
+    inside.open();
+    return () => { inside.close(); frame.remove(); };
   }
 
   const release = held();
