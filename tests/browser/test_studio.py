@@ -164,6 +164,41 @@ def test_error_stands_at_its_value_and_the_curve_stays(page):
     assert [m for m in page.errors() if "422" not in m] == []
 
 
+def test_empty_field_says_so_and_the_last_value_stays(page):
+    field = page.find(ROW.format(STIFFNESS, ".text"))
+    typed(page, STIFFNESS, "6 N/mm")
+    settled(page)
+    curve = page.run(CURVE)
+    typed(page, STIFFNESS, " ")
+    problem = page.find(ROW.format(STIFFNESS, ".problem"))
+    assert "empty" in problem.text
+    assert field.get_attribute("aria-invalid") == "true"
+    page.find("#gasket").click()  # another run leaves the message
+    page.wait(f"return (() => {{ {CURVE} }})() !== arguments[0]", curve)
+    assert problem.is_displayed()
+    page.find("#gasket").click()
+    assert page.wait(f"return (() => {{ {CURVE} }})() === arguments[0]", curve)
+    page.run("document.querySelector(arguments[0]).click()", ROW.format(STIFFNESS, ".back"))
+    assert changed_from(page, CURVE, curve)
+    assert not problem.is_displayed()
+    assert field.get_attribute("aria-invalid") is None
+    assert field.get_attribute("value").endswith("N/mm")
+
+
+def test_contact_and_gap_stay_in_view_beside_the_sliders(page):
+    verdict = "return document.getElementById('verdict').textContent"
+    assert re.match(r"No contact: gap \d+\.\d mm", page.run(verdict))
+    page.run(
+        "document.querySelectorAll('#numbers details').forEach((fold) => { fold.open = true; })"
+    )
+    page.run("const list = document.querySelector('aside'); list.scrollTop = list.scrollHeight")
+    box = "return document.getElementById('verdict').getBoundingClientRect().top - document.querySelector('aside').getBoundingClientRect().top"
+    assert -1 <= page.run(box) <= 1
+    before = page.run(verdict)
+    typed(page, "gasket.stiffness_y", "0.5 N/mm")
+    assert changed_from(page, verdict, before)
+
+
 def test_the_studio_has_no_serious_fault_of_accessibility(page):
     assert serious_faults(page) == []
 
@@ -181,6 +216,10 @@ def test_gasket_is_taken_out(page):
 def test_arrows_of_seven_numbers_stand_in_the_table(page):
     columns = "return document.querySelectorAll('#measures th[title]').length === 7"
     assert page.wait(columns, timeout=60.0)
+    keys = page.run(
+        "return [...document.querySelectorAll('#measures th[title]')].map((t) => t.title)"
+    )
+    assert not [key for key in keys if key.startswith(("loads.", "imperfections.", "bodies.drum"))]
     shown = page.run("return document.querySelector('#measures tbody').textContent")
     assert "▲" in shown
     assert "▼" in shown

@@ -70,6 +70,8 @@ class Slider:
         label, last = name.replace("_", " "), " ".join(parents[-1:]).replace("_", " ")
         if last.startswith("no. "):
             last = f"{parents[-2].rstrip('s')} {last.removeprefix('no. ')}"
+        if parents and parents[0].endswith("_types"):  # the name of a type does not say its kind
+            last = f"{parents[0].removesuffix('_types').replace('_', ' ')} {last}"
         return {
             "key": self.key,
             "group": " · ".join(parents).replace("_", " ") or "machine",

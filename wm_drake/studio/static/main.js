@@ -59,6 +59,7 @@ async function setState(wanted) {
   if (other) await openMachine();
   intoLink(state, variants);
   showHistory();
+  list.forget();
   list.show(state.values, answer?.values);
   showLoad();
   if (other || loads !== before) { runGhost(); rank(); }
@@ -179,12 +180,15 @@ async function rank() {
   byId('rank').disabled = false;
 }
 
-/** Take the seven numbers that change the chosen measure most. */
+/** Keys of numbers that a design does not choose: no influence is ranked for them. */
+const NOT_DESIGNED = /^(loads|profile|sensors|imperfections|measured|step|output_period)\b|^bodies\.(?!\w*counterweight)|^frames\.\w*_(child|parent)\./;
+
+/** Take the seven numbers of the design that change the chosen measure most. */
 function chooseTurned() {
   if (!answer) return;
   const kind = byId('rank-by').value;
   const size = (of) => Math.max(0, ...of.changes.map((value, place) => (answer.rows[place]?.kind === kind ? Math.abs(value ?? 0) : 0)));
-  const influences = ranking.map((of) => ({key: of.key, size: size(of)})).filter((of) => of.size > 0);
+  const influences = ranking.filter(({key}) => !NOT_DESIGNED.test(key)).map((of) => ({key: of.key, size: size(of)})).filter((of) => of.size > 0);
   influences.sort((a, b) => b.size - a.size);
   turned = influences.slice(0, 7).map((of) => of.key);
   run();
@@ -221,6 +225,7 @@ const sizeOf = (bands) => Math.max(0, ...bands.map((band) => band
 function showAnswer() {
   if (!answer) return;
   offerKinds();
+  showVerdict();
   showMeasures(byId('measures'), answer, ghost, labelOf);
   list.show(state.values, answer.values);
   showEnvelopes();
@@ -228,6 +233,22 @@ function showAnswer() {
   showOrbits();
   showMotion();
   showVariants();
+}
+
+/** Say beside the sliders whether the tub touches the housing, and how large the gap is. */
+function showVerdict() {
+  const {gap, diverged} = answer;
+  const words = (name) => name.replaceAll('_', ' ');
+  const touches = Boolean(gap && gap.distance <= 0);
+  byId('verdict').classList.toggle('alarm', touches || Boolean(diverged));
+  if (diverged) byId('verdict').textContent = 'The run diverged: no answer.';
+  else if (!gap) byId('verdict').textContent = 'The machine has no shapes: no gap is known.';
+  else {
+    const was = ghost?.gap && !ghost.diverged ? `, as it was ${fixed(ghost.gap.distance)} mm` : '';
+    byId('verdict').replaceChildren(
+      make('strong', {}, touches ? `The tub touches: ${fixed(gap.distance)} mm` : `No contact: gap ${fixed(gap.distance)} mm`),
+      `${words(gap.moving)} to ${words(gap.fixed)} at ${fixed(gap.rpm, 0)} rpm${was}`);
+  }
 }
 
 function showEnvelopes() {

@@ -3,6 +3,7 @@
 import {digits, make} from './dom.js';
 
 const STEPS = 1000;
+const EMPTY = 'The field is empty: the last value stays in use. Type a value, or press ↺.';
 
 export class NumberList {
   /** `moved(key, text, final)` is called with a text, or null for "as it was". */
@@ -45,6 +46,7 @@ export class NumberList {
       return `${Number(value.toPrecision(5))} ${number.unit}`.trim();
     };
     slider.addEventListener('input', () => {
+      row.isEmpty = false;
       text.value = sliderText();
       this.moved(number.key, text.value, false);
     });
@@ -53,9 +55,14 @@ export class NumberList {
     text.addEventListener('blur', () => { row.isTyping = false; });
     text.addEventListener('change', () => {
       row.isTyping = false;
-      this.moved(number.key, text.value.trim() || null, true);
+      row.isEmpty = !text.value.trim();
+      if (row.isEmpty) this.refuse(row, EMPTY);
+      else this.moved(number.key, text.value.trim(), true);
     });
-    back.addEventListener('click', () => this.moved(number.key, null, true));
+    back.addEventListener('click', () => {
+      row.isEmpty = false;
+      this.moved(number.key, null, true);
+    });
     this.rows.set(number.key, row);
     return element;
   }
@@ -67,7 +74,7 @@ export class NumberList {
       row.element.classList.toggle('moved', isMoved);
       const value = key in shown ? shown[key] : row.number.value;
       // an answer that comes while the user types leaves the text alone
-      if (!row.isTyping && (document.activeElement !== row.text || isMoved)) {
+      if (!row.isTyping && !row.isEmpty && (document.activeElement !== row.text || isMoved)) {
         row.text.value = isMoved ? values[key] : `${digits(row.number.value, 6).replace('−', '-')} ${row.number.unit}`.trim();
       }
       if (document.activeElement !== row.slider && (key in shown || !isMoved)) {
@@ -81,16 +88,16 @@ export class NumberList {
   /** Show problems and warnings at their values; return those that have no row. */
   problems(problems, warnings = []) {
     for (const row of this.rows.values()) {
-      row.problem.hidden = row.warning.hidden = true;
+      row.warning.hidden = true;
+      if (row.isEmpty) continue;
+      row.problem.hidden = true;
       row.element.classList.remove('wrong');
+      row.text.removeAttribute('aria-invalid');
     }
     const left = problems.filter(({key, message}) => {
       const row = this.nearest(key);
       if (!row) return true;
-      row.problem.textContent = message;
-      row.problem.hidden = false;
-      row.element.classList.add('wrong');
-      row.element.closest('details').open = true;
+      this.refuse(row, message);
       return false;
     });
     for (const {key, message} of warnings) {
@@ -100,6 +107,20 @@ export class NumberList {
       row.warning.hidden = false;
     }
     return left;
+  }
+
+  /** Forget which fields were left empty, because another state is shown. */
+  forget() {
+    for (const row of this.rows.values()) row.isEmpty = false;
+  }
+
+  /** Say at a value what is wrong with it. */
+  refuse(row, message) {
+    row.problem.textContent = message;
+    row.problem.hidden = false;
+    row.element.classList.add('wrong');
+    row.text.setAttribute('aria-invalid', 'true');
+    row.element.closest('details').open = true;
   }
 
   nearest(key) {
