@@ -89,7 +89,7 @@ class GeometryResult(Result):
 
     @property
     def kinds(self) -> list[str]:
-        """What each drawing is for."""
+        """Return what each drawing is for."""
         fresh = len(self.levels) - self.design - 1
         return ["design"] * self.design + ["fresh"] * fresh + ["best of surface"]
 

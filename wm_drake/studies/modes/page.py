@@ -77,7 +77,7 @@ class ModesResult(Result):
 
     @cached_property
     def gaps(self) -> dict[str, Nearness | None]:
-        """How near the modes bring the tub to the housing, by linearisation."""
+        """Return how near the modes bring the tub to the housing, by linearisation."""
         result = self.modes
         return {
             name: nearness(self.scene, result.rest_pose, result.modes[name], result.amplitude)
