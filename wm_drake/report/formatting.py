@@ -9,6 +9,8 @@ import numpy as np
 from wm_drake.parameters.units import Unit
 
 MM_PER_M = Unit("m", "mm").from_si(1.0)
+GM_PER_KGM = Unit("kg*m", "g*m").from_si(1.0)
+MPA_PER_PA = Unit("Pa", "MPa").from_si(1.0)
 RPM_PER_RAD_S = Unit("rad/s", "rpm").from_si(1.0)
 
 MISSING = "–"

@@ -21,7 +21,7 @@ from wm_drake.report.figure import (
     Rule,
     in_grid,
 )
-from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number, plain
+from wm_drake.report.formatting import GM_PER_KGM, MM_PER_M, RPM_PER_RAD_S, number, plain
 from wm_drake.report.page import Picture, picture
 from wm_drake.report.sections import Section, SectionedPage
 from wm_drake.report.table import Column, Table, table_of
@@ -82,7 +82,7 @@ class BalancerResult(Result):
             "machine": f.machine.name,
             "rate_rpm_per_s": RPM_PER_RAD_S * f.rate,
             "highest_speed_rpm": RPM_PER_RAD_S * f.high,
-            "capacity_gm": 1e3 * f.capacity,
+            "capacity_gm": GM_PER_KGM * f.capacity,
             "picked_up_from_rpm": RPM_PER_RAD_S * picked_up_from(f.machine),
             "answer": answer(f),
             "lock_below_rpm": RPM_PER_RAD_S * lock_below(f),
@@ -215,7 +215,7 @@ def _pick_up_text(f: Findings) -> str:
 def _capacity_text(f: Findings) -> str:
     """Return what the balls can balance, and what is beyond it."""
     heaviest = f.capacity / f.radius
-    text = f"{number(1e3 * f.capacity, 0)} g m, that of {number(heaviest, 2)} kg at the wall"
+    text = f"{number(GM_PER_KGM * f.capacity, 0)} g m, that of {number(heaviest, 2)} kg at the wall"
     beyond = [pair for pair in f.loads if not f.can_balance(pair)]
     if not beyond:
         return f"{text}; no load is beyond it in the plane of a ring"
@@ -306,7 +306,7 @@ def loads_frame(f: Findings) -> pd.DataFrame:
             {
                 "mass_kg": pair.mass,
                 "place_mm": MM_PER_M * pair.y,
-                "unbalance_gm": 1e3 * pair.mass * f.radius,
+                "unbalance_gm": GM_PER_KGM * pair.mass * f.radius,
                 **_numbers(pair),
             }
             for pair in f.loads

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from wm_drake.parameters.units import Unit
-from wm_drake.report.formatting import plain
+from wm_drake.report.formatting import GM_PER_KGM, plain
 from wm_drake.studies.drive.study import DriveResult, motor_with_limit
 
 rpm = Unit("rad/s", "rpm").from_si
@@ -41,7 +41,7 @@ def map_table(result: DriveResult) -> pd.DataFrame:
         {
             "load": torque_map.load,
             "mass_factor": factor,
-            "sum_of_mass_times_radius_gm": 1e3 * torque_map.unbalance[u],
+            "sum_of_mass_times_radius_gm": GM_PER_KGM * torque_map.unbalance[u],
             "torque_limit_Nm": torque,
             "end_rpm": rpm(float(torque_map.end_speed[u, t])),
             "caught_rpm": rpm(float(torque_map.caught_speed[u, t])),
@@ -59,11 +59,11 @@ def estimation_table(result: DriveResult) -> pd.DataFrame:
         return pd.DataFrame()
     return pd.DataFrame(
         {
-            "planted_gm": 1e3 * estimation.planted,
-            "estimated_gm": 1e3 * estimation.estimated,
-            "error_gm": 1e3 * estimation.errors,
-            "from_torque_alone_gm": 1e3 * estimation.from_torque,
-            "from_speed_alone_gm": 1e3 * estimation.from_speed,
+            "planted_gm": GM_PER_KGM * estimation.planted,
+            "estimated_gm": GM_PER_KGM * estimation.estimated,
+            "error_gm": GM_PER_KGM * estimation.errors,
+            "from_torque_alone_gm": GM_PER_KGM * estimation.from_torque,
+            "from_speed_alone_gm": GM_PER_KGM * estimation.from_speed,
         }
     )
 
@@ -72,13 +72,13 @@ def error_measures(result: DriveResult) -> dict[str, float] | None:
     """Return bias, RMS and 95 % quantile of the error of the estimated unbalance. [g m]"""
     if result.estimation is None:
         return None
-    errors = 1e3 * result.estimation.errors
+    errors = GM_PER_KGM * result.estimation.errors
     return {
         "loads": float(len(errors)),
         "bias_gm": float(np.mean(errors)),
         "rms_gm": float(np.sqrt(np.mean(errors**2))),
         "p95_gm": float(np.quantile(np.abs(errors), 0.95)),
-        "mean_planted_gm": float(np.mean(1e3 * result.estimation.planted)),
+        "mean_planted_gm": float(np.mean(GM_PER_KGM * result.estimation.planted)),
     }
 
 

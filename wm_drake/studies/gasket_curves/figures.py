@@ -20,7 +20,7 @@ from wm_drake.report.figure import (
     Rule,
     in_grid,
 )
-from wm_drake.report.formatting import MM_PER_M
+from wm_drake.report.formatting import MM_PER_M, MPA_PER_PA
 from wm_drake.solid.curves import Curve, Point
 from wm_drake.solid.mesh import Ring, axes_at
 from wm_drake.studies.rig.units import units_of
@@ -73,8 +73,8 @@ def rubber_figure(rubber: Rubber) -> Figure | None:
         return None
     measured = np.array(rubber.test.stretch)
     stretch = np.linspace(min(1.0, measured.min()), measured.max(), 100)
-    curve = 1e-6 * tension_stress(stretch, rubber.constants)
-    stress = 1e-6 * np.array(rubber.test.stress)
+    curve = MPA_PER_PA * tension_stress(stretch, rubber.constants)
+    stress = MPA_PER_PA * np.array(rubber.test.stress)
     marks = (
         Line(stretch, curve, color=OURS, key="fit"),
         Points(measured, stress, color=MEASURED, key="test"),

@@ -1,6 +1,6 @@
 """Page of the curves of a gasket."""
 
-from wm_drake.report.formatting import MM_PER_M, number, percent, significant
+from wm_drake.report.formatting import MM_PER_M, MPA_PER_PA, number, percent, significant
 from wm_drake.report.page import picture
 from wm_drake.report.sections import Section, SectionedPage
 from wm_drake.report.table import Column, Table, line
@@ -118,11 +118,11 @@ def summary(result: CurvesResult) -> str:
 
 def _rubber_text(result: CurvesResult) -> str:
     rubber = result.drawing.rubber
-    c1, c2, c3 = (significant(1e-6 * value, 3) for value in rubber.constants)
+    c1, c2, c3 = (significant(MPA_PER_PA * value, 3) for value in rubber.constants)
     hardness = "" if rubber.shore_a is None else f"{rubber.shore_a:g} Shore A, "
     return (
         f"{hardness}constants of Yeoh {c1}, {c2}, {c3} MPa, bulk modulus "
-        f"{significant(1e-6 * rubber.bulk, 3)} MPa, loss factor {rubber.loss_factor:g}"
+        f"{significant(MPA_PER_PA * rubber.bulk, 3)} MPa, loss factor {rubber.loss_factor:g}"
     )
 
 
@@ -167,7 +167,7 @@ def _checks_shown(result: CurvesResult) -> Table:
             unit.unit,
             *(unit.factor * checked.curve.values[[0, -1]]),
             max(checked.begin.stretch, checked.end.stretch),
-            1e-6 * max(checked.begin.stress, checked.end.stress),
+            MPA_PER_PA * max(checked.begin.stress, checked.end.stress),
             100.0 * checked.curve.work_error(),
             *(unit.factor * checked.touches_at),
             *(unit.factor * checked.wrinkles_at),

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from wm_drake.report.formatting import plain
+from wm_drake.report.formatting import MPA_PER_PA, plain
 from wm_drake.solid.curves import AXIAL, RADIAL, TILT, TWIST, Motion
 from wm_drake.studies.gasket_curves.machine import coupling
 from wm_drake.studies.gasket_curves.study import CurvesResult
@@ -79,8 +79,8 @@ def checks_table(result: CurvesResult) -> pd.DataFrame:
                 "to": unit.factor * checked.curve.values[-1],
                 "stretch_at_begin": checked.begin.stretch,
                 "stretch_at_end": checked.end.stretch,
-                "stress_at_begin_MPa": 1e-6 * checked.begin.stress,
-                "stress_at_end_MPa": 1e-6 * checked.end.stress,
+                "stress_at_begin_MPa": MPA_PER_PA * checked.begin.stress,
+                "stress_at_end_MPa": MPA_PER_PA * checked.end.stress,
                 "work_error": checked.curve.work_error(),
                 "folds_touch_from": unit.factor * checked.touches_at[0],
                 "folds_touch_to": unit.factor * checked.touches_at[1],

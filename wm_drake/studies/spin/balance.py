@@ -20,7 +20,7 @@ from wm_drake.report.figure import (
     in_grid,
     named,
 )
-from wm_drake.report.formatting import RPM_PER_RAD_S, listed, number, plain, shape_name
+from wm_drake.report.formatting import GM_PER_KGM, RPM_PER_RAD_S, listed, number, plain, shape_name
 from wm_drake.report.page import Picture, picture
 from wm_drake.report.sections import Section
 from wm_drake.report.table import Column, Table, table_of
@@ -37,9 +37,6 @@ MOST_DOTS = 500
 
 SMALLEST = 1e-3
 """Smallest unbalance that a logarithmic axis shows. [g m]"""
-
-GM_PER_KGM = 1e3
-"""Unbalance in g m of 1 kg m."""
 
 BALLS = (
     "Angles are from the top of the drum, positive as it turns. The unbalance in a plane is the "
