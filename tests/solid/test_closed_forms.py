@@ -166,7 +166,7 @@ def test_work_of_the_rim_is_the_energy(wave, motion):
 
 
 def test_mirror_image_is_an_equilibrium(wave):
-    """What is taken as the opposite motion is what the solver finds there."""
+    """Check that what is taken as the opposite motion is what the solver finds there."""
     ring = half_ring(wave[0], 4, 4)
     solver = Solver(ring, wave[0].rubber)
     for motion, largest in ((RADIAL, 0.002), (TILT, 0.01)):

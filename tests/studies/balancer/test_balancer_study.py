@@ -192,7 +192,7 @@ def result():
 
 
 def test_balls_help_at_speed_and_hurt_in_the_run_up(result):
-    """The planted physics: balls add to the unbalance below the resonances, cancel it above."""
+    """Check the planted physics: balls add to the unbalance below the resonances, cancel it above."""
     tables = result.tables()
     loads, curve = tables["loads"], tables["curve"]
     assert (loads.level_free_mm < 0.1 * loads.level_locked_mm).all()
