@@ -140,6 +140,7 @@ OTHERS = [
     (page("calibrate"), 0, load_free),
     (page("designs"), 0, load_design),
     (page("gasket-drawing"), 0, load_gasket_drawing),
+    (page("gasket-drawing"), 1, load_gasket_drawing),
     (page("tolerances"), 0, load_tolerances),
     (page("tolerances"), 1, load_limits),
 ]
