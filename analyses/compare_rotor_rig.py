@@ -22,6 +22,7 @@ from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report.drawing import matplotlib_of
 from wm_drake.report.figure import MEASURED, OURS, QUIET, Axis, Figure, Line, Panel, Points
+from wm_drake.studies.modes.study import SLIDING, MachineModes
 
 HERE = Path(__file__).parent
 LOAD, HOLDS = "washers_3", 20
@@ -196,11 +197,34 @@ def mapping(machine: Machine, steady: pd.DataFrame, stair: float, settle: float)
     return table(["change of the mapping", "median, %", "nine of ten points within, %"], rows)
 
 
-def modes(machine: Machine) -> str:
+def critical_sentence(found: MachineModes) -> str:
     """Return the critical speeds of the Campbell diagram as a sentence."""
-    speeds = wm.modes(machine, LOAD).critical_speeds * 30.0 / np.pi
+    speeds = found.critical_speeds * 30.0 / np.pi
     across = ", ".join(f"{speed:.0f}" for speed in speeds if speed < 5000.0)
     return f"Critical speeds of the linearised machine (order 1 meets a mode): {across} rpm."
+
+
+def campbell_figure(found: MachineModes) -> Figure:
+    """Return natural frequencies over the speed, with the published critical speeds on order 1."""
+    diagram = found.diagrams[SLIDING]
+    rpm = diagram.speed * 30.0 / np.pi
+    inside = diagram.frequency_hz[0] < 100.0  # the carrier along and about the shaft: above
+    marks = [
+        Line(rpm, frequency, color=OURS, width=2.0, key="wm_drake")
+        for frequency in diagram.frequency_hz.T[inside]
+    ]
+    marks.append(Line(rpm, rpm / 60.0, color=QUIET, dash="dashed", key="order 1"))
+    published = (
+        (COMPUTED, "#1a1a1a", "circle", "critical speed computed in the paper"),
+        (MEASURED_RPM, MEASURED, "triangle-up", "critical speed measured"),
+    )
+    marks += [
+        Points(speeds, np.array(speeds) / 60.0, color=color, symbol=symbol, size=8.0, key=key)
+        for speeds, color, symbol, key in published
+    ]
+    x = Axis(label="speed, rpm", range=(0.0, 5400.0))
+    y = Axis(label="natural frequency, Hz", range=(0.0, 60.0))
+    return Figure(panels=(Panel(marks=tuple(marks), x=x, y=y),), height=420.0)
 
 
 def main() -> None:
@@ -223,7 +247,8 @@ def main() -> None:
         "up": sweep(machine, 310.0, 5310.0, step, 0.25),
         "down": sweep(machine, 5310.0, 310.0, step, 0.25),
     }
-    text = "\n\n".join([tables(steady, runs, paper, measured), modes(machine), changes])
+    found = wm.modes(machine, LOAD)
+    text = "\n\n".join([tables(steady, runs, paper, measured), critical_sentence(found), changes])
     print(text)
     if arguments.out:
         arguments.out.write_text(text + "\n")
@@ -231,8 +256,12 @@ def main() -> None:
         before, _, rest = arguments.page.read_text().partition(MARKS[0])
         after = rest.partition(MARKS[1])[2]
         arguments.page.write_text(f"{before}{MARKS[0]}\n\n{text}\n\n{MARKS[1]}{after}")
-        drawing = matplotlib_of(figure(steady, runs["up"], paper, measured))
-        drawing.savefig(arguments.page.parent / "pictures" / "rotor_rig.png", dpi=110)
+        pictures = {
+            "rotor_rig.png": figure(steady, runs["up"], paper, measured),
+            "rotor_rig_campbell.png": campbell_figure(found),
+        }
+        for name, picture in pictures.items():
+            matplotlib_of(picture).savefig(arguments.page.parent / "pictures" / name, dpi=110)
 
 
 if __name__ == "__main__":
