@@ -3,6 +3,8 @@
 Tests that use it have the marker `browser`. They are skipped where there is no browser.
 """
 
+import base64
+import re
 import shutil
 from pathlib import Path
 
@@ -51,6 +53,12 @@ class Browser:
         """Show the page dark or light, on a screen or in print."""
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
         self._command("Emulation.setEmulatedMedia", {"media": media, "features": [scheme]})
+
+    def sheets(self):
+        """Return the number of sheets of A4 on which the page is printed."""
+        a4 = {"paperWidth": 8.27, "paperHeight": 11.69, "preferCSSPageSize": True}
+        data = self.driver.execute_cdp_cmd("Page.printToPDF", a4)["data"]
+        return len(re.findall(rb"/Type\s*/Page\b", base64.b64decode(data)))
 
     def errors(self):
         """Return the errors of scripts and of requests since the last call."""

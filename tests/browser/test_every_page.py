@@ -16,6 +16,10 @@ A4 = 688
 """Width of A4 between its margins. [pixels]"""
 
 
+MOST_SHEETS = 12
+"""Largest number of sheets of a page as it opens."""
+
+
 @pytest.mark.parametrize("name", KINDS)
 def test_page_is_in_order_and_nothing_is_cut_off(browser, tmp_path, name):
     browser.open(write_page(name, tmp_path))
@@ -26,6 +30,7 @@ def test_page_is_in_order_and_nothing_is_cut_off(browser, tmp_path, name):
         browser.media(dark=is_dark)
         browser.run(DRAW)
         assert browser.run(LAYOUT) == [], f"{width} pixels"
+    assert browser.sheets() <= MOST_SHEETS
     browser.run("location.hash = '#everything'")  # only what is open is printed
     browser.wait("return !document.querySelector('details:not([open])')")
     browser.size(A4)

@@ -1,7 +1,5 @@
 """Report pages in a real browser: controls work, names are text, print and dark colours."""
 
-import base64
-import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -127,16 +125,9 @@ def test_folded_sections_open_by_a_link(browser, pages):
     assert count > 3
 
 
-def sheets(browser):
-    """Return the number of sheets of A4 on which the page is printed."""
-    a4 = {"paperWidth": 8.27, "paperHeight": 11.69, "preferCSSPageSize": True}
-    data = browser.driver.execute_cdp_cmd("Page.printToPDF", a4)["data"]
-    return len(re.findall(rb"/Type\s*/Page\b", base64.b64decode(data)))
-
-
 def test_what_is_folded_is_not_printed_and_the_paper_says_so(browser, pages):
     opened(browser, pages(gasket_page))
-    few = sheets(browser)
+    few = browser.sheets()
     visible = "return getComputedStyle(document.querySelector(arguments[0])).display !== 'none'"
     browser.media(media="print")
     parts = (".on-paper", "#load-1", "#explore", "#contributions")
@@ -147,7 +138,7 @@ def test_what_is_folded_is_not_printed_and_the_paper_says_so(browser, pages):
     browser.wait("return !document.querySelector('details:not([open])')")
     assert [browser.run(visible, part) for part in parts] == [False, True, True, True]
     browser.media()
-    assert few <= 12 < sheets(browser)
+    assert few <= 12 < browser.sheets()
 
 
 def test_machine_page_turns_and_names_parts(browser, tmp_path):
@@ -175,7 +166,9 @@ def test_print_draws_every_picture_on_a4_in_light_colours(browser, pages):
     browser.size(690)
     browser.media(media="print")
     browser.run("dispatchEvent(new Event('beforeprint'))")
-    wide = "return [...document.querySelectorAll('.plot')].map(p => p.scrollWidth)"
+    wide = (
+        "return [...document.querySelectorAll('.plot')].map(p => p.getBoundingClientRect().width)"
+    )
     assert max(browser.run(wide)) <= 690
     ink = "return getComputedStyle(document.querySelector('.plot .xtick text')).fill"
     assert browser.run(ink) == "rgb(82, 96, 109)"

@@ -5,7 +5,7 @@
    dark page, draw it when it comes into view and before printing, and a legend and buttons of
    panels that the keyboard reaches. A colour `rgb()` is never turned. */
 const Pictures = (() => {
-  const PRINT_WIDTH = 686, LEAST_WIDTH = 600, MINUS = "\u2212";
+  const PRINT_WIDTH = 1040, LEAST_WIDTH = 600, MINUS = "\u2212";
   const FONT = 'system-ui, -apple-system, "Segoe UI", Roboto, "Liberation Sans", Arial, sans-serif';
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const drawn = new Map();
