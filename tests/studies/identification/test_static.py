@@ -1,6 +1,7 @@
 """Quasi-static tests: planted table and friction come back, from one-sided and two-sided tests."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 from wm_drake.errors import InputError
 from wm_drake.parameters import MeasuredLoop, load_machine
-from wm_drake.studies.identification.static import static_curve
+from wm_drake.studies.identification.static import field_of, static_curve
 
 FRICTION, SOON = 3.0, 2e-4  # N, m
 
@@ -67,7 +68,7 @@ def test_energy_of_a_whole_cycle_is_the_area_of_the_loop():
 def test_repeated_tests_are_averaged_and_purely_elastic_ones_have_no_hysteresis():
     runs = [ramps((0.0, 20e-3, 0.0), friction=0.0, offset=o) for o in (0.0, 0.0, 0.0)]
     curve = static_curve("about_y", runs)
-    assert curve.field == "rotational_stiffness_y"
+    assert field_of(curve.axis) == "rotational_stiffness_y"
     assert curve.friction == pytest.approx(0.0, abs=1e-3)
     assert set(curve.table(3)) == {"angle", "torque"}
     assert curve.table(3)["torque"][-1] == pytest.approx(elastic(20e-3), rel=3e-3)
@@ -112,3 +113,28 @@ def test_command_gives_all_axes_in_one_plot_and_a_machine(wm_drake):
     page = Path("fit/report.html").read_text()
     assert page.count("<figure data-picture>") == 1
     assert set(pd.read_csv("fit/static.csv").axis) == {"x", "y", "about_x", "about_y"}
+
+
+def test_command_finds_the_sponge_of_a_free_stroke_damper(wm_drake):
+    """Plant a sponge that has no force in the free stroke, with a friction of 1 N."""
+    table = load_machine("free_stroke").damper_types["free_stroke"].sponge
+    test = ramps((0.0, 9e-3, -9e-3, 9e-3, 0.0), samples=8000)
+    rising = np.gradient(test.displacement) >= 0.0
+    force = np.interp(test.displacement, table.displacement, table.force) + np.where(rising, 1, -1)
+    straight = ("time_s", "displacement_mm", "force_N")
+    write("s.csv", replace(test, force=force), straight)
+    ended = wm_drake("identify damper --static s.csv --machine free_stroke --knots 9 --out fit")
+    assert ended.code == 0
+    found = load_machine("fit/identified.yaml").damper_types["free_stroke"].sponge
+    places = np.array([-8e-3, -5e-3, 0.0, 2e-3, 5e-3, 8e-3])
+    wanted = np.interp(places, table.displacement, table.force)
+    got = np.interp(places, found.displacement, found.force)
+    assert got == pytest.approx(wanted, abs=0.4)
+    assert "with a hysteresis of ±1 N" in Path("fit/report.html").read_text()
+
+
+def test_a_damper_without_a_sponge_table_is_refused(wm_drake):
+    write("s.csv", ramps((0.0, 9e-3, 0.0)), ("time_s", "displacement_mm", "force_N"))
+    ended = wm_drake("identify damper --static s.csv --machine reference")
+    assert ended.code == 2
+    assert "the law mstv" in ended.err

@@ -55,6 +55,11 @@ class DamperFitOptions(FitOptions):
     )
     outer_mass: str | None = OUTER_MASS
     jig_mass: str | None = JIG_MASS
+    static: bool = option(
+        False,
+        "Quasi-static tests of the sponge of a free-stroke damper ([A] Eq. (5)), below the force "
+        "at which it slides: table and hysteresis.",
+    )
 
 
 class AxisFitOptions(FitOptions):
@@ -94,13 +99,11 @@ def _begin(kind: str, options: Any) -> Task:
         from wm_drake.studies.identification.table2 import Table2Task
 
         return Table2Task(options)
-    if kind == "damper":
-        return study.DamperFitTask(options)
     if options.static:
         from wm_drake.studies.identification.static_tests import StaticTask
 
         return StaticTask(kind, options)
-    return study.AxisFitTask(kind, options)
+    return study.DamperFitTask(options) if kind == "damper" else study.AxisFitTask(kind, options)
 
 
 def _declared(kind: str, about: str, options: type[Options], folder: str) -> Study:

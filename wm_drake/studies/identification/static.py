@@ -1,4 +1,4 @@
-"""Quasi-static tests of a bushing or gasket: force table and hysteresis by axis ([B] 3.1.1)."""
+"""Quasi-static tests: force table and hysteresis of each axis ([B] 3.1.1), or of a sponge."""
 
 import itertools
 from collections.abc import Sequence
@@ -11,6 +11,9 @@ from wm_drake.errors import input_error
 from wm_drake.parameters import MeasuredLoop
 from wm_drake.parameters.types import FloatArray
 from wm_drake.rigs.smoothing import smoothed
+
+SPONGE = "sponge"
+"""Name in place of an axis, and field of a damper type, for the sponge of a free-stroke damper."""
 
 NODES = 40
 """Places on each side of zero at which branches are averaged."""
@@ -30,7 +33,7 @@ class StaticCurve:
     """Quasi-static behaviour along or about one axis.
 
     Attributes:
-        axis: One of `wm_drake.rigs.AXES`.
+        axis: One of `wm_drake.rigs.AXES`, or `SPONGE`.
         loops: Recorded tests.
         position: Places over the range, zero among them (m,). [m; rad]
         loading, unloading: Mean force of the branches that rise and fall in displacement, where
@@ -69,11 +72,6 @@ class StaticCurve:
         """Median half width of the hysteresis. [N; N m]"""
         return float(np.nanmedian(self.half_width))
 
-    @property
-    def field(self) -> str:
-        """Field of a bushing that holds the table."""
-        return f"{'rotational_' if self.rotates else ''}stiffness_{self.axis[-1]}"
-
     def table(self, knots: int) -> dict[str, tuple[float, ...]]:
         """Return the monotone table of the elastic curve.
 
@@ -106,6 +104,13 @@ class StaticCurve:
         }
 
 
+def field_of(axis: str) -> str:
+    """Return the field of a bushing, or of a damper type, that holds the table of an axis."""
+    if axis == SPONGE:
+        return SPONGE
+    return f"{'rotational_' if axis.startswith('about') else ''}stiffness_{axis[-1]}"
+
+
 def static_curve(axis: str, loops: Sequence[MeasuredLoop]) -> StaticCurve:
     """Return force table and hysteresis of quasi-static tests of one axis.
 
@@ -115,7 +120,7 @@ def static_curve(axis: str, loops: Sequence[MeasuredLoop]) -> StaticCurve:
     that one less or plus the half width next to it.
 
     Args:
-        axis: One of `wm_drake.rigs.AXES`.
+        axis: One of `wm_drake.rigs.AXES`, or `SPONGE`.
         loops: Tests of this axis, at least one.
 
     Raises:

@@ -67,7 +67,7 @@ def summary(curves: Sequence[StaticCurve]) -> str:
 
 def static_figure(curves: Sequence[StaticCurve]) -> Figure:
     """Draw samples, branches and table of each axis, translations above rotations."""
-    ordered = sorted(curves, key=lambda c: AXES.index(c.axis))
+    ordered = sorted(curves, key=_place)
     kinds = [[c for c in ordered if c.rotates == kind] for kind in (False, True)]
     columns = max(2, *map(len, kinds))
     panels: list[Panel | None] = []
@@ -114,7 +114,7 @@ def static_table(curves: Sequence[StaticCurve]) -> pd.DataFrame:
 def measures_shown(curves: Sequence[StaticCurve]) -> Table:
     """Return the measures of each axis with units."""
     groups = []
-    for c in sorted(curves, key=lambda c: AXES.index(c.axis)):
+    for c in sorted(curves, key=_place):
         units = units_of(c.rotates)
         low, high = units.factor * c.position[0], units.factor * c.position[-1]
         cells = (
@@ -144,6 +144,11 @@ def measures_shown(curves: Sequence[StaticCurve]) -> Table:
         "tests",
     )
     return Table(caption, heads, tuple(groups), text_columns=8)
+
+
+def _place(curve: StaticCurve) -> int:
+    """Return the place of a curve among the others; a sponge has no others."""
+    return AXES.index(curve.axis) if curve.axis in AXES else 0
 
 
 def _name(curve: StaticCurve) -> str:

@@ -1,4 +1,4 @@
-"""`identify gasket --static`: force tables with hysteresis from quasi-static tests."""
+"""`identify --static`: force tables with hysteresis from quasi-static tests."""
 
 import json
 from collections.abc import Sequence
@@ -10,12 +10,12 @@ import pandas as pd
 from rich.table import Table
 
 from wm_drake.errors import input_error
-from wm_drake.parameters import MeasuredLoop
+from wm_drake.parameters import Component, MeasuredLoop
 from wm_drake.studies.components import axes_of, target_of
 from wm_drake.studies.identification.fragment import Destination, table_entry, written_fragment
 from wm_drake.studies.identification.inputs import loops_of
-from wm_drake.studies.identification.options import AxisFitOptions
-from wm_drake.studies.identification.static import StaticCurve, static_curve
+from wm_drake.studies.identification.options import AxisFitOptions, DamperFitOptions
+from wm_drake.studies.identification.static import SPONGE, StaticCurve, field_of, static_curve
 from wm_drake.studies.identification.static_page import measures_shown, static_page, static_table
 from wm_drake.studies.inputs import pairs_of
 from wm_drake.studies.run import Executor
@@ -47,7 +47,7 @@ class StaticResult(Result):
         """Write the tables for a machine, the curves, and their measures as JSON."""
         super().write(folder)
         entries = {
-            f"{curve.field[:-1]}{axis[-1]}": table_entry(curve.table(self.knots), _source(curve))
+            field_of(axis): table_entry(curve.table(self.knots), _source(curve))
             for axes, curve in self.curves.items()
             for axis in axes
         }
@@ -80,16 +80,20 @@ def _source(curve: StaticCurve) -> str:
 class StaticTask(Task):
     """Quasi-static tests with checked options."""
 
-    def __init__(self, kind: str, options: AxisFitOptions) -> None:
-        """Find the component and read the tests of each axis.
+    def __init__(self, kind: str, options: AxisFitOptions | DamperFitOptions) -> None:
+        """Find the component and read the tests of each axis, or of the sponge of a damper.
 
         Raises:
             InputError: an option or a file is wrong.
         """
         self.options, self.target = options, target_of(kind, options)
-        name = self.target.component.name
-        self.title = kind if name == kind else f"{kind} {name}"
-        by_axis = _files_by_axis(options.files, options.axis)
+        component = self.target.component
+        self.title = kind if component.name == kind else f"{kind} {component.name}"
+        if isinstance(options, AxisFitOptions):
+            by_axis = _files_by_axis(options.files, options.axis)
+        else:
+            _check_sponge(component)
+            by_axis = {(SPONGE,): list(options.files)}
         self.tests = {axes: _loops(paths, options, axes[0]) for axes, paths in by_axis.items()}
 
     def run(self, executor: Executor) -> StaticResult:
@@ -98,6 +102,16 @@ class StaticTask(Task):
         changes = dict(pairs_of(self.options.sets, "--set"))
         destination = Destination(self.target, executor.out or Path(), changes)
         return StaticResult(self.title, curves, self.options.knots, destination)
+
+
+def _check_sponge(damper: Component) -> None:
+    if not hasattr(damper.parameters, SPONGE):
+        law = damper.parameters.law  # type: ignore[union-attr]
+        raise input_error(
+            f"damper {damper.name} has the law {law}, in which no table can be put; a quasi-static "
+            "test gives the table of the sponge of the law free_stroke",
+            where="--static",
+        )
 
 
 def _files_by_axis(files: Sequence[Path], axis: str | None) -> dict[tuple[str, ...], list[Path]]:
@@ -119,7 +133,9 @@ def _files_by_axis(files: Sequence[Path], axis: str | None) -> dict[tuple[str, .
     return by_axis
 
 
-def _loops(paths: Sequence[Path], options: AxisFitOptions, axis: str) -> list[MeasuredLoop]:
+def _loops(
+    paths: Sequence[Path], options: AxisFitOptions | DamperFitOptions, axis: str
+) -> list[MeasuredLoop]:
     loops = loops_of(paths, options)
     if loops[0].rotates != axis.startswith("about"):
         needs = "angles and moments" if axis.startswith("about") else "displacements and forces"
