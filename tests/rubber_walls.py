@@ -9,9 +9,13 @@ SHEAR = 2.0 * C1
 """Shear modulus of a Neo-Hookean rubber of constant C1. [Pa]"""
 
 
-def drawing(*corners, bulk=500.0 * SHEAR):
+def drawing(*corners, bulk=500.0 * SHEAR, fillet=0.0):
     """Return a drawing through corners (radius, y, thickness). [m]"""
-    points = (MeridianPoint(radius=r, y=y, thickness=t) for r, y, t in corners)
+    ends = 0, len(corners) - 1
+    points = (
+        MeridianPoint(radius=r, y=y, thickness=t, fillet=0.0 if number in ends else fillet)
+        for number, (r, y, t) in enumerate(corners)
+    )
     return GasketDrawing(meridian=tuple(points), rubber=Rubber(c1=C1, bulk_modulus=bulk))
 
 

@@ -175,11 +175,13 @@ class GasketDrawing(Frozen):
         meridian: Corners of the middle line; the first is clamped to the housing, the last is moved
             by the tub.
         rubber: The rubber.
+        contact: Whether folds hold each other off; without it they may overlap.
     """
 
     about: str = ""
     meridian: tuple[MeridianPoint, ...] = Field(max_length=60)
     rubber: Rubber
+    contact: bool = True
 
     @model_validator(mode="after")
     def _can_be_built(self) -> "GasketDrawing":

@@ -5,5 +5,6 @@ Leaves: `Curve`, force and moment of the moved rim over its displacement or angl
 May import: `parameters`, `compiler`, `errors`; no Drake, no report.
 
 `rubber` has the material, `element` one element, `mesh` the nodes of a drawing, `equilibrium`
-Newton's method, `curves` the motions of a rim, `deformed` stretch, stress and touching folds.
+Newton's method, `touching` and `contact` what holds folds off each other, `curves` the motions of
+a rim, `deformed` stretch, stress and wrinkles.
 """

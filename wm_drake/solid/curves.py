@@ -237,8 +237,10 @@ class Gasket:
         Raises:
             InputError: the wall bends too sharply for its thickness.
         """
-        self._about_axis = Solver(wedge(drawing, 3 * mesh.meridian), drawing.rubber)
-        self._across = Solver(half_ring(drawing, mesh.meridian, mesh.around), drawing.rubber)
+        rings = wedge(drawing, 3 * mesh.meridian), half_ring(drawing, mesh.meridian, mesh.around)
+        self._about_axis, self._across = (
+            Solver(ring, drawing.rubber, drawing.contact) for ring in rings
+        )
 
     def curve(
         self, motion: Motion, values: Sequence[float], progress: Callable[[float], None]

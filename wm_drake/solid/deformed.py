@@ -1,4 +1,4 @@
-"""State of a deformed ring: its stretch, its stress, and where its folds touch."""
+"""State of a deformed ring: its stretch, its stress, its wrinkles."""
 
 from dataclasses import dataclass
 
@@ -11,9 +11,6 @@ from wm_drake.solid.mesh import Ring
 
 FIRST_WRINKLE = 4
 """Smallest number of waves around the whole ring that counts as wrinkles, not as the motion."""
-
-FINER = 8
-"""Points on the middle line between two nodes, to find where folds touch."""
 
 
 @dataclass(frozen=True)
@@ -75,33 +72,3 @@ def wrinkles(ring: Ring, u: FloatArray) -> float:
     waves = dct([x * np.cos(angles) + z * np.sin(angles), y], type=1) / (numbers.shape[1] - 1)
     largest = float(np.linalg.norm(u, axis=-1).max())
     return float(np.abs(waves[..., FIRST_WRINKLE:]).max()) / largest if largest else 0.0
-
-
-def folds_touch(ring: Ring, u: FloatArray) -> bool:
-    """Return whether parts of the wall overlap that are apart along the meridian.
-
-    Args:
-        ring: The ring.
-        u: Displacements of the nodes. (nodes, 3) [m]
-    """
-    drawn = ring.positions[ring.grid]
-    thickness = _finer(np.linalg.norm(drawn[:, 0, 2] - drawn[:, 0, 0], axis=-1)[:, None])[:, 0]
-    middle = _finer(drawn[:, 0, 1])
-    steps = np.linalg.norm(np.diff(middle, axis=0), axis=1)
-    along = np.append(0.0, np.cumsum(steps))
-    wall = 0.5 * (thickness[:, None] + thickness[None, :])
-    apart = np.abs(np.subtract.outer(along, along)) > 3.0 * wall
-    for column in range(ring.grid.shape[1]):
-        numbers = ring.grid[:, column, 1]
-        line = _finer(ring.positions[numbers] + u[numbers])
-        distance = np.linalg.norm(line[:, None] - line[None, :], axis=-1)
-        if np.any(apart & (distance < wall)):
-            return True
-    return False
-
-
-def _finer(values: FloatArray) -> FloatArray:
-    """Return rows between which others lie evenly. (n, m) to (FINER (n - 1) + 1, m)"""
-    places = np.linspace(0.0, len(values) - 1.0, FINER * (len(values) - 1) + 1)
-    rows = np.arange(len(values))
-    return np.column_stack([np.interp(places, rows, column) for column in values.T])

@@ -8,8 +8,10 @@ from scipy.linalg import LinAlgError, solveh_banded
 from wm_drake.compiler.compilation import long_running
 from wm_drake.parameters.gasket_drawing import Rubber
 from wm_drake.parameters.types import FloatArray
+from wm_drake.solid.contact import STIFFNESS, add_contact, contact_energy
 from wm_drake.solid.element import UNKNOWNS, element_energy, write_element
 from wm_drake.solid.mesh import Ring
+from wm_drake.solid.touching import Faces, Touching
 
 TOLERANCE = 1e-7
 """Largest residual force, in the sizes of all forces within the elements."""
@@ -131,12 +133,44 @@ class Solved:
     Attributes:
         u: Displacements of the nodes. (nodes, 3) [m]
         forces: Forces of the ring on its nodes, reversed: what holds it there. (nodes, 3) [N]
-        energy: Strain energy of the whole ring. [J]
+        energy: Energy of strain and contact of the whole ring. [J]
     """
 
     u: FloatArray
     forces: FloatArray
     energy: float
+
+
+@dataclass(frozen=True)
+class Numbering:
+    """Numbers of the unknowns.
+
+    Attributes:
+        free: Number of each unknown, -1 for given displacements. (nodes, 3)
+        width: Width of the lower band of the stiffness.
+        size: Number of unknowns.
+    """
+
+    free: np.ndarray
+    width: int
+    size: int
+
+    @classmethod
+    def of(cls, given: np.ndarray, order: np.ndarray, groups: np.ndarray) -> "Numbering":
+        """Number the unknowns.
+
+        Args:
+            given: Which displacements are given. (nodes, 3)
+            order: Nodes in the order of their unknowns. (nodes,)
+            groups: Nodes that are coupled. (groups, n)
+        """
+        free = np.full(given.shape, -1)
+        unknown = ~given[order]
+        numbers = np.where(unknown, np.cumsum(unknown).reshape(unknown.shape) - 1, -1)
+        free[order] = numbers
+        coupled = free[groups].reshape(len(groups), -1)
+        lowest = np.where(coupled < 0, np.iinfo(int).max, coupled).min(axis=1)
+        return cls(free, int(np.max(coupled.max(axis=1) - lowest)) + 1, int(unknown.sum()))
 
 
 class Solver:
@@ -147,17 +181,28 @@ class Solver:
         iterations: Newton iterations so far.
     """
 
-    def __init__(self, ring: Ring, rubber: Rubber) -> None:
-        """Number the unknowns; both rims are given."""
+    def __init__(self, ring: Ring, rubber: Rubber, has_contact: bool = False) -> None:
+        """Number the unknowns; both rims are given.
+
+        Touching folds couple all nodes of a column. Only while they touch, columns are numbered
+        one after the other, which has a wider band.
+
+        Args:
+            ring: The ring.
+            rubber: Its rubber.
+            has_contact: Whether folds are held off each other.
+        """
         self.ring, self.iterations = ring, 0
         self._rubber = np.array(rubber.constants), rubber.bulk
+        self._faces = Faces(ring) if has_contact else None
+        self._contact_stiffness = STIFFNESS * 2.0 * rubber.constants[0]
         given = ring.locked.copy()
         given[ring.clamped], given[ring.moved] = True, True
-        self._free = np.where(given, -1, np.cumsum(~given).reshape(given.shape) - 1)
-        numbers = self._free[ring.nodes].reshape(len(ring.nodes), -1)
-        lowest = np.where(numbers < 0, np.iinfo(int).max, numbers).min(axis=1)
-        self._width = int(np.max(numbers.max(axis=1) - lowest)) + 1
-        self._size = int(np.count_nonzero(~given))
+        by_column = ring.grid.transpose(1, 0, 2)
+        self._apart = Numbering.of(given, ring.grid.ravel(), ring.nodes)
+        whole = by_column.reshape(len(by_column), -1)
+        wide = whole if len(whole) == 1 else np.hstack([whole[:-2:2], whole[1::2], whole[2::2]])
+        self._together = Numbering.of(given, by_column.ravel(), wide)
 
     def at_rest(self) -> Solved:
         """Return the ring as drawn."""
@@ -177,23 +222,60 @@ class Solver:
         ring, u, energy = self.ring, start.u.copy(), np.inf
         change = np.zeros_like(u)
         change[ring.moved] = rim - u[ring.moved]
-        band, rhs = np.zeros((self._width, self._size)), np.zeros(self._size)
         forces = np.zeros_like(u)
         for _ in range(MOST_ITERATIONS):
             self.iterations += 1
-            size = write_system(
-                *self._arrays, u, change, self._free, *self._rubber, band, rhs, forces
-            )
+            free, band, rhs, size = self._system(u, change, forces)
             if size < 0.0 or not np.isfinite(rhs).all():
                 break
             moves = bool(np.any(change))
             if not moves and np.abs(rhs).max() <= TOLERANCE * size:
-                return Solved(u, forces.copy(), ring.copies * energy)
+                return Solved(u, forces, ring.copies * energy)
             unknown, is_stable = _downhill(band, rhs)
-            step = change + np.append(unknown, 0.0)[self._free]
+            step = change + np.append(unknown, 0.0)[free]
             u, energy = self._along(u, step, np.inf if moves or is_stable else energy)
             change[:] = 0.0
         raise NoEquilibriumError
+
+    def _system(
+        self, u: FloatArray, change: FloatArray, forces: FloatArray
+    ) -> tuple[np.ndarray, FloatArray, FloatArray, float]:
+        """Return the equations of a Newton step: numbers of the unknowns, band, right-hand side.
+
+        Args:
+            u: Displacements. [m]
+            change: Change of the given displacements in this step. [m]
+            forces: Receives the forces on all nodes. [N]
+
+        Returns:
+            The three, and the sum of the sizes of the elements' forces, as `write_system`.
+        """
+        touching = self.touching(u)
+        numbering = self._together if touching else self._apart
+        band, rhs = np.zeros((numbering.width, numbering.size)), np.zeros(numbering.size)
+        size = write_system(
+            *self._arrays, u, change, numbering.free, *self._rubber, band, rhs, forces
+        )
+        if touching and self._faces is not None:
+            places = self.ring.positions + u
+            add_contact(
+                touching.rows, touching.curves, self._faces.numbers, places, change,
+                numbering.free, self._contact_stiffness, band, rhs, forces,
+            )  # fmt: skip
+        return numbering.free, band, rhs, size
+
+    def touching(self, u: FloatArray) -> Touching | None:
+        """Return where folds touch at displacements of the nodes; None if they do not."""
+        touching = self._faces.touching(u) if self._faces else None
+        return touching if touching is not None and len(touching.rows) else None
+
+    def _energy(self, u: FloatArray) -> float:
+        """Return the energy of strain and contact of this part of the ring. [J]"""
+        energy = float(total_energy(*self._arrays, u, *self._rubber))
+        touching = self.touching(u)
+        if touching is None:
+            return energy
+        return energy + float(contact_energy(touching.rows, self._contact_stiffness))
 
     @property
     def _arrays(self) -> tuple[np.ndarray, ...]:
@@ -213,9 +295,9 @@ class Solver:
         part = 1.0
         while part >= SHORTEST:
             trial = u + part * step
-            reached = total_energy(*self._arrays, trial, *self._rubber)
+            reached = self._energy(trial)
             if reached <= energy + ENERGY_ROUNDING * abs(reached):
-                return trial, float(reached)
+                return trial, reached
             if np.isinf(energy):
                 break
             part *= 0.5

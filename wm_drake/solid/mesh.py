@@ -29,6 +29,7 @@ class Ring:
         positions: Places of the numbered nodes in these axes. (nodes, 3) [m]
         grid: Numbers of the nodes: along the meridian, around, through the wall. (n, m, 3)
         locked: Directions without displacement, by symmetry. (nodes, 3)
+        angles: Part of the angle about the axis that belongs to each column. (m,) [rad]
         copies: Factor from the forces of this part to those of the whole ring.
         shown: Resultants that do not vanish by symmetry: force along x, y, z, moment about them.
     """
@@ -39,6 +40,7 @@ class Ring:
     positions: FloatArray
     grid: np.ndarray
     locked: np.ndarray
+    angles: FloatArray
     copies: float
     shown: tuple[bool, ...]
 
@@ -77,7 +79,8 @@ def half_ring(drawing: GasketDrawing, meridian: int, around: int) -> Ring:
     places = positions.reshape(-1, 3)
     frames = np.broadcast_to(np.eye(3), (*nodes.shape, 3, 3)).copy()
     shown = (True, True, False, False, False, True)
-    return _checked(Ring(places[nodes], nodes, frames, places, numbers, locked, 2.0, shown))
+    parts = math.pi / (6.0 * around) * np.array([1.0, *([4.0, 2.0] * around)[:-1], 1.0])
+    return _checked(Ring(places[nodes], nodes, frames, places, numbers, locked, parts, 2.0, shown))
 
 
 def wedge(drawing: GasketDrawing, meridian: int) -> Ring:
@@ -103,6 +106,7 @@ def wedge(drawing: GasketDrawing, meridian: int) -> Ring:
             _turned(section, 0.0).reshape(-1, 3),
             one[:, None, :],
             np.zeros((one.size, 3), dtype=bool),
+            np.array([2.0 * HALF_WEDGE]),
             math.pi / HALF_WEDGE,
             (False, True, False, False, True, False),
         )

@@ -23,6 +23,7 @@ from wm_drake.report.figure import (
 from wm_drake.report.formatting import MM_PER_M, MPA_PER_PA
 from wm_drake.solid.curves import Curve, Point
 from wm_drake.solid.mesh import Ring, axes_at
+from wm_drake.solid.touching import Faces
 from wm_drake.studies.rig.units import units_of
 
 TITLES = {
@@ -111,6 +112,11 @@ def _cuts(curve: Curve, column: int) -> Iterator[Mark]:
     ):
         outline = MM_PER_M * _outline(curve.ring, point, column)
         yield Line(*outline.T, color=color, key=key, width=1.2)
+        touching = Faces(curve.ring).touching(point.u).in_column(column)
+        radius, y = MM_PER_M * touching.places.T
+        side = -1.0 if column else 1.0
+        if len(y):
+            yield Points(side * radius, y, color=color, symbol="square", size=4.0)
 
 
 def rings_figure(curves: dict[str, Curve]) -> Figure:

@@ -22,9 +22,10 @@ METHOD = (
     "housing is clamped, that at the tub moves as a rigid body about its centre on the axis. The "
     "axial and twist curves are those of a thin wedge, the radial and tilt curves those of half a "
     "ring. The force is that on the moved rim in its direction of motion; moments are about its "
-    "moved centre. There is no contact between folds, no pressure of water, no set of the rubber, "
-    "and no beads or ribs that the drawing does not have. Damping: loss factor times stiffness by "
-    "2 π f at the frequency below."
+    "moved centre. Folds that touch hold each other off without friction, unless the drawing has "
+    "contact: false. There is no pressure of water, no set of the rubber, and no beads or ribs "
+    "that the drawing does not have. Damping: loss factor times stiffness by 2 π f at the "
+    "frequency below."
 )
 
 
@@ -40,7 +41,7 @@ def curves_page(result: CurvesResult, facts: Facts) -> str:
     sections = picture(
         sections_figure(curves),
         "Cuts through the wall as drawn and at both ends of each curve.",
-        "Cuts through the wall in the plane of the motion, to scale.",
+        "Cuts through the wall in the plane of the motion, to scale. Squares: folds touch.",
     )
     rings = picture(
         rings_figure(curves),
@@ -170,18 +171,20 @@ def _checks_shown(result: CurvesResult) -> Table:
             MPA_PER_PA * max(checked.begin.stress, checked.end.stress),
             100.0 * checked.curve.work_error(),
             *(unit.factor * checked.touches_at),
+            100.0 * checked.depth,
             *(unit.factor * checked.wrinkles_at),
         )
         groups.append(line(name, cells))
     header = (
         "curve", "unit", Column("from", decimals=2), Column("to", decimals=2),
         Column("largest stretch", decimals=3), Column("largest stress", "MPa", 3),
-        Column("work less energy", "%", 3), Column("folds overlap below", decimals=2),
-        Column("folds overlap above", decimals=2), Column("wrinkles below", decimals=2),
+        Column("work less energy", "%", 3), Column("folds touch below", decimals=2),
+        Column("folds touch above", decimals=2), Column("overlap", "% of wall", 2),
+        Column("wrinkles below", decimals=2),
         Column("wrinkles above", decimals=2),
     )  # fmt: skip
     caption = (
         "Stretch: largest principal stretch at both ends. Stress: equivalent stress of von Mises. "
-        "Folds overlap: the model has no contact there, the real gasket is stiffer."
+        "Folds touch: at the first points where they do; the overlap is that of the soft contact."
     )
     return Table(caption, header, tuple(groups), text_columns=2)

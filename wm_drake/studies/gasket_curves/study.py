@@ -18,7 +18,8 @@ from wm_drake.parameters.gasket_drawing import GasketDrawing, load_gasket_drawin
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.solid.curves import MOTIONS, Curve, Gasket, Mesh
-from wm_drake.solid.deformed import Deformed, deformed, folds_touch, wrinkles
+from wm_drake.solid.deformed import Deformed, deformed, wrinkles
+from wm_drake.solid.touching import Faces
 from wm_drake.studies.gasket_curves.machine import (
     damping_per_stiffness,
     stiffness_of,
@@ -49,7 +50,8 @@ class Checked:
     Attributes:
         curve: The curve.
         begin, end: Stretch and stress at its ends.
-        touches_at: First value on each side where folds overlap, and NaN without. (2,) [m or rad]
+        touches_at: First value on each side where folds touch, and NaN without. (2,) [m or rad]
+        depth: Largest depth by which they overlap, in thicknesses of the wall.
         wrinkles_at: First value on each side where the wall has wrinkles, and NaN without. (2,)
     """
 
@@ -57,6 +59,7 @@ class Checked:
     begin: Deformed
     end: Deformed
     touches_at: FloatArray
+    depth: float
     wrinkles_at: FloatArray
 
 
@@ -117,7 +120,8 @@ class CurvesResult(Result):
 
     def warnings(self) -> Sequence[str]:
         """Return where the curves are less than what a real gasket does."""
-        return [text for checked in self.curves.values() for text in _warnings_of(checked)]
+        contact = self.drawing.contact
+        return [text for one in self.curves.values() for text in _warnings_of(one, contact)]
 
     def failures(self) -> Sequence[str]:
         """Return where a curve ends early; what was computed is kept."""
@@ -126,7 +130,7 @@ class CurvesResult(Result):
                 if text]  # fmt: skip
 
 
-def _warnings_of(checked: Checked) -> Iterable[str]:
+def _warnings_of(checked: Checked, has_contact: bool) -> Iterable[str]:
     name, rotates = checked.curve.motion.name, checked.curve.motion.rotates
     unit = Unit("rad", "deg") if rotates else Unit("m", "mm")
 
@@ -134,10 +138,10 @@ def _warnings_of(checked: Checked) -> Iterable[str]:
         shown = [f"{unit.from_si(value):.3g}" for value in values if np.isfinite(value)]
         return f"{' and '.join(shown)} {unit.shown}"
 
-    if np.isfinite(checked.touches_at).any():
+    if np.isfinite(checked.touches_at).any() and not has_contact:
         yield (
-            f"{name}: folds overlap from {listed(checked.touches_at)} on; the model has no contact "
-            "between folds, so the real gasket is stiffer there"
+            f"{name}: folds overlap from {listed(checked.touches_at)} on; the drawing has no "
+            "contact between folds, so the real gasket is stiffer there"
         )
     if np.isfinite(checked.wrinkles_at).any():
         yield (
@@ -203,12 +207,14 @@ class CurvesTask(Task):
         if points[0].value == 0.0 or points[-1].value == 0.0:
             raise WmDrakeError(f"{curve.stopped}: there is no curve; nothing was written")
         rubber = self.drawing.rubber
-        touch = [folds_touch(curve.ring, point.u) for point in points]
+        faces = Faces(curve.ring)
+        depths = [faces.touching(point.u).depth for point in points]
         return Checked(
             curve,
             deformed(curve.ring, rubber, points[0].u),
             deformed(curve.ring, rubber, points[-1].u),
-            _first(curve.values, touch),
+            _first(curve.values, [depth > 0.0 for depth in depths]),
+            max(depths),
             _first(curve.values, [wrinkles(curve.ring, point.u) > WRINKLED for point in points]),
         )
 

@@ -84,6 +84,7 @@ def checks_table(result: CurvesResult) -> pd.DataFrame:
                 "work_error": checked.curve.work_error(),
                 "folds_touch_from": unit.factor * checked.touches_at[0],
                 "folds_touch_to": unit.factor * checked.touches_at[1],
+                "largest_overlap_in_thicknesses": checked.depth,
                 "wrinkles_from": unit.factor * checked.wrinkles_at[0],
                 "wrinkles_to": unit.factor * checked.wrinkles_at[1],
                 "stopped": checked.curve.stopped,

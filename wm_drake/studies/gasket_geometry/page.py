@@ -17,7 +17,7 @@ METHOD = (
     "degree two (degree one if there are few drawings). The error is that on fresh drawings, by "
     "the range of the response in the design. The drawing with the largest gap on the surface is "
     "computed and run too; the best drawing is that with the largest gap of all that were run. "
-    "There is no contact between folds."
+    "Folds that touch hold each other off, unless the drawing has contact: false."
 )
 
 
