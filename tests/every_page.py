@@ -76,7 +76,10 @@ KINDS = {
         "--targets", "measured.csv", "--starts", "1", "--iterations", "3",
         "--leave-out", "back", "--fewer", "1",
     ),
-    "gasket": _one("sections.html", "study", "gasket", "--trials", "150", "--check", "C_L=120 %"),
+    "gasket": _one(
+        "sections.html", "study", "gasket", "--trials", "150", "--check", "C_L=120 %",
+        "--load", "middle", "--load", "counter", "--response", "D", "--response", "F",
+    ),
     "gasket_of_one_load": _one(
         "sections.html", "study", "gasket", "--design", "orthogonal", "--trials", "243",
         "--model", "main", "--load", "back", "--response", "mount_force_peak", "--response", "amplitude",

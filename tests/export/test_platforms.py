@@ -31,22 +31,18 @@ NEEDED = {
 """Libraries that a library may need: C library and mathematics, and the loader."""
 
 
-@pytest.fixture(scope="module")
-def libraries(tmp_path_factory):
-    """Contents of the library of each platform, by platform."""
-    path = tmp_path_factory.mktemp("fmu") / "machine.fmu"
+def test_library_of_each_platform(tmp_path):
+    """Write all in one test: the compiler takes a minute for them."""
+    path = tmp_path / "machine.fmu"
     options = FmuOptions(platform=",".join(PLATFORMS))
     wm.export_fmu(wm.load_machine("reference"), "middle", path, options)
     with zipfile.ZipFile(path) as archive:
-        return {
-            name: archive.read(f"binaries/{platform.fmi3}/wm_drake_machine{platform.suffix}")
-            for name, platform in PLATFORMS.items()
-        }
+        for name, platform in PLATFORMS.items():
+            check(name, archive.read(f"binaries/{platform.fmi3}/wm_drake_machine{platform.suffix}"))
 
 
-@pytest.mark.parametrize("name", PLATFORMS)
-def test_library_of_each_platform(libraries, name):
-    content = libraries[name]
+def check(name, content):
+    """Check format, symbols and needed libraries of the library of a platform."""
     assert content.startswith(FORMAT[name])
     if name in MACHINE:
         assert int.from_bytes(content[18:20], "little") == MACHINE[name]

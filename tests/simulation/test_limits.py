@@ -51,8 +51,10 @@ def test_free_decay_has_the_closed_form_frequency_and_log_decrement(machine):
         assert log_decrement == pytest.approx(2 * np.pi * zeta / np.sqrt(1 - zeta**2), rel=1e-6)
 
 
-@pytest.mark.parametrize("engine", ["compiled", "drake"])
-@pytest.mark.parametrize("ratio", [0.5, 0.9, 1.0, 1.1, 2.0])
+@pytest.mark.parametrize(
+    ("ratio", "engine"),
+    [*((ratio, "compiled") for ratio in (0.5, 0.9, 1.0, 1.1, 2.0)), (1.0, "drake")],
+)
 def test_unbalance_response_equals_the_closed_form(machine, ratio, engine):
     speed = ratio * natural_frequency()
     case = Case("one", unbalance(UNBALANCE, RADIUS), constant_speed(speed, 26.0))

@@ -133,8 +133,9 @@ def test_peaks_of_the_run_up_hold_at_a_tenth_of_the_step(machine, reference, loa
     )
 
 
-def test_error_controlled_integration_agrees(machine, reference, run_up):
-    case, record = fast(reference, "middle"), run_up
+def test_error_controlled_integration_agrees(machine, reference):
+    case = fast(reference, "middle")
+    record = simulate(machine, case)
     setup = machine.set_up(case.load)
     simulator = Simulator(machine.diagram, setup.context)
     integrator = simulator.get_mutable_integrator()  # Drake's default: RK3 with error control
@@ -174,16 +175,15 @@ def redrawn(parameters: MachineParameters, move) -> MachineParameters:
     return MachineParameters.model_validate(tree)
 
 
-def test_mirrored_machine_moves_as_the_mirror_image(machine, reference, engine):
+def test_mirrored_machine_moves_as_the_mirror_image(machine, reference):
     profile = SpinProfile(time=(0.0, 4.0), speed=(0.0, 24.0))
     backwards = SpinProfile(time=(0.0, 4.0), speed=(0.0, -24.0))
     load = Load(unbalances=(Unbalance(mass=0.7, radius=0.25, y=-0.1, phase=0.4),))
     image = Load(unbalances=(Unbalance(mass=0.7, radius=0.25, y=-0.1, phase=-0.4),))
-    record = simulate(machine, Case("one", load, profile), engine)
+    record = simulate(machine, Case("one", load, profile))
     reflected = simulate(
         build_machine(redrawn(reference, lambda p: p * np.array([-1.0, 1.0, 1.0]))),
         Case("one", image, backwards),
-        engine,
     )
     np.testing.assert_allclose(
         reflected.tub_position, record.tub_position * np.array([-1, 1, 1]), atol=1e-9
@@ -212,7 +212,7 @@ def test_phase_shift_of_the_load_is_a_shift_of_the_start_angle(machine):
     assert float(np.abs(turned.displacement).max()) > 1e-4
 
 
-def test_moving_the_world_moves_the_machine_with_it(machine, upright, engine):
+def test_moving_the_world_moves_the_machine_with_it(machine, upright):
     """Shift a machine along y: it has the same displacements.
 
     Every frame and centre of mass of tub and housing and the load are shifted by the same amount.
@@ -222,8 +222,8 @@ def test_moving_the_world_moves_the_machine_with_it(machine, upright, engine):
     profile = SpinProfile(time=(0.0, 3.0), speed=(0.0, 18.0))
     base = Load(unbalances=(Unbalance(mass=0.7, radius=0.25, y=-0.1),))
     shifted = Load(unbalances=(Unbalance(mass=0.7, radius=0.25, y=-0.1 + shift[1]),))
-    there = simulate(build_machine(moved), Case("one", shifted, profile), engine)
-    here = simulate(machine, Case("one", base, profile, parameters=upright), engine)
+    there = simulate(build_machine(moved), Case("one", shifted, profile))
+    here = simulate(machine, Case("one", base, profile, parameters=upright))
     # m; rounding grows at friction's corners, a hundred times more near the resonance
     np.testing.assert_allclose(there.displacement, here.displacement, atol=1e-8)
     np.testing.assert_allclose(there.bushing_force, here.bushing_force, atol=1e-4)  # N

@@ -29,7 +29,7 @@ SLOWLY = [
     pytest.param(name, marks=[pytest.mark.slow] if name in {*REQUIRED, *SHORTER} else [])
     for name in STUDIES
 ]
-SHORTER["tolerance"] = KINDS["tolerance"].commands
+SHORTER["tolerance"] = [(*KINDS["tolerance"].commands[0], "--samples", "32", "--subset", "0")]
 
 
 @pytest.fixture

@@ -163,10 +163,15 @@ COMPONENTS = {
 }
 LONG = {(name, method) for name in COMPONENTS for method in METHODS if "damper" in name}
 LONG -= {("mstv damper", "least-squares")}
+LONGEST = {("free-stroke damper", "evolution")}
+"""Most of a minute; the damper is found by the other searches, other components by this one."""
 
 
 def marked(pairs):
-    return [pytest.param(*pair, marks=pytest.mark.slow if pair in LONG else ()) for pair in pairs]
+    return [
+        pytest.param(*pair, marks=pytest.mark.hours if pair in LONGEST else pytest.mark.slow if pair in LONG else ())
+        for pair in pairs
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -192,18 +197,14 @@ def held(name, search):
 
 
 def mark_of(name, method):
-    """Return the mark by the time of 100 fits: a second, half a minute, minutes to most of an hour.
+    """Return the mark by the time of 100 fits: a second, ten seconds, half a minute to most of an hour.
 
     Other searches come to the minimum of least squares, see the tests above and below, and their
     intervals are computed by the same function.
     """
     if (name, method) == ("gasket, radial", "least-squares"):
         return ()
-    return (
-        pytest.mark.hours
-        if method != "least-squares" or (name, method) in LONG
-        else pytest.mark.slow
-    )
+    return pytest.mark.hours if method != "least-squares" or "damper" in name else pytest.mark.slow
 
 
 @pytest.mark.parametrize(
