@@ -35,6 +35,7 @@ from wm_drake.rigs import (
     measures_of,
 )
 from wm_drake.rigs.loops import steady_deformations
+from wm_drake.rigs.run import stroke_points
 from wm_drake.systems.element_system import ElementSystem
 
 MSTV = damper_of("mstv", friction_damping=0.0)  # fit of [C]; f_max assumed
@@ -377,3 +378,21 @@ def test_mstv_higher_frequency_lower_friction(amplitude):
         works.append(np.mean(friction * slider) / frequency)
     assert frictions == sorted(frictions, reverse=True)
     assert works == sorted(works, reverse=True)
+
+
+def test_points_of_a_free_stroke_are_where_the_paper_has_them():
+    """Check [A] section 2.1, Fig. 5: free stroke from A to B, largest force at C, turn at D."""
+    damper = load_machine("free_stroke").damper_types["free_stroke"]
+    bench = damper_bench(damper)
+    loop = force_loop(bench, Harmonic(1.0, 10e-3))
+    a, b, c, d = (stroke_points(bench, loop)[letter] for letter in "ABCD")
+    x, force = loop.displacement, loop.force
+    assert x[a] < x[b] < x[c] < x[d] == x.max()
+    # the sponge leaves its free stroke of 6 mm as far as it slid against the tube
+    assert x[b] - x[a] == pytest.approx(6e-3, rel=0.2)
+    assert max(abs(force[[a, b]])) <= damper.basic_friction_force + 0.05 * force.max()
+    assert force[c] == force.max()
+    inside = force_loop(bench, Harmonic(1.0, 1e-3))  # a motion that stays in the free stroke
+    assert stroke_points(bench, inside) == {}
+    other = damper_bench(load_machine("reference").damper_types["friction"])
+    assert stroke_points(other, force_loop(other, Harmonic(1.0, 5e-3))) == {}

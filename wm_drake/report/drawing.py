@@ -202,6 +202,8 @@ def _second_axes(axes: Axes, place: Place) -> Axes:
     for spine in second.spines.values():
         spine.set_visible(False)
     _style_axis(second, "y", place.panel.second, (), y_count(place.bottom - place.top))
+    second.yaxis.tick_right()
+    second.grid(visible=False)
     second.spines["right"].set_visible(True)
     return second
 

@@ -8,8 +8,9 @@ import numpy as np
 
 from wm_drake.elements.bushing import BUSHING_LAW
 from wm_drake.elements.damper_law import law_numbers, law_of
+from wm_drake.laws.friction import havsin_friction
 from wm_drake.laws.table import table_range
-from wm_drake.parameters.damper_laws import DamperLaw
+from wm_drake.parameters.damper_laws import DamperLaw, FreeStrokeDamper
 from wm_drake.parameters.types import FloatArray
 from wm_drake.rigs.bench import Bench, BushingBench, DamperBench, Harmonic
 from wm_drake.rigs.loops import ForceLoop, LoopMeasures, force_loops, measures_of
@@ -125,3 +126,36 @@ def slider_friction_curves(
         return None
     constants = [getattr(numbers, name) for name in DamperLaw.arguments(friction)[2:]]
     return np.array([[friction(w, u, *constants) for w in rates] for u in deformation_rates])
+
+
+UNDEFORMED = 0.02
+"""Part of the largest force of a sponge below which it counts as undeformed."""
+
+
+def stroke_points(bench: Bench, loop: ForceLoop) -> dict[str, int]:
+    """Return the points A to D of the loop of a free-stroke damper, as [A] Fig. 5.
+
+    While the damper lengthens, the free stroke goes from A to B; the sponge is deformed up to C,
+    where the force is largest, and the motion turns at D. The basic friction is taken off the force
+    to find where the sponge has none.
+
+    Returns:
+        Samples of the loop by letter; empty for another law, or where the stroke ends before B.
+    """
+    if not isinstance(bench, DamperBench):
+        return {}
+    if law_of(bench.packed).parameters is not FreeStrokeDamper:
+        return {}
+    numbers = law_numbers(bench.packed)
+    basic = [
+        havsin_friction(v, numbers.basic_full_friction_velocity, numbers.basic_friction_force)
+        for v in loop.velocity
+    ]
+    bottom, turn = int(np.argmin(loop.displacement)), int(np.argmax(loop.displacement))
+    way = np.arange(bottom, turn if turn > bottom else turn + len(loop.force)) % len(loop.force)
+    sponge = (loop.force + np.array(basic))[way]  # the friction acts against the motion
+    free = np.flatnonzero(np.abs(sponge) <= UNDEFORMED * np.abs(sponge).max())
+    if not len(free) or free[-1] == len(way) - 1:
+        return {}
+    largest = int(np.argmax(loop.force[way]))
+    return {"A": int(way[free[0]]), "B": int(way[free[-1]]), "C": int(way[largest]), "D": turn}

@@ -1,12 +1,14 @@
 """Figures of force loops over displacement, velocity and time, single or overlaid."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report.figure import (
+    MARK,
     MEASURED,
     OURS,
     QUIET,
@@ -15,7 +17,9 @@ from wm_drake.report.figure import (
     Line,
     Mark,
     Panel,
+    Points,
     Rule,
+    Text,
     in_grid,
     shade,
 )
@@ -78,17 +82,28 @@ def overlaid_figure(
     return Figure(panels=placed, height=190.0, widths=(1.0,) * columns, keys=tuple(lines))
 
 
-def time_figure(loop: ForceLoop) -> Figure:
-    """Draw motion and force over one period and the loop, as [A] Figs. 5, 8, 12, [C] Figs. 4, 5."""
+def time_figure(loop: ForceLoop, points: Mapping[str, int]) -> Figure:
+    """Draw motion and force over one period and the loop, as [A] Figs. 5, 8, 12, [C] Figs. 4, 5.
+
+    Args:
+        loop: The loop.
+        points: Samples that get a letter on the force, from `stroke_points`.
+    """
     units = units_of(loop.rotates)
     factor, force = units.factor, units.force_label
     time = np.append(loop.time, 1.0 / loop.motion.frequency)
+    at = list(points.values())
     motion = Line(time, factor * _closed(loop.displacement), color=QUIET, dash="dashed")
     of_time = Line(time, _closed(loop.force), width=2.2, is_second=True)
     reach, largest = (1.13 * float(np.abs(one.y).max()) or 1.0 for one in (motion, of_time))
     panels = [
         Panel(
-            marks=(Rule(0.0, color=QUIET), motion, of_time),
+            marks=(
+                Rule(0.0, color=QUIET),
+                motion,
+                of_time,
+                *_letters(points, loop.time[at], loop.force[at], is_second=True),
+            ),
             x=Axis(label="time, s"),
             y=Axis(
                 label=f"{units.label('displacement')} (dashed)", color=QUIET, range=(-reach, reach)
@@ -98,8 +113,24 @@ def time_figure(loop: ForceLoop) -> Figure:
     ]
     for x, over in ((loop.displacement, "displacement"), (loop.velocity, "velocity")):
         curve = Line(factor * _closed(x), _closed(loop.force), width=2.2)
-        panels.append(loop_panel("", [curve], units.label(over), force))
+        letters = _letters(points, factor * x[at], loop.force[at])
+        panels.append(loop_panel("", [curve, *letters], units.label(over), force))
     return Figure(panels=in_grid(panels, 3), height=220.0)
+
+
+def _letters(
+    points: Mapping[str, int], x: FloatArray, y: FloatArray, *, is_second: bool = False
+) -> list[Mark]:
+    """Return a dot and a letter at each point."""
+    if not points:
+        return []
+    marks: list[Mark] = [Points(x, y, color=MARK, size=6.0, is_second=is_second)]
+    for letter, a, b in zip(points, x.tolist(), y.tolist(), strict=True):
+        above = Text(a, b, letter, is_bold=True, across="right", up="bottom", shift=(-5.0, 3.0))
+        below = replace(above, across="left", up="top", shift=(5.0, -3.0))
+        if not is_second:  # D lies close to C
+            marks.append(below if letter == "D" else above)
+    return marks
 
 
 def friction_law_figure(run: RigRun) -> Figure | None:

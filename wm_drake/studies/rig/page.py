@@ -11,6 +11,7 @@ from wm_drake.report.page import Picture, picture
 from wm_drake.report.sections import Section, SectionedPage
 from wm_drake.report.table import Column, Table, line, table_of
 from wm_drake.rigs import ForceLoop, RigRun
+from wm_drake.rigs.run import stroke_points
 from wm_drake.studies.rig.figures import (
     amplitude_text,
     frequency_text,
@@ -170,12 +171,14 @@ def _numbers(run: RigRun) -> Table:
 def _pictures(run: RigRun) -> list[Picture]:
     largest = max(run.loops, key=lambda loop: (loop.motion.amplitude, -loop.motion.frequency))
     which = f"{frequency_text(largest)}, {amplitude_text(largest)}"
+    points = stroke_points(run.bench, largest)
+    letters = " A to B: free stroke; C: largest force; D: the motion turns." if points else ""
     pictures = [
         picture(
-            time_figure(largest),
+            time_figure(largest, points),
             f"Motion and force over one period, and the loop, at {which}.",
             f"One period at {which}: motion and force over time, and the force over displacement "
-            "and over velocity (form of [A] Figs. 5, 8, 12 and [C] Figs. 4, 5).",
+            f"and over velocity (form of [A] Figs. 5, 8, 12 and [C] Figs. 4, 5).{letters}",
         )
     ]
     frequencies = _distinct(run.loops, frequency_text)
