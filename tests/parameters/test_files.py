@@ -326,3 +326,15 @@ def test_numbers_are_replaced_and_the_rest_of_the_file_stays(write, reference):
     comments = {line for line in before if line.startswith("#")}
     assert comments
     assert comments <= after
+
+
+def test_a_replaced_vector_keeps_its_own_source(write):
+    machine, path = load_machine("adams_2026"), machine_path("adams_2026")
+    key = "bodies.drum.centre_of_mass"
+    changed = with_value(machine, key, (0.0, 0.05, 0.0))
+    changed = changed.model_copy(update={"sources": {**changed.sources, key: "fit: new"}})
+    text = machine_file_with(path, changed, [key])
+    again = load_machine(write(text))
+    assert again.bodies["drum"].centre_of_mass == (0.0, 0.05, 0.0)
+    assert again.sources[key] == "fit: new"
+    assert again.sources["bodies.drum.mass"] == machine.sources["bodies.drum.mass"]

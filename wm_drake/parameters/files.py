@@ -265,10 +265,11 @@ def machine_file_with(path: Path, parameters: MachineParameters, keys: Iterable[
         node: Any = tree
         for part in parents:
             node = node[int(part)] if isinstance(node, list) else node[part]
-        if isinstance(value, tuple):  # the columns of a table share one source
+        has_source = isinstance(node[name], CommentedMap)
+        if isinstance(value, tuple) and not has_source:  # the columns of a table share one source
             node[name], node["source"] = unit.text(value), source_of(parameters, key)
             continue
-        if not isinstance(node[name], CommentedMap):
+        if not has_source:
             node[name] = CommentedMap()
             node[name].fa.set_flow_style()
         node[name]["value"], node[name]["source"] = unit.text(value), source_of(parameters, key)

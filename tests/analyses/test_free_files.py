@@ -1,0 +1,31 @@
+"""Start values of the free files are the shipped machines."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wm_drake.model.build import build_machine
+from wm_drake.parameters import load_machine
+from wm_drake.parameters.free import load_free
+from wm_drake.parameters.keys import quantities
+from wm_drake.studies.calibration.parameter_map import parameter_map_of
+
+ANALYSES = Path(__file__).parents[2] / "analyses"
+
+
+@pytest.mark.parametrize("name", ["reference", "adams_2026"])
+def test_the_start_of_a_free_file_is_the_shipped_machine(name):
+    machine = build_machine(load_machine(name))
+    parameter_map = parameter_map_of(machine, load_free(ANALYSES / f"{name}_free.yaml"))
+    shipped = {key: value for key, value, _ in quantities(parameter_map.base)}
+    started = {
+        key: value for key, value, _ in quantities(parameter_map.parameters_at(parameter_map.start))
+    }
+    # the file rounds each quantity to a thousandth of its prior deviation
+    rounding = 1e-3 * np.abs(parameter_map.deviation)
+    allowed = dict.fromkeys((value.key for value in parameter_map.values), 1e-9)
+    for value in parameter_map.values:
+        allowed[value.key] += np.max(rounding @ np.abs(value.factors))
+    for key, tolerance in allowed.items():
+        assert started[key] == pytest.approx(shipped[key], abs=tolerance), key
