@@ -448,7 +448,7 @@ def commands(file: str) -> dict[str, list[str]]:
 
 MEASURED = sorted(MACHINES_FOLDER.glob("*.csv"))
 YAML_DOORS = (*SHIPPED, *TEXTS)
-DOORS = (*YAML_DOORS, *CSV, "netcdf", "sdf", "mesh", "set", "options", "links", "http")
+DOORS = (*YAML_DOORS, *CSV, *("netcdf", "sdf", "mesh", "set", "options", "links", "http", "dxf"))
 """Every door; a case takes them in turn."""
 
 
@@ -811,7 +811,27 @@ def _request_case(random_: random.Random, _folder: Path) -> FuzzCase:
     return FuzzCase("http", ["http", "POST", f"api/{name}", text], [""])
 
 
+def _dxf_case(random_: random.Random, folder: Path) -> FuzzCase:
+    """Return a case of the middle line of a gasket: broken text, odd values of odd groups."""
+    entities = ["0\nLINE\n8\nwall\n10\n160\n20\n0\n11\n160\n21\n20\n"]
+    entities.append("0\nARC\n8\nwall\n10\n170\n20\n20\n40\n10\n50\n0\n51\n180\n")
+    entities.append("0\nLWPOLYLINE\n70\n0\n10\n180\n20\n20\n42\n0.41421356\n10\n190\n20\n10\n")
+    random_.shuffle(entities)
+    text = f"0\nSECTION\n2\nENTITIES\n{''.join(entities)}0\nENDSEC\n0\nEOF\n"
+    content = broken_text(random_, text)
+    if random_.random() < 0.5:
+        lines = text.splitlines()
+        lines[random_.randrange(len(lines))] = random_.choice([*WORDS, *NUMBERS])
+        content = "\n".join(lines).encode(errors="replace")
+    (folder / "wall.dxf").write_bytes(content)
+    drawing = "dxf: {file: wall.dxf, unit: mm, thickness: 2 mm}\nrubber: {shore_a: 40}\n"
+    (folder / "input.yaml").write_text(drawing, encoding="utf-8")
+    command = ["gasket", "curves", "input.yaml", "--quick"]
+    return FuzzCase("dxf", command, ["wall.dxf", "input.yaml"])
+
+
 OWN_CASES = {
+    "dxf": _dxf_case,
     "http": _request_case,
     "set": _set_case,
     "options": _options_case,

@@ -3,16 +3,20 @@
 import itertools
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationError, model_validator
 
+from wm_drake.errors import InputError
 from wm_drake.parameters import units as u
+from wm_drake.parameters.dxf import DxfLine, corners_of
 from wm_drake.parameters.elements import Frozen
-from wm_drake.parameters.files import read_model
+from wm_drake.parameters.files import read_model, read_yaml
+from wm_drake.parameters.problems import problems_of
 from wm_drake.parameters.text_files import DATA, ShippedFiles
 from wm_drake.parameters.types import FloatArray
 
@@ -92,6 +96,39 @@ class TensionTest(Frozen):
         return float(np.sqrt(np.mean(error**2)) / np.max(np.abs(self.stress)))
 
 
+class PronySeries(Frozen):
+    """Relaxation of the rubber: its stiffness after a step, by that at once.
+
+        k(t) / k(0) = 1 - sum of share_i (1 - exp(-t / time_i))
+
+    The hardness, the constants and the tension test are those of the relaxed rubber.
+
+    Attributes:
+        time: Relaxation times.
+        share: Part of the stiffness at once that relaxes with each; together below 1.
+    """
+
+    time: Annotated[tuple[Annotated[float, Field(gt=0.0)], ...], u.Unit("s", "s")]
+    share: tuple[Annotated[float, u.PureNumber(), Field(gt=0.0, lt=1.0)], ...]
+
+    @model_validator(mode="after")
+    def _is_a_series(self) -> "PronySeries":
+        if not self.time or len(self.time) != len(self.share):
+            raise ValueError(
+                f"needs as many shares as times, at least one; has {len(self.time)} times and "
+                f"{len(self.share)} shares"
+            )
+        if sum(self.share) >= 1.0:
+            raise ValueError(f"the shares add up to {sum(self.share):.3g}; allowed is below 1")
+        return self
+
+    def modulus(self, frequency: float) -> complex:
+        """Return storage + i loss modulus at a frequency [Hz], by that of the relaxed rubber."""
+        turn = 2j * math.pi * frequency * np.array(self.time)
+        moving = np.array(self.share) / (1.0 - sum(self.share))
+        return complex(1.0 + np.sum(moving * turn / (1.0 + turn)))
+
+
 class Rubber(Frozen):
     """Rubber: a hardness, constants of Yeoh, or a tension test.
 
@@ -102,6 +139,7 @@ class Rubber(Frozen):
         test: Tension test, in place of a hardness or constants.
         bulk_modulus: Bulk modulus; 500 times the shear modulus if not given.
         loss_factor: Ratio of loss to storage modulus at the frequency of the resonances.
+        prony: Relaxation, in place of a loss factor.
     """
 
     shore_a: Annotated[float, u.PureNumber(), Field(ge=20.0, le=80.0)] | None = None
@@ -111,6 +149,7 @@ class Rubber(Frozen):
     test: TensionTest | None = None
     bulk_modulus: Annotated[_Pressure, Field(gt=0.0)] | None = None
     loss_factor: Annotated[float, u.PureNumber(), Field(ge=0.0, le=2.0)] = 0.0
+    prony: PronySeries | None = None
 
     @model_validator(mode="after")
     def _is_one_rubber(self) -> "Rubber":
@@ -118,6 +157,8 @@ class Rubber(Frozen):
             raise ValueError("needs either shore_a or c1 or test")
         if self.c1 is None and (self.c2 or self.c3):
             raise ValueError("c2 and c3 belong to c1, not to shore_a or test")
+        if self.prony is not None and self.loss_factor:
+            raise ValueError("needs either loss_factor or prony")
         return self
 
     @model_validator(mode="after")
@@ -145,6 +186,12 @@ class Rubber(Frozen):
         young = 1e6 * 0.0981 * (56.0 + 7.62336 * s) / (0.137505 * (254.0 - 2.54 * s))
         return young / 6.0, 0.0, 0.0
 
+    def modulus(self, frequency: float) -> complex:
+        """Return storage + i loss modulus at a frequency [Hz], by the modulus of the curves."""
+        if self.prony is not None:
+            return self.prony.modulus(frequency)
+        return 1.0 + 1j * self.loss_factor
+
     @property
     def bulk(self) -> float:
         """Bulk modulus. [Pa]"""
@@ -167,7 +214,19 @@ class MeridianPoint(Frozen):
     fillet: Annotated[u.Length, Field(ge=0.0)] = 0.0
 
 
-class GasketDrawing(Frozen):
+class _Described(Frozen):
+    about: str = ""
+    rubber: Rubber
+    contact: bool = True
+
+
+class _DxfDrawing(_Described):
+    """File of a gasket whose middle line is in a DXF file."""
+
+    dxf: DxfLine
+
+
+class GasketDrawing(_Described):
     """A gasket: a wall turned about the axis, from the rim at the housing to the rim at the tub.
 
     Attributes:
@@ -178,10 +237,7 @@ class GasketDrawing(Frozen):
         contact: Whether folds hold each other off; without it they may overlap.
     """
 
-    about: str = ""
     meridian: tuple[MeridianPoint, ...] = Field(max_length=60)
-    rubber: Rubber
-    contact: bool = True
 
     @model_validator(mode="after")
     def _can_be_built(self) -> "GasketDrawing":
@@ -300,4 +356,19 @@ def load_gasket_drawing(name_or_path: str | Path) -> GasketDrawing:
     Raises:
         InputError: the file is missing or wrong, with one problem for each error.
     """
-    return read_model(GasketDrawing, _FILES.path(name_or_path))
+    path = _FILES.path(name_or_path)
+    if "dxf" not in read_yaml(path):
+        return read_model(GasketDrawing, path)
+    read = read_model(_DxfDrawing, path)
+    meridian = [
+        {"radius": radius, "y": y, "thickness": read.dxf.thickness, "fillet": fillet}
+        for radius, y, fillet in corners_of(read.dxf, path.parent)
+    ]
+    try:
+        described = read.model_dump(exclude={"dxf"})
+        return GasketDrawing.model_validate({**described, "meridian": meridian})
+    except ValidationError as error:
+        raise InputError(
+            replace(problem, where=str(path.parent / read.dxf.file))
+            for problem in problems_of(error, GasketDrawing)
+        ) from None

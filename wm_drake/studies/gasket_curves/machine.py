@@ -33,11 +33,12 @@ def stiffness_of(curves: Mapping[str, Curve]) -> GasketStiffness:
 def damping_per_stiffness(drawing: GasketDrawing, frequency: float) -> float:
     """Return the damping of an axis by its stiffness.
 
-        c / k = tan(delta) / (2 pi f)
+        c / k = E'' / E / (2 pi f)
 
-    A dashpot with this coefficient dissipates what the rubber does at the frequency f. [s]
+    A dashpot with this coefficient dissipates what the rubber does at the frequency f. E is the
+    modulus of the curves, E'' the loss modulus. [s]
     """
-    return drawing.rubber.loss_factor / (2.0 * math.pi * frequency)
+    return drawing.rubber.modulus(frequency).imag / (2.0 * math.pi * frequency)
 
 
 def coupling(curves: Mapping[str, Curve]) -> float:

@@ -24,8 +24,8 @@ METHOD = (
     "ring. The force is that on the moved rim in its direction of motion; moments are about its "
     "moved centre. Folds that touch hold each other off without friction, unless the drawing has "
     "contact: false. There is no pressure of water, no set of the rubber, and no beads or ribs "
-    "that the drawing does not have. Damping: loss factor times stiffness by 2 π f at the "
-    "frequency below."
+    "that the drawing does not have. Damping: loss modulus by modulus, times stiffness by "
+    "2 π f, at the frequency below."
 )
 
 
@@ -120,10 +120,13 @@ def summary(result: CurvesResult) -> str:
 def _rubber_text(result: CurvesResult) -> str:
     rubber = result.drawing.rubber
     c1, c2, c3 = (significant(MPA_PER_PA * value, 3) for value in rubber.constants)
+    modulus = rubber.modulus(result.frequency)
     hardness = "" if rubber.shore_a is None else f"{rubber.shore_a:g} Shore A, "
     return (
         f"{hardness}constants of Yeoh {c1}, {c2}, {c3} MPa, bulk modulus "
-        f"{significant(MPA_PER_PA * rubber.bulk, 3)} MPa, loss factor {rubber.loss_factor:g}"
+        f"{significant(MPA_PER_PA * rubber.bulk, 3)} MPa. At the frequency of the damping its "
+        f"storage and loss modulus are {significant(modulus.real, 3)} and "
+        f"{significant(modulus.imag, 3)} of the modulus of the curves"
     )
 
 

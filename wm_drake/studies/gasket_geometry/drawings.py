@@ -83,12 +83,8 @@ def changed(
         for (radius, y), point in zip(places, drawing.meridian, strict=True)
     )
     try:
-        rubber = Rubber(
-            shore_a=values[3],
-            bulk_modulus=drawing.rubber.bulk_modulus,
-            loss_factor=drawing.rubber.loss_factor,
-        )
-        return GasketDrawing(about=drawing.about, meridian=points, rubber=rubber)
+        rubber = Rubber.model_validate({**dict(drawing.rubber), "shore_a": values[3]})
+        return GasketDrawing.model_validate({**dict(drawing), "meridian": points, "rubber": rubber})
     except ValidationError as error:
         texts = ", ".join(
             f"{factor.name} {value:.3g} {factor.unit}"

@@ -146,10 +146,16 @@ def drawing_tree(drawing: GasketDrawing) -> dict[str, Any]:
         }
         for point in drawing.meridian
     ]
-    rubber = {"shore_a": str(drawing.rubber.shore_a), "loss_factor": drawing.rubber.loss_factor}
+    rubber: dict[str, Any] = {"shore_a": drawing.rubber.shore_a}
+    if drawing.rubber.prony is None:
+        rubber["loss_factor"] = drawing.rubber.loss_factor
+    else:
+        times = ", ".join(map(repr, drawing.rubber.prony.time))
+        rubber["prony"] = {"time": f"({times}) s", "share": list(drawing.rubber.prony.share)}
     if drawing.rubber.bulk_modulus is not None:
         rubber["bulk_modulus"] = Unit("Pa", "MPa").text(drawing.rubber.bulk_modulus)
-    return {"about": drawing.about, "meridian": points, "rubber": rubber}
+    tree = {"about": drawing.about, "meridian": points, "rubber": rubber}
+    return tree if drawing.contact else tree | {"contact": False}
 
 
 class GeometryTask(Task):
