@@ -65,13 +65,18 @@ def ready(browser):
     browser.wait(GHOST, timeout=60.0)
 
 
+def unfolded(browser, key):
+    """Open the part of the machine and the group of a number."""
+    opened = (
+        "for (let e = document.querySelector(arguments[0]); e; e = e.parentElement) e.open = true"
+    )
+    browser.run(opened, ROW.format(key, ""))
+
+
 def typed(browser, key, text):
     from selenium.webdriver.common.keys import Keys
 
-    browser.run(
-        "document.querySelector(arguments[0]).closest('details').open = true",
-        ROW.format(key, ".text"),
-    )
+    unfolded(browser, key)
     field = browser.find(ROW.format(key, ".text"))
     browser.run("arguments[0].scrollIntoView({block: 'center'})", field)
     # as a user does: selenium's clear() would leave the field, which sets it as it was
@@ -121,10 +126,7 @@ def test_answer_leaves_a_text_alone_that_is_being_typed(page):
 
 def test_slider_moves_the_curve_and_ends_in_the_history(page):
     curve = page.run(CURVE)
-    page.run(
-        "document.querySelector(arguments[0]).closest('details').open = true",
-        ROW.format(UNBALANCE, ""),
-    )
+    unfolded(page, UNBALANCE)
     slider = page.find(ROW.format(UNBALANCE, "input[type=range]"))
     page.run("arguments[0].scrollIntoView({block: 'center'})", slider)
     page.mouse("mousePressed", slider, 0.5)
@@ -197,6 +199,31 @@ def test_contact_and_gap_stay_in_view_beside_the_sliders(page):
     before = page.run(verdict)
     typed(page, "gasket.stiffness_y", "0.5 N/mm")
     assert changed_from(page, verdict, before)
+
+
+def test_the_load_that_decides_stands_first_and_can_be_shown(page):
+    loads = "return [...document.querySelectorAll('#verdict button')].map((b) => b.textContent)"
+    page.wait(f"return (() => {{ {loads} }})().length === 4")
+    shown = page.run(loads)
+    gaps = [float(re.search(r" (-?\d+\.\d)", text)[1]) for text in shown]
+    assert gaps == sorted(gaps)
+    first = page.run("return document.querySelector('#verdict strong').textContent")
+    name = shown[0].split()[0]
+    assert f"{gaps[0]} mm with load {name}" in first
+    curve = page.run(CURVE)
+    page.find("#verdict button").click()
+    assert changed_from(page, CURVE, curve)
+    assert page.run("return document.getElementById('load').value") == name
+
+
+def test_numbers_are_folded_by_parts_of_the_machine(page):
+    parts = "return [...document.querySelectorAll('#numbers > .part > summary')].map((s) => s.textContent)"
+    assert page.run(parts)[:3] == ["gasket", "springs", "dampers"]
+    assert len(page.run(parts)) < 13
+    page.find("#search").send_keys("damper left, end on the tub")
+    visible = "return [...document.querySelectorAll('#numbers .number')].filter((n) => n.checkVisibility()).map((n) => n.dataset.key)"
+    keys = page.run(visible)
+    assert keys == [f"frames.damper_left_tub.position.{axis}" for axis in range(3)]
 
 
 def test_the_studio_has_no_serious_fault_of_accessibility(page):

@@ -30,6 +30,14 @@ def test_changed_file_is_read_again(machines):
     assert renewed.machine is opened.machine  # same elements: nothing is built
 
 
+@pytest.mark.parametrize("name", ["reference", "free_stroke", "rodrigues_2010"])
+def test_each_number_has_a_part_of_the_machine_and_words(machines, name):
+    page = machines.open(name).for_page()
+    assert {number["part"] for number in page["numbers"]} <= set(page["parts"])
+    words = [number["group"] for number in page["numbers"]]
+    assert not [text for text in words if "_" in text or "frames" in text]
+
+
 def test_folders_and_other_files_are_not_listed(machines):
     (machines.folder / "folder.yaml").mkdir()
     (machines.folder / "notes.txt").write_text("")

@@ -68,7 +68,8 @@ def test_answer_is_that_of_a_single_run(answer, machine, moved):
     for label, value in zip("xyz", measures.gasket_force.values, strict=True):
         assert shown[f"gasket F{label}, N"] == value
     for mount, value in zip(record.mount.values, measures.mount_force_peak.values, strict=True):
-        assert shown[f"{mount}, N"] == value
+        words = str(mount).replace("s.", " ").replace("_", " ")
+        assert shown[f"{words}, N"] == value
     for sensor, value in zip(record.sensor.values, measures.amplitude.values, strict=True):
         assert shown[f"{sensor}, mm"] == pytest.approx(1e3 * value, rel=1e-15)
     band = envelopes(record)
@@ -82,6 +83,15 @@ def test_answer_is_that_of_a_single_run(answer, machine, moved):
         history = record.bushing_force.sel(bushing="gasket").values[:, axis]
         low, high = bands[f"gasket F{name}"]
         assert (min(low), max(high)) == pytest.approx((history.min(), history.max()), abs=1e-3)
+
+
+def test_gap_with_each_load_is_that_of_its_run(client, answer):
+    body = {"page": "test", "state": state({STIFFNESS: "4 N/mm"})}
+    found = {of["load"]: of for of in client.post("api/loads", json=body).json()["loads"]}
+    assert found["middle"]["gap"] == pytest.approx(answer["gap"], abs=2e-3)
+    other = run(client, {STIFFNESS: "4 N/mm"}, load="back").json()
+    assert found["back"]["gap"]["distance"] == pytest.approx(other["gap"]["distance"], abs=2e-3)
+    assert list(found) == ["middle", "counter", "back", "front"]
 
 
 def test_arrow_is_the_difference_of_two_runs(client, answer):

@@ -18,7 +18,7 @@ class SdfNames:
 
     Attributes:
         frames: Frames and links to which elements attach, sorted.
-        movable_frames: Those whose position can be overridden.
+        movable_frames: Those whose position a machine file can override.
         links: Links that are not fixed to the world.
         welded: For each frame, its body and all that are welded to it.
     """
@@ -46,16 +46,26 @@ def _names_of(plant: MultibodyPlant) -> SdfNames:
     frames = {frame.name(): frame for frame in map(plant.get_frame, plant.GetFrameIndices(model))}
     frames.pop("__model__", None)
     fixed = [body.index() for body in plant.GetBodiesWeldedTo(plant.world_body())]
+    joints = [plant.get_joint(index).name() for index in plant.GetJointIndices()]
     links = map(plant.get_body, plant.GetBodyIndices(model))
     return SdfNames(
         tuple(sorted(frames)),
-        tuple(name for name in sorted(frames) if isinstance(frames[name], FixedOffsetFrame)),
+        tuple(
+            name
+            for name in sorted(frames)
+            if isinstance(frames[name], FixedOffsetFrame) and not _is_made(name, joints)
+        ),
         tuple(link.name() for link in links if link.index() not in fixed),
         {
             name: frozenset(body.name() for body in plant.GetBodiesWeldedTo(frame.body()))
             for name, frame in frames.items()
         },
     )
+
+
+def _is_made(frame: str, joints: list[str]) -> bool:
+    """Return whether Drake made a frame on its own account, for a joint that is no revolute."""
+    return frame.endswith(("_F", "_M")) and any(frame.startswith(f"{name}_") for name in joints)
 
 
 def tubes_of(plant: MultibodyPlant, joint: str) -> tuple[RigidBody, RigidBody]:

@@ -3,16 +3,15 @@
 import math
 from typing import Annotated
 
-from pydantic import Field, StringConstraints, model_validator
+from pydantic import Field, model_validator
 
 from wm_drake.parameters import units as u
 from wm_drake.parameters.elements import Frozen
 from wm_drake.parameters.inertia import InertiaMatrix
+from wm_drake.parameters.types import Name
 
 SMALLEST_SINE = 0.02
 """Smallest sine of the angle at a foot between its neighbours; below it, three feet are in line."""
-
-FootName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_-]{0,63}$")]
 
 
 class Foot(Frozen):
@@ -65,7 +64,7 @@ class Cabinet(Frozen):
     centre_of_mass: u.Position
     floor: u.Length
     friction: Annotated[u.Ratio, Field(gt=0.0)]
-    feet: dict[FootName, Foot]
+    feet: dict[Name, Foot]
     moves: bool = False
     inertia: InertiaMatrix | None = None
     foot_type: FootType | None = None

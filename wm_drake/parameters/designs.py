@@ -8,9 +8,10 @@ from pydantic import Field, model_validator
 from wm_drake.errors import input_error, nearest_names
 from wm_drake.parameters.elements import Frozen
 from wm_drake.parameters.files import read_model
-from wm_drake.parameters.machine import MachineParameters, Name
+from wm_drake.parameters.machine import MachineParameters
 from wm_drake.parameters.text_files import DATA, ShippedFiles
 from wm_drake.parameters.tolerances import OneSided, fraction
+from wm_drake.parameters.types import Name
 
 DESIGNS_FOLDER = DATA / "designs"
 _FILES = ShippedFiles("design file", DESIGNS_FOLDER)

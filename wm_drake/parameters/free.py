@@ -9,7 +9,7 @@ from wm_drake.errors import nearest_names
 from wm_drake.parameters import units as u
 from wm_drake.parameters.elements import Frozen
 from wm_drake.parameters.files import read_model
-from wm_drake.parameters.machine import Name
+from wm_drake.parameters.types import Name
 
 
 class Measured(Frozen):

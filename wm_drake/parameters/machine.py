@@ -3,7 +3,7 @@
 import math
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, StringConstraints, ValidationInfo, field_validator, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from wm_drake.errors import nearest_names
 from wm_drake.parameters import units as u
@@ -24,10 +24,7 @@ from wm_drake.parameters.elements import (
 from wm_drake.parameters.inertia import InertiaMatrix
 from wm_drake.parameters.sections import SECTIONS
 from wm_drake.parameters.spin import Load, SpinProfile, Unbalance
-
-Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_-]{0,63}$")]
-"""Name of an entry. It becomes part of key paths and of file names."""
-
+from wm_drake.parameters.types import Name
 
 OUTPUT_PERIOD = 5e-3
 """Default time between samples of a record, as in the measurements of [B]. [s]"""

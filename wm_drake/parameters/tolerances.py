@@ -11,8 +11,9 @@ from pydantic import Field, model_validator
 from wm_drake.errors import input_error, nearest_names
 from wm_drake.parameters.elements import Frozen
 from wm_drake.parameters.files import read_model
-from wm_drake.parameters.machine import MachineParameters, Name
+from wm_drake.parameters.machine import MachineParameters
 from wm_drake.parameters.text_files import DATA, ShippedFiles
+from wm_drake.parameters.types import Name
 from wm_drake.parameters.units import Share
 
 TOLERANCES_FOLDER = DATA / "tolerances"

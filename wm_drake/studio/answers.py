@@ -22,7 +22,8 @@ from wm_drake.parameters import MachineParameters, SpinProfile
 from wm_drake.parameters.plausibility import unusual_numbers
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
-from wm_drake.report.formatting import plain
+from wm_drake.report.formatting import plain, shape_name
+from wm_drake.simulation.band import band_warnings, pass_band
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.displacements import (
     amplitudes,
@@ -42,6 +43,7 @@ from wm_drake.studies.spin.figures import (
     orbit_window,
 )
 from wm_drake.studio.machines import OpenMachine, is_same
+from wm_drake.studio.parts import words_of
 from wm_drake.studio.state import State
 
 FIRST = ("amplitudes", "gap", "extremes", "mounts")
@@ -77,6 +79,11 @@ def runner_of(machine: OpenMachine) -> Runner:
     return Runner(machine.parameters, shown_measures(), histories={0}, are_alike=True)
 
 
+def gap_runner_of(machine: OpenMachine) -> Runner:
+    """Return the runner of the gaps with all loads of a machine."""
+    return Runner(machine.parameters, ("gap",), histories=False)
+
+
 def answer(
     machine: OpenMachine, runner: Runner, state: State, keys: Sequence[str] = ()
 ) -> dict[str, Any]:
@@ -96,7 +103,9 @@ def answer(
         turned = _turned(machine, case, keys[:LANES])
         batch_key, items = _batch(machine, [case, *(other for _, _, other in turned)])
         setup = items[0].numbers.setup
+        profile, period = batch_key.profile, batch_key.period
         warnings = [
+            *(Problem("", "profile.band", text) for text in band_warnings(profile, period)),
             *unusual_numbers(setup.parameters, state.values),
             *unusual_springs(setup),
             *_friction_that_jumps(setup.parameters),
@@ -111,11 +120,42 @@ def answer(
         "arrows": _arrows(machine, turned, results),
         "warnings": [{"key": p.key, "message": p.message} for p in warnings],
         "diverged": main.diverged,
+        "band": pass_band(profile, period),
         "stepping": {
             "integrator": batch_key.stepping.integrator,
             "step_ms": MS_PER_S * batch_key.stepping.step,
         },
     }
+
+
+def gaps_of_loads(machine: OpenMachine, runner: Runner, state: State) -> list[dict[str, Any]]:
+    """Return the smallest gap with each load of the machine, as a page has it now.
+
+    Args:
+        machine: The open machine.
+        runner: From `gap_runner_of`.
+        state: What the page has chosen; its load makes no difference.
+
+    Raises:
+        InputError: a number is wrong.
+    """
+    names = machine.parameters.loads
+    with machine.lock:
+        cases = [
+            machine.case(state.model_copy(update={"load": name, "masses": ()})) for name in names
+        ]
+        parameters = cases[0].parameters
+        assert parameters is not None  # a page's case has parameters of its own
+        batches = list(machine.preparation(parameters).batches(cases))
+    runs = sorted((run for batch in batches for run in runner.run(*batch)), key=lambda r: r.number)
+    return [
+        {
+            "load": name,
+            "gap": None if run.gap is None else _gap(run.gap, run.case.profile),
+            "diverged": run.diverged,
+        }
+        for name, run in zip(names, runs, strict=True)
+    ]
 
 
 def _friction_that_jumps(parameters: MachineParameters) -> list[Problem]:
@@ -225,7 +265,8 @@ def _rows(machine: OpenMachine, run: RunResult, variable: Variable) -> list[dict
     values = plain(np.ravel(run.values[variable.name] * variable.unit.from_si(1.0)))
     rows = []
     for labels, value in zip(itertools.product(*along), values, strict=True):
-        title, unit = variable.short_title_of(labels), variable.unit_text
+        words = [words_of(label.split(".")) if "." in label else label for label in labels]
+        title, unit = variable.short_title_of(words), variable.unit_text
         rows.append(
             {
                 "title": f"{title}, {unit}",
@@ -245,8 +286,8 @@ def _gap(gap: Gap, profile: SpinProfile) -> dict[str, Any]:
         "distance": gap.distance * MM_PER_M,
         "time": gap.time,
         "rpm": float(profile.speed_at(gap.time)) * RPM_PER_RAD_S,
-        "moving": gap.moving,
-        "fixed": gap.fixed,
+        "moving": shape_name(gap.moving),
+        "fixed": shape_name(gap.fixed),
     }
 
 

@@ -28,6 +28,7 @@ from wm_drake.simulation.cases import Case, case_of
 from wm_drake.simulation.mounts import mount_names
 from wm_drake.simulation.steps import checked_integrator, checked_step
 from wm_drake.studio.numbers import Slider, sliders_of
+from wm_drake.studio.parts import CALCULATION, PART_ORDER, places_of
 from wm_drake.studio.shared_values import SharedValues
 from wm_drake.studio.state import DESCRIBED, State
 
@@ -264,7 +265,8 @@ class OpenMachine:
         """Return all that a page needs to know of the machine before the first run."""
         parameters = self.parameters
         with self.lock:
-            numbers = [slider.for_page() for slider in self.sliders.values()]
+            places = places_of(parameters, self.machine.plant)
+            numbers = [slider.for_page(places) for slider in self.sliders.values()]
             shapes = {
                 body: [_shape(name, of) for name, of in outlines.items()]
                 for body, outlines in (
@@ -276,6 +278,7 @@ class OpenMachine:
             "name": parameters.name,
             "about": parameters.about,
             "numbers": numbers,
+            "parts": [*PART_ORDER, CALCULATION],
             "loads": list(parameters.loads),
             "gasket": parameters.gasket is not None,
             "sensors": {name: sensor.axis for name, sensor in parameters.sensors.items()},

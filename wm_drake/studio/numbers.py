@@ -1,7 +1,7 @@
 """All numbers of a machine that a page can move: key path, unit, value, ranges, group."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +11,7 @@ from wm_drake.parameters.keys import is_index
 from wm_drake.parameters.plausibility import UsualRange, usual_range
 from wm_drake.parameters.units import Unit
 from wm_drake.parameters.variation import Number
+from wm_drake.studio.parts import part_and_group
 
 NOT_MOVED = ("gravity",)
 """Numbers that a built machine cannot change."""
@@ -60,8 +61,13 @@ class Slider:
         """One hundredth of the slider, in SI units."""
         return (self.high - self.low) / 100.0 / self.unit.from_si(1.0)
 
-    def for_page(self) -> dict[str, Any]:
-        """Return the number as the page shows it; `short` is unique enough for a narrow column."""
+    def for_page(self, places: Mapping[str, tuple[str, str]]) -> dict[str, Any]:
+        """Return the number as the page shows it; `short` is unique enough for a narrow column.
+
+        Args:
+            places: From `studio.parts.places_of`.
+        """
+        part, group = part_and_group(self.key, places)
         *parents, name = self.key.split(".")
         if self.is_entry:
             vector = parents.pop()
@@ -72,9 +78,12 @@ class Slider:
             last = f"{parents[-2].rstrip('s')} {last.removeprefix('no. ')}"
         if parents and parents[0].endswith("_types"):  # the name of a type does not say its kind
             last = f"{parents[0].removesuffix('_types').replace('_', ' ')} {last}"
+        if parents[:1] == ["frames"]:  # a name of a frame is no word
+            last, label = f"{group}:", label.removeprefix("position ")
         return {
             "key": self.key,
-            "group": " · ".join(parents).replace("_", " ") or "machine",
+            "part": part,
+            "group": group,
             "label": label,
             "short": f"{last} {label}".strip(),
             "unit": self.unit.label,

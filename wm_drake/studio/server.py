@@ -23,7 +23,15 @@ from starlette.staticfiles import StaticFiles
 from wm_drake.batch.runs import Runner
 from wm_drake.errors import InputError, input_error
 from wm_drake.report.provenance import program
-from wm_drake.studio.answers import LANES, answer, arrows, influential_keys, runner_of
+from wm_drake.studio.answers import (
+    LANES,
+    answer,
+    arrows,
+    gap_runner_of,
+    gaps_of_loads,
+    influential_keys,
+    runner_of,
+)
 from wm_drake.studio.forms import forms
 from wm_drake.studio.guard import Guard
 from wm_drake.studio.jobs import Jobs
@@ -57,6 +65,13 @@ class RunRequest(_Body):
     keys: Annotated[list[Text], Field(max_length=LANES)] = []
 
 
+class LoadsRequest(_Body):
+    """A run of all loads of the machine that a page has chosen."""
+
+    page: Text
+    state: State
+
+
 class SaveRequest(_Body):
     """A machine to save."""
 
@@ -85,6 +100,7 @@ class Studio:
         self.cheap = ThreadPoolExecutor(2, thread_name_prefix="studio-cheap")
         self.turns = Turns(self._executor, self._workers)
         self._runners: WeakKeyDictionary[OpenMachine, Runner] = WeakKeyDictionary()
+        self._gap_runners: WeakKeyDictionary[OpenMachine, Runner] = WeakKeyDictionary()
         self._rankings: dict[str, asyncio.Task[list[dict[str, Any]]]] = {}
 
     def opened(self, identifier: str) -> tuple[OpenMachine, Runner]:
@@ -103,6 +119,14 @@ class Studio:
         answered = answer(machine, runner, state, keys) | {"measured": machine.measured(state)}
         passed = time.perf_counter() - begin[0], time.thread_time() - begin[1]
         return answered | {"server_s": {"wall": passed[0], "cpu": passed[1]}}
+
+    def gaps(self, state: State) -> list[dict[str, Any]]:
+        """Return the smallest gap with each load."""
+        machine, _ = self.opened(state.machine)
+        runner = self._gap_runners.get(machine)
+        if runner is None:
+            runner = self._gap_runners.setdefault(machine, gap_runner_of(machine))
+        return gaps_of_loads(machine, runner, state)
 
     async def ranking(self, state: State) -> list[dict[str, Any]]:
         """Return the arrows of all numbers that influence a run; pages share the work."""
@@ -148,6 +172,7 @@ def application(studio: Studio, token: str, port: int) -> Guard:
             Route("/api/machines", routes.machines),
             Route("/api/machine", routes.machine),
             Route("/api/run", routes.run, methods=["POST"]),
+            Route("/api/loads", routes.loads, methods=["POST"]),
             Route("/api/place", routes.place),
             Route("/api/ranking", routes.ranking, methods=["POST"]),
             Route("/api/save", routes.save, methods=["POST"]),
@@ -201,6 +226,16 @@ class _Routes:
         try:
             run = partial(self.studio.run, body.state, body.keys)
             return _json(await self.studio.turns.take(f"page {body.page}", run))
+        except OvertakenError:
+            return _json({"overtaken": True})
+
+    async def loads(self, request: Request) -> Response:
+        """Return the gap with each load; a request that is overtaken is dropped."""
+        body = LoadsRequest.model_validate_json(await request.body())
+        try:
+            run = partial(self.studio.gaps, body.state)
+            gaps = await self.studio.turns.take(f"loads {body.page}", run, background=True)
+            return _json({"loads": gaps})
         except OvertakenError:
             return _json({"overtaken": True})
 

@@ -24,6 +24,7 @@ let state = null;      // what is chosen, as the server reads it
 let machine = null;    // the opened machine
 let answer = null;     // the answer that is drawn
 let ghost = null;      // the answer of the machine as it was, with the same load
+let loads = null;      // gap with each load, and the number of the request
 let variants = [];     // {name, state, answer}
 let turned = [];       // keys of the seven numbers
 let ranking = [];      // arrows of all numbers
@@ -70,7 +71,7 @@ async function openMachine() {
   status('opening …');
   machine = await get(`machine?id=${encodeURIComponent(state.machine)}`);
   if (!state.masses.length && !machine.loads.includes(state.load)) [state.load] = machine.loads;
-  list.fill(machine.numbers);
+  list.fill(machine.numbers, machine.parts);
   scene.shapes(machine.shapes);
   turned = [];
   byId('machine').value = state.machine;
@@ -131,6 +132,7 @@ async function run() {
     showAnswer();
     showProblems([], found.warnings);
     status(`${fixed(performance.now() - begin, 0)} ms · ${found.stepping.integrator}, ${digits(found.stepping.step_ms, 3)} ms steps`);
+    runLoads(number);
   } catch (error) {
     if (number !== asked) return;
     showProblems(error instanceof Problems ? error.problems : [{key: '', message: error.message}]);
@@ -139,6 +141,17 @@ async function run() {
     settled = Math.max(settled, number);
     showBusy();
   }
+}
+
+/** Ask for the gap with every load, after the answer to the chosen one, unless that is overtaken. */
+async function runLoads(number) {
+  if (number !== asked) return;
+  try {
+    const found = await post('loads', {page: PAGE, state});
+    if (found.overtaken || number < (loads?.number ?? 0)) return;
+    loads = {number, gaps: found.loads};
+    showVerdict();
+  } catch { /* a wrong number is shown by the run itself */ }
 }
 
 /** Tell readers of the page, also those of a screen reader, whether an answer is under way. */
@@ -211,7 +224,7 @@ function makePanels() {
   panels.envelopes = new Map(Object.keys(machine.sensors).map((name) => [name, new BandPanel(byId('envelopes'), name, 'mm', times.envelopes)]));
   panels.forces = new Map();
   panels.orbits = ['front', 'rear'].map((name) => new OrbitPanel(byId('orbits'), name));
-  answer = ghost = null;
+  answer = ghost = loads = null;
 }
 
 const envelopeBand = (sides) => ({
@@ -235,23 +248,48 @@ function showAnswer() {
   showVariants();
 }
 
-/** Say beside the sliders whether the tub touches the housing, and how large the gap is. */
+const touches = ({gap, diverged}) => Boolean(diverged || (gap && gap.distance <= 0));
+
+/** Say beside the sliders whether the tub touches the housing: the load that decides comes first. */
 function showVerdict() {
   const {gap, diverged} = answer;
-  const words = (name) => name.replaceAll('_', ' ');
-  const touches = Boolean(gap && gap.distance <= 0);
-  byId('verdict').classList.toggle('alarm', touches || Boolean(diverged));
-  if (diverged) byId('verdict').textContent = 'The run diverged: no answer.';
-  else if (!gap) byId('verdict').textContent = 'The machine has no shapes: no gap is known.';
+  const chosen = {load: state.masses.length ? DESCRIBED : state.load, gap, diverged};
+  const others = (loads?.gaps ?? []).filter(({load}) => load !== chosen.load);
+  const size = (of) => (of.diverged ? -Infinity : of.gap?.distance ?? Infinity);
+  const all = [chosen, ...others].sort((a, b) => size(a) - size(b));
+  const [first] = all;
+  byId('verdict').classList.toggle('alarm', touches(first));
+  if (first.diverged) byId('verdict').textContent = `The run with load ${first.load} diverged: no answer.`;
+  else if (!first.gap) byId('verdict').textContent = 'The machine has no shapes: no gap is known.';
   else {
-    const was = ghost?.gap && !ghost.diverged ? `, as it was ${fixed(ghost.gap.distance)} mm` : '';
+    const distance = fixed(first.gap.distance);
+    const which = others.length ? ` with load ${first.load}` : '';
     byId('verdict').replaceChildren(
-      make('strong', {}, touches ? `The tub touches: ${fixed(gap.distance)} mm` : `No contact: gap ${fixed(gap.distance)} mm`),
-      `${words(gap.moving)} to ${words(gap.fixed)} at ${fixed(gap.rpm, 0)} rpm${was}`);
+      make('strong', {}, touches(first) ? `The tub touches${which}: ${distance} mm` : `No contact: gap ${distance} mm${which}`),
+      `${first.gap.moving} to ${first.gap.fixed} at ${fixed(first.gap.rpm, 0)} rpm`,
+      make('span', {class: 'loads'}, ...(all.length > 1 ? all : []).map((of) => gapOfLoad(of, of === chosen))));
   }
 }
 
+/** A button with the gap of a load, which shows that load; the others follow the chosen one. */
+function gapOfLoad(of, isChosen) {
+  const now = of.diverged ? 'diverged' : fixed(of.gap.distance);
+  const before = isChosen && ghost?.gap && !ghost.diverged ? fixed(ghost.gap.distance) : now;
+  const text = `${of.load} ${now}${before === now ? '' : `, was ${before}`}`;
+  const isOld = !isChosen && loads.number < drawn;
+  return make('button', {
+    class: [isOld && 'old', touches(of) && 'alarm'].filter(Boolean).join(' '), 'aria-pressed': String(isChosen),
+    title: `show load ${of.load}`, onclick: () => showOtherLoad(of.load),
+  }, text);
+}
+
+function showOtherLoad(name) {
+  byId('load').value = name;
+  byId('load').dispatchEvent(new Event('change'));
+}
+
 function showEnvelopes() {
+  byId('band').textContent = `, ${answer.band.map((end) => digits(end, 3)).join('–')} Hz`;
   const names = [...panels.envelopes.keys()];
   const bands = (of) => (of?.envelopes?.length ? of.envelopes.map(envelopeBand) : []);
   const now = bands(answer);
@@ -321,7 +359,7 @@ function showMotion() {
   const gap = answer.gap_points && {...answer.gap_points, distance: answer.gap.distance};
   if (frame < 0 && gap) {
     scene.show(gap.pose, gap);
-    byId('frame-time').textContent = `${fixed(answer.gap.time, 2)} s, ${fixed(answer.gap.rpm, 0)} rpm: ${answer.gap.moving.replaceAll('_', ' ')} to ${answer.gap.fixed.replaceAll('_', ' ')}`;
+    byId('frame-time').textContent = `${fixed(answer.gap.time, 2)} s, ${fixed(answer.gap.rpm, 0)} rpm: ${answer.gap.moving} to ${answer.gap.fixed}`;
     return;
   }
   const at = Math.min(Math.max(frame, 0), motion.time.length - 1);

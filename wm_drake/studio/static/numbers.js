@@ -13,17 +13,21 @@ export class NumberList {
     this.rows = new Map();
   }
 
-  /** List the numbers of a machine. */
-  fill(numbers) {
+  /** List the numbers of a machine, folded by parts of the machine and by groups within. */
+  fill(numbers, order) {
     this.rows.clear();
-    const groups = new Map();
+    const parts = new Map(order.map((name) => [name, new Map()]));
     for (const number of numbers) {
+      const groups = parts.get(number.part);
       if (!groups.has(number.group)) groups.set(number.group, []);
       groups.get(number.group).push(this.row(number));
     }
-    this.parent.replaceChildren(...[...groups].map(([name, rows]) =>
-      make('details', {open: false}, make('summary', {}, name), ...rows)));
-    this.groups = [...this.parent.children];
+    const fold = (name, kind, content) => make('details', {class: kind}, make('summary', {}, name), ...content);
+    const inside = (groups) => (groups.size === 1 ? [...groups.values()][0]
+      : [...groups].map(([name, rows]) => fold(name, 'group', rows)));
+    this.parent.replaceChildren(...[...parts].filter(([, groups]) => groups.size)
+      .map(([name, groups]) => fold(name, 'part', inside(groups))));
+    this.folds = [...this.parent.querySelectorAll('details')];
   }
 
   row(number) {
@@ -120,7 +124,7 @@ export class NumberList {
     row.problem.hidden = false;
     row.element.classList.add('wrong');
     row.text.setAttribute('aria-invalid', 'true');
-    row.element.closest('details').open = true;
+    this.open([row.number.key]);
   }
 
   nearest(key) {
@@ -130,22 +134,22 @@ export class NumberList {
   /** Show only numbers whose key path has all words, and only moved ones if wanted. */
   search(words, onlyMoved) {
     const wanted = words.toLowerCase().split(/\s+/).filter(Boolean);
-    for (const group of this.groups) {
-      let found = 0;
-      for (const element of group.querySelectorAll('.number')) {
-        const name = `${element.dataset.key} ${group.firstChild.textContent} ${element.firstChild.textContent}`.toLowerCase();
-        const fits = wanted.every((word) => name.includes(word)) && (!onlyMoved || element.classList.contains('moved'));
-        element.hidden = !fits;
-        element.style.display = fits ? '' : 'none';
-        found += fits ? 1 : 0;
-      }
-      group.hidden = found === 0;
-      if (wanted.length || onlyMoved) group.open = found > 0;
+    for (const {number, element} of this.rows.values()) {
+      const name = `${number.key} ${number.part} ${number.group} ${number.label}`.toLowerCase();
+      const fits = wanted.every((word) => name.includes(word)) && (!onlyMoved || element.classList.contains('moved'));
+      element.hidden = !fits;
+      element.style.display = fits ? '' : 'none';
+    }
+    for (const fold of this.folds) {
+      fold.hidden = !fold.querySelector('.number:not([hidden])');
+      if (wanted.length || onlyMoved) fold.open = !fold.hidden;
     }
   }
 
   /** Open the groups of some numbers. */
   open(keys) {
-    for (const key of keys) this.rows.get(key)?.element.closest('details').setAttribute('open', '');
+    for (const key of keys) {
+      for (let fold = this.rows.get(key)?.element.closest('details'); fold; fold = fold.parentElement.closest('details')) fold.open = true;
+    }
   }
 }
