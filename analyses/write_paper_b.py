@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wm_drake import Case, build_machine, load_machine, simulate_many
+from wm_drake import Case, build_machine, load_machine, modes, simulate_many
 from wm_drake.batch.ledger import open_ledger
 from wm_drake.parameters import (
     GASKET_FACTORS,
@@ -38,7 +38,8 @@ from wm_drake.studies.gasket.study import GasketTrials
 from wm_drake.studies.validation import page
 from wm_drake.studies.validation.claims import claims
 
-MACHINES = ("reference", "adams_2026")
+ADAMS = "adams_2026"
+MACHINES = ("reference", ADAMS)
 LOADS = ("middle", "counter")
 ADAMS_SOURCE = "Adams model of [B]"
 DEVIATION = 0.1
@@ -59,9 +60,15 @@ FREE_DAMPING = {
 """Free quantities of the search of the damping."""
 
 
-def screening_of(machine: MachineParameters, trials: int) -> Screening:
-    """Return the gasket study of [B] with linear tables; a D-optimal design below 243 trials."""
-    levels = levels_of(machine, load_factors(GASKET_FACTORS), "linear")
+def screening_of(machine: MachineParameters, trials: int, tables: str = "linear") -> Screening:
+    """Return the gasket study of [B]; a D-optimal design below 243 trials.
+
+    Args:
+        machine: The machine.
+        trials: Number of trials.
+        tables: How a level changes a stiffness table; "linear" as in [B].
+    """
+    levels = levels_of(machine, load_factors(GASKET_FACTORS), tables)
     kind = "orthogonal" if trials >= 243 else "d-optimal"
     design = make_design(kind, tuple(level.name for level in levels), trials=trials)
     middle = at_levels(machine, levels, [0] * len(levels))
@@ -94,6 +101,32 @@ def amplitude_lines(machines: dict[str, MachineParameters]) -> list[list[str]]:
                 cells += [f"{theirs:g}", f"{ours:.1f} ({100.0 * (ours / theirs - 1.0):+.0f} %)"]
             lines.append(cells)
     return lines
+
+
+def change_lines(machines: dict[str, MachineParameters]) -> list[list[str]]:
+    """Return the lines of the percentages of Table 1: change of each amplitude by the gasket."""
+    changes, printed = {}, np.array([])
+    for name, machine in machines.items():
+        targets = targets_of(machine, measured_amplitudes(machine))
+        runs = [Case(n, machine.loads[n], machine.profile, gasket) for n, gasket in targets.loads]
+        computed = simulate_many(build_machine(machine), runs).amplitude.values
+        both = (targets.gasket_effects(a) for a in (targets.amplitude, computed))
+        printed, changes[name] = (100.0 * np.concatenate([e[n] for n in LOADS]) for e in both)
+    lines = []
+    places = [f"{load}, {sensor}" for load in LOADS for sensor in machines[MACHINES[0]].sensors]
+    for k, place in enumerate(places):
+        cells = [
+            f"{values[k]:+.0f} %" + (" **sign**" if values[k] * printed[k] < 0.0 else "")
+            for values in changes.values()
+        ]
+        lines.append([place, f"{printed[k]:+.0f} %", *cells])
+    return lines
+
+
+def resonance_line(machine: MachineParameters) -> list[str]:
+    """Return the range of speeds at which the unbalance meets a mode, friction sliding."""
+    speeds = modes(build_machine(machine), LOADS[0]).critical_speeds * 30.0 / np.pi
+    return [machine.name, f"{speeds.min():.0f} to {speeds.max():.0f} rpm"]
 
 
 def study_lines(
@@ -178,6 +211,54 @@ def damping_line(machine: MachineParameters, is_quick: bool) -> list[str]:
     return [machine.name, *cells, f"{100.0 * misses:.0f} %"]
 
 
+def study_text(machines: dict[str, MachineParameters], trials: int) -> tuple[str, str]:
+    """Return the summary of the gasket studies, and Tables 4 and 5 with section 4."""
+    screenings = {name: screening_of(machine, trials) for name, machine in machines.items()}
+    first = screenings[MACHINES[0]]
+    published = published_for(published_results(machines[MACHINES[0]].published), first.tables)
+    of_each = [summary(name, s, published) for name, s in screenings.items()]
+    curved = screening_of(machines[ADAMS], trials, "scaled")
+    of_each.append(summary(f"{ADAMS}, its stiffening curves scaled", curved, published))
+    heads = [
+        "machine",
+        "same leading factor",
+        "contributions: mean / largest difference, points",
+        "means: mean / largest difference, %",
+        "effects with another sign",
+    ]
+    sums, terms = study_lines(screenings, published)
+    said = [[words, *cells] for words, cells in claims(screenings)]
+    heads_of_both = ["", "printed", *MACHINES]
+    text = page.table_text("Table 4: variance explained", heads_of_both, sums)
+    contributions = "Table 5 and Fig. 10: means, ranges, contributions"
+    text += page.table_text(contributions, heads_of_both, terms)
+    text += page.table_text("Section 4 in words", ["", *MACHINES], said)
+    return page.table_text("Summary", heads, of_each), text
+
+
+def amplitude_text(machines: dict[str, MachineParameters], is_quick: bool) -> str:
+    """Return Tables 1 to 3, resonances, and the damping that the amplitudes give."""
+    pairs = [text for name in MACHINES for text in (f"{name}: printed, mm", "ours, mm")]
+    text = page.table_text(
+        "Tables 1 to 3: amplitudes", ["", "source", *pairs], amplitude_lines(machines)
+    )
+    text += page.table_text(
+        "Table 1: change of the amplitude by the gasket",
+        ["", "printed", *MACHINES],
+        change_lines(machines),
+    )
+    text += page.table_text(
+        "Section 2.2: resonances, printed 100 to 300 rpm",
+        ["machine", "unbalance meets a mode at"],
+        [resonance_line(machine) for machine in machines.values()],
+    )
+    return text + page.table_text(
+        "Section 3.1.2: damping from the amplitudes alone",
+        ["machine", "C_L (printed 0.019)", "C_T (printed 60)", "RMS difference of the amplitudes"],
+        [damping_line(machine, is_quick) for machine in machines.values()],
+    )
+
+
 def main() -> None:
     """Run the machines and write the page."""
     parser = argparse.ArgumentParser(
@@ -189,40 +270,12 @@ def main() -> None:
     arguments = parser.parse_args()
     trials = 150 if arguments.quick else 243
     machines = {name: load_machine(name) for name in MACHINES}
-    screenings = {name: screening_of(machine, trials) for name, machine in machines.items()}
-    first = screenings[MACHINES[0]]
-    published = published_for(published_results(machines[MACHINES[0]].published), first.tables)
-    sums, terms = study_lines(screenings, published)
-    heads = ["", "printed", *MACHINES]
-    pairs = [text for name in MACHINES for text in (f"{name}: printed, mm", "ours, mm")]
-    text = page.origin(
+    short, study = study_text(machines, trials)
+    origin = page.origin(
         "python analyses/write_paper_b.py --page docs/paper-b.md",
-        [f"Gasket study: {trials} trials, tables linear."],
+        [f"Gasket study: {trials} trials, tables linear, as in [B], where nothing else is said."],
     )
-    of_each = [summary(name, s, published) for name, s in screenings.items()]
-    text += page.table_text(
-        "Summary",
-        [
-            "machine",
-            "same leading factor",
-            "contributions: mean / largest difference, points",
-            "means: mean / largest difference, %",
-            "effects with another sign",
-        ],
-        of_each,
-    )
-    text += page.table_text(
-        "Tables 1 to 3: amplitudes", ["", "source", *pairs], amplitude_lines(machines)
-    )
-    text += page.table_text("Table 4: variance explained", heads, sums)
-    text += page.table_text("Table 5 and Fig. 10: means, ranges, contributions", heads, terms)
-    text += page.table_text(
-        "Section 3.1.2: damping from the amplitudes alone",
-        ["machine", "C_L (printed 0.019)", "C_T (printed 60)", "RMS difference of the amplitudes"],
-        [damping_line(machine, arguments.quick) for machine in machines.values()],
-    )
-    said = [[words, *cells] for words, cells in claims(screenings)]
-    text += page.table_text("Section 4 in words", ["", *MACHINES], said)
+    text = origin + short + amplitude_text(machines, arguments.quick) + study
     print(text)
     page.write(text, arguments.out, arguments.page)
 
