@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from both_engines import LOAD, difference, redrawn
 from machine_with_bearing import with_bearing
-from machines_of_each_kind import machines_of_each_kind
 
 from wm_drake.errors import InputError
 from wm_drake.model.build import build_machine
@@ -32,7 +31,7 @@ def machines():
         }
     )
     found = {name: load_machine(name) for name in ("reference", "free_stroke")}
-    found |= {"crooked": crooked, "springs only": machines_of_each_kind()["springs only"]}
+    found["crooked"] = crooked
     return {name: with_bearing(parameters) for name, parameters in found.items()}
 
 

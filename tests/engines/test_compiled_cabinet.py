@@ -12,7 +12,7 @@ from wm_drake.model.build import build_machine
 
 def machines():
     kinds = machines_of_each_kind()
-    fixed = {"reference": kinds["reference"], "springs only": kinds["springs only"]}
+    fixed = {"reference": kinds["reference"]}
     fixed["three laws"] = kinds["two bushings, five dampers of three laws"]
     fixed["compliant bearing"] = with_bearing(kinds["reference"])
     return {name: with_moving_cabinet(parameters) for name, parameters in fixed.items()}
