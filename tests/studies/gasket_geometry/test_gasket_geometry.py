@@ -9,7 +9,8 @@ import pytest
 import wm_drake as wm
 from wm_drake.errors import InputError
 from wm_drake.parameters.gasket_drawing import load_gasket_drawing
-from wm_drake.studies.gasket_geometry.drawings import changed, factors_of
+from wm_drake.studies.gasket_geometry.drawings import changed, factors_of, with_folds
+from wm_drake.studies.gasket_geometry.study import GAP, excess, ranked
 from wm_drake.studies.gasket_geometry.surface import fit
 
 
@@ -50,9 +51,41 @@ def test_factors_change_the_drawing():
         changed(drawing, wide, np.array([1.0, 0.0, 0.0, 0.0]))
 
 
+def test_folds_are_repeated_in_the_room_of_the_drawn_ones():
+    folded = load_gasket_drawing("folded")
+    assert with_folds(folded, 1) is folded
+    twice = with_folds(folded, 2)
+    places = [(1e3 * point.radius, 1e3 * point.y) for point in twice.meridian]
+    assert np.array(places) == pytest.approx(np.array([
+        (160, 0), (160, 30), (168, 30), (168, 8), (176, 8), (176, 30), (184, 30), (184, 8),
+        (192, 8), (192, 60),
+    ]))  # fmt: skip
+    assert {point.fillet for point in twice.meridian[1:-1]} == {3e-3}
+    wave = with_folds(load_gasket_drawing("bellows").model_copy(update={"meridian": tuple(
+        point.model_copy(update={"fillet": min(point.fillet, 6e-3)})
+        for point in load_gasket_drawing("bellows").meridian)}), 2)  # fmt: skip
+    assert [round(1e3 * point.y, 9) for point in wave.meridian] == [0, 20, 27.5, 35, 42.5, 50, 70]
+    with pytest.raises(InputError, match=r"with folds repeated 6 times: .*too sharp"):
+        with_folds(folded, 6)
+    tube = folded.model_copy(update={"meridian": (folded.meridian[0], folded.meridian[-1])})
+    with pytest.raises(InputError, match="has 0 corners between its rims"):
+        with_folds(tube, 2)
+
+
+def test_the_best_drawing_keeps_the_limits_and_then_has_the_largest_gap():
+    responses = {GAP: np.array([3.0, 9.0, 5.0, 4.0]), "largest_stretch": np.array([1, 4, 1.9, 2.0])}
+    assert ranked(responses, {}).tolist() == [1, 2, 3, 0]
+    assert ranked(responses, {"largest_stretch": 2.0}).tolist() == [2, 3, 0, 1]
+    assert ranked(responses, {"largest_stretch": 0.5})[0] == 0
+    assert excess(responses, {"largest_stretch": 2.0}) == pytest.approx([0.0, 1.0, 0.0, 0.0])
+
+
 def test_thicker_and_harder_walls_are_stiffer_and_the_best_drawing_is_verified(tmp_path):
     out = tmp_path / "out"
-    result = wm.run_study("gasket-geometry", quick=True, quiet=True, out=out)
+    limit = 1.05
+    result = wm.run_study(
+        "gasket-geometry", quick=True, quiet=True, out=out, limit=[f"largest_stretch={limit}"]
+    )
     for name in ("radial_N_per_mm", "axial_N_per_mm", "twist_Nm_per_rad", "tilt_Nm_per_rad"):
         thickness, _, _, hardness = result.surfaces[name].coefficients[1:5]
         assert thickness > 0.0
@@ -63,8 +96,10 @@ def test_thicker_and_harder_walls_are_stiffer_and_the_best_drawing_is_verified(t
     assert bending[0] > 1.5 * shear[0]  # bending goes with the cube of the thickness
     assert result.kinds == ["design"] * 6 + ["fresh"] * 2 + ["best of surface"]
     assert result.errors("twist_Nm_per_rad") < 10.0
-    gap = result.responses["smallest_gap_mm"]
-    assert gap[result.best_at] == gap.max()
+    gap, stretch = result.responses[GAP], result.responses["largest_stretch"]
+    assert result.keeps_limits
+    assert gap[result.best_at] == gap[stretch <= limit].max()
+    assert np.all((stretch > 1.0) & (stretch < 1.3))
     best = load_gasket_drawing(out / "best.yaml")
     assert best.rubber.shore_a == pytest.approx(result.best.rubber.shore_a)
     for point, other in zip(best.meridian, result.best.meridian, strict=True):
@@ -77,6 +112,9 @@ def test_thicker_and_harder_walls_are_stiffer_and_the_best_drawing_is_verified(t
         ("nosuch", "no shipped gasket drawing"),
         ("soft.yaml", "rubber.shore_a: needs shore_a"),
         ("folded --set gasket=null", "the machine has no gasket"),
+        ("folded --limit smallest_gap_mm=3", "'smallest_gap_mm': allowed are radial_N_per_mm"),
+        ("folded --limit largest_stretch=x", "'largest_stretch=x': allowed is a number above 0"),
+        ("bellows --folds 3", "with folds repeated 3 times"),
         ("folded --load nosuch", "neither a load of machine"),
     ],
 )

@@ -1,5 +1,6 @@
 """Drawings of a design: a drawing with changed wall, folds and hardness."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,6 +49,43 @@ def factors_of(drawing: GasketDrawing) -> tuple[Factor, ...]:
         Factor("fillet", "radius of folds, of that of the drawing", "%", 92.0, 8.0),
         Factor("hardness", "hardness", "Shore A", drawing.rubber.shore_a, 6.0),
     )
+
+
+def with_folds(drawing: GasketDrawing, times: int) -> GasketDrawing:
+    """Return a drawing whose folds are repeated, each narrower, in the room of the drawn ones.
+
+    The folds are the corners between the rims. They are repeated along the radius or along y:
+    where the first and the last of these corners are farther apart. Each has the depth of the
+    drawing; width and fillets are divided by the number.
+
+    Args:
+        drawing: The drawing.
+        times: Number of repetitions.
+
+    Raises:
+        InputError: the drawing has fewer than two corners between its rims, or cannot be built.
+    """
+    if times == 1:
+        return drawing
+    first, *inner, last = drawing.meridian
+    if len(inner) < 2:
+        raise input_error(
+            f"has {len(inner)} corners between its rims; folds to repeat need two", key="meridian"
+        )
+    spans = {name: getattr(inner[-1], name) - getattr(inner[0], name) for name in ("radius", "y")}
+    along = max(spans, key=lambda name: abs(spans[name]))
+    begin, points = getattr(inner[0], along), [first]
+    for number in range(times):
+        for point in inner:
+            at = begin + (getattr(point, along) - begin + number * spans[along]) / times
+            moved = point.model_copy(update={along: at, "fillet": point.fillet / times})
+            if math.hypot(moved.radius - points[-1].radius, moved.y - points[-1].y) > 1e-6:
+                points.append(moved)
+    try:
+        return GasketDrawing.model_validate({**dict(drawing), "meridian": (*points, last)})
+    except ValidationError as error:
+        message = f"with folds repeated {times} times: {error.errors()[0]['msg']}"
+        raise input_error(message, key="meridian") from None
 
 
 def changed(

@@ -20,6 +20,15 @@ class GeometryOptions(Options):
     )
     drawings: int = option(27, "Drawings of the design.", "N", ge=6, le=400)
     fresh: int = option(4, "Fresh drawings that test the response surfaces.", "N", ge=2, le=100)
+    folds: int = option(
+        1, "Times that the folds of the drawing are repeated, each narrower.", "N", ge=1, le=6
+    )
+    limit: tuple[str, ...] = option(
+        (),
+        "Largest value of a response that the best drawing may have, such as "
+        "largest_gasket_force_N=60 or largest_stretch=1.3; repeat for more.",
+        "RESPONSE=VALUE",
+    )
     load: tuple[str, ...] = LOADS
     profile: Path | None = PROFILE
     axial: str = option("10 mm", "Largest displacement along the axis, both ways.", "LENGTH")
@@ -42,7 +51,7 @@ def _begin(options: GeometryOptions, machine: "Machine") -> Task:
 
 GASKET_GEOMETRY = Study(
     "gasket-geometry",
-    "Vary the drawing of a gasket: wall, folds, hardness; find what moves the tub least.",
+    "Vary the drawing of a gasket: wall, folds, hardness; find the largest gap.",
     GeometryOptions,
     _begin,
     quick={

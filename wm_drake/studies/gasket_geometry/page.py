@@ -15,8 +15,9 @@ METHOD = (
     "The drawings are a Latin hypercube of the factors. Finite elements give the curves of each, "
     "and the machine runs all loads with each gasket. The responses are fitted with polynomials of "
     "degree two (degree one if there are few drawings). The error is that on fresh drawings, by "
-    "the range of the response in the design. The drawing with the largest gap on the surface is "
-    "computed and run too; the best drawing is that with the largest gap of all that were run. "
+    "the range of the response in the design. The drawing with the largest gap on the surface, "
+    "within the limits, is computed and run too; the best drawing is that with the largest gap of "
+    "all that were run and keep the limits. "
     "Folds that touch hold each other off, unless the drawing has contact: false."
 )
 
@@ -30,6 +31,7 @@ def geometry_page(result: GeometryResult, facts: Facts) -> str:
             f"{result.design} of the design, {len(result.levels) - result.design - 1} fresh",
         ),
         ("Loads", ", ".join(result.loads)),
+        ("Limits", _limits_text(result)),
         *facts.rows(),
     ]
     return SectionedPage(
@@ -42,7 +44,7 @@ def geometry_page(result: GeometryResult, facts: Facts) -> str:
             Section("files", "Files", links=(("best.yaml", "the best drawing"),)),
         ],
         made,
-        warnings=facts.warnings,
+        warnings=(*facts.warnings, *result.warnings()),
         about="Wall thickness, depth and radius of folds, hardness: what moves the tub least.",
         method=METHOD,
     ).html()
@@ -61,11 +63,17 @@ def summary(result: GeometryResult) -> str:
     middle = float(result.surfaces[GAP].at(np.zeros((1, len(result.factors))))[0])
     return (
         f"Best drawing that was run: {best}. Its smallest gap is {number(gap[result.best_at], 2)} "
-        f"mm; in the middle of the ranges the surface has {number(middle, 2)} mm. The drawing with "
+        f"mm. Limits: {_limits_text(result)}. In the middle of the ranges the surface has "
+        f"{number(middle, 2)} mm. The drawing with "
         f"the largest gap on the surface, {number(expected, 2)} mm, has {number(gap[-1], 2)} mm "
         f"when it is run. Error of the surface of the gap on fresh drawings: "
         f"{number(result.errors(GAP))} % of the range."
     )
+
+
+def _limits_text(result: GeometryResult) -> str:
+    texts = [f"{RESPONSES[name]} up to {limit:g}" for name, limit in result.limits.items()]
+    return "; ".join(texts) or "none"
 
 
 def _over_factors(result: GeometryResult) -> Picture:

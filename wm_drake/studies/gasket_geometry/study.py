@@ -1,6 +1,6 @@
 """The study: a design of drawings, finite elements of each, runs, surfaces, the best drawing."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,9 +18,10 @@ from wm_drake.parameters.elements import ForceTable, TorqueTable
 from wm_drake.parameters.files import yaml_text
 from wm_drake.parameters.gasket_drawing import GasketDrawing, load_gasket_drawing
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Unit
+from wm_drake.parameters.units import Unit, plain_number
 from wm_drake.simulation.cases import Case
 from wm_drake.solid.curves import MOTIONS, Gasket, Mesh
+from wm_drake.solid.deformed import deformed
 from wm_drake.studies.gasket_curves.machine import (
     GasketStiffness,
     damping_per_stiffness,
@@ -28,10 +29,10 @@ from wm_drake.studies.gasket_curves.machine import (
     with_gasket,
 )
 from wm_drake.studies.gasket_curves.study import curve_values, positive
-from wm_drake.studies.gasket_geometry.drawings import Factor, changed, factors_of
+from wm_drake.studies.gasket_geometry.drawings import Factor, changed, factors_of, with_folds
 from wm_drake.studies.gasket_geometry.options import GeometryOptions
 from wm_drake.studies.gasket_geometry.surface import Surface, fit
-from wm_drake.studies.inputs import selected_cases
+from wm_drake.studies.inputs import pairs_of, selected_cases
 from wm_drake.studies.run import Executor
 from wm_drake.studies.study import Facts, Result, Task
 
@@ -55,11 +56,20 @@ RESPONSES = {
     "smallest_gap_mm": "smallest gap, mm",
     "largest_amplitude_mm": "largest amplitude of a sensor, mm",
     "largest_gasket_force_N": "largest gasket force, N",
+    "largest_stretch": "largest stretch of the rubber",
 }
 """Responses of a drawing: words by names."""
 
 GAP = "smallest_gap_mm"
 """Response that the best drawing makes largest."""
+
+
+@dataclass(frozen=True)
+class Computed:
+    """What the curves of a drawing give: stiffness, and the largest stretch at their ends."""
+
+    stiffness: GasketStiffness
+    stretch: float
 
 
 @dataclass(frozen=True)
@@ -76,6 +86,7 @@ class GeometryResult(Result):
         surfaces: Response surfaces by name.
         best: The drawing whose runs have the largest gap.
         loads: Names of the loads.
+        limits: Largest values of responses that the best drawing may have.
     """
 
     name: str
@@ -86,6 +97,7 @@ class GeometryResult(Result):
     surfaces: dict[str, Surface]
     best: GasketDrawing
     loads: tuple[str, ...]
+    limits: dict[str, float]
 
     @property
     def kinds(self) -> list[str]:
@@ -95,8 +107,19 @@ class GeometryResult(Result):
 
     @property
     def best_at(self) -> int:
-        """Number of the drawing whose runs have the largest gap."""
-        return int(np.argmax(self.responses[GAP]))
+        """Number of the best drawing that was run."""
+        return int(ranked(self.responses, self.limits)[0])
+
+    @property
+    def keeps_limits(self) -> bool:
+        """Whether the best drawing keeps all limits."""
+        return not excess(self.responses, self.limits)[self.best_at]
+
+    def warnings(self) -> Sequence[str]:
+        """Return whether no drawing keeps the limits."""
+        if self.keeps_limits:
+            return []
+        return ["no drawing that was run keeps all limits; the best one exceeds them the least"]
 
     def errors(self, name: str) -> float:
         """Return the RMS error of a surface on fresh drawings, by the response's range. [%]"""
@@ -134,6 +157,37 @@ class GeometryResult(Result):
         """Write the tables and the best drawing."""
         super().write(folder)
         (folder / "best.yaml").write_text(yaml_text(drawing_tree(self.best)), encoding="utf-8")
+
+
+def excess(responses: Mapping[str, FloatArray], limits: Mapping[str, float]) -> FloatArray:
+    """Return by how much drawings exceed limits at most, in parts of the limit; 0 if not. (n,)"""
+    parts = [responses[name] / limit - 1.0 for name, limit in limits.items()]
+    return np.max([np.zeros_like(responses[GAP]), *parts], axis=0)
+
+
+def ranked(responses: Mapping[str, FloatArray], limits: Mapping[str, float]) -> np.ndarray:
+    """Return the numbers of drawings, best first: within the limits, then the largest gap. (n,)"""
+    return np.lexsort((-responses[GAP], excess(responses, limits)))
+
+
+def limits_of(entries: Sequence[str]) -> dict[str, float]:
+    """Return limits by responses.
+
+    Raises:
+        InputError: a response is unknown, or a limit is not a number above 0.
+    """
+    limits = {}
+    for name, text in pairs_of(entries, "--limit"):
+        if name not in RESPONSES or name == GAP:
+            allowed = ", ".join(response for response in RESPONSES if response != GAP)
+            raise input_error(f"'{name}': allowed are {allowed}", where="--limit")
+        try:
+            limits[name] = plain_number(text)
+        except ValueError:
+            limits[name] = 0.0
+        if not 0.0 < limits[name] < np.inf:
+            raise input_error(f"'{name}={text}': allowed is a number above 0", where="--limit")
+    return limits
 
 
 def drawing_tree(drawing: GasketDrawing) -> dict[str, Any]:
@@ -174,7 +228,8 @@ class GeometryTask(Task):
             raise input_error(
                 "the machine has no gasket, whose frames the new one takes", key="machine"
             )
-        self.drawing = load_gasket_drawing(options.file)
+        self.drawing = with_folds(load_gasket_drawing(options.file), options.folds)
+        self.limits = limits_of(options.limit)
         self.factors = factors_of(self.drawing)
         self.cases = selected_cases(self.machine, options.load, True, options.profile)
         self.frequency = positive(options.frequency, Unit("Hz", "Hz"), "--frequency")
@@ -208,18 +263,18 @@ class GeometryTask(Task):
         """Compute all drawings, fit the surfaces, and verify the best drawing."""
         assert executor.ledger is not None
         levels = np.concatenate([self.design, self.fresh])
-        stiffness = []
+        computed = []
         with executor.progress(len(levels), "drawings") as progress:
             for number, at in enumerate(levels):
-                stiffness.append(self._stiffness(executor.ledger, at))
+                computed.append(self._computed(executor.ledger, at))
                 progress(number + 1)
-        responses = self._responses(executor, levels, stiffness)
+        responses = self._responses(executor, levels, computed)
         count = len(self.design)
         surfaces = {
             name: fit(self.design, response[:count]) for name, response in responses.items()
         }
         proposed = self._best(surfaces)
-        made = self._stiffness(executor.ledger, proposed)
+        made = self._computed(executor.ledger, proposed)
         verified = self._responses(executor, proposed[None], [made])
         levels = np.vstack([levels, proposed])
         every = {name: np.concatenate([responses[name], verified[name]]) for name in responses}
@@ -230,14 +285,15 @@ class GeometryTask(Task):
             every,
             count,
             surfaces,
-            changed(self.drawing, self.factors, levels[int(np.argmax(every[GAP]))]),
+            changed(self.drawing, self.factors, levels[ranked(every, self.limits)[0]]),
             tuple(case.name for case in self.cases),
+            self.limits,
         )
 
     def _best(self, surfaces: dict[str, Surface]) -> FloatArray:
-        """Return the levels of the candidate with the largest gap that can be built."""
-        order = np.argsort(-surfaces[GAP].at(self.candidates))
-        for at in order:
+        """Return the levels of the best candidate on the surfaces that can be built."""
+        expected = {name: surface.at(self.candidates) for name, surface in surfaces.items()}
+        for at in ranked(expected, self.limits):
             try:
                 Gasket(changed(self.drawing, self.factors, self.candidates[at]), self.mesh)
             except WmDrakeError:
@@ -245,8 +301,8 @@ class GeometryTask(Task):
             return np.asarray(self.candidates[at])
         raise WmDrakeError("no drawing of the range can be built")
 
-    def _stiffness(self, ledger: Ledger, levels: FloatArray) -> GasketStiffness:
-        """Return the curves of a drawing, from the ledger if it has them.
+    def _computed(self, ledger: Ledger, levels: FloatArray) -> Computed:
+        """Return what the curves of a drawing give, from the ledger if it has them.
 
         Raises:
             WmDrakeError: a curve ends early.
@@ -264,13 +320,17 @@ class GeometryTask(Task):
                     )
                 curves[motion.name] = curve
             made = stiffness_of(curves)
-            tables = {name: np.array(table.curve) for name, table in made.tables.items()}
-            ledger.put(key, {**tables, "coupling": made.coupling})
+            kept_tables = {name: np.array(table.curve) for name, table in made.tables.items()}
+            stretch = max(
+                deformed(curve.ring, drawing.rubber, curve.points[end].u).stretch
+                for curve in curves.values()
+                for end in (0, -1)
+            )
+            ledger.put(key, {**kept_tables, "coupling": made.coupling, "stretch": stretch})
         kept = ledger.get(key).values
-        return GasketStiffness(
-            {motion.name: _table(motion.rotates, kept[motion.name]) for motion in MOTIONS},
-            float(kept["coupling"]),
-        )
+        tables = {motion.name: _table(motion.rotates, kept[motion.name]) for motion in MOTIONS}
+        stiffness = GasketStiffness(tables, float(kept["coupling"]))
+        return Computed(stiffness, float(kept["stretch"]))
 
     def _text(self, levels: FloatArray) -> str:
         return ", ".join(
@@ -279,10 +339,12 @@ class GeometryTask(Task):
         )
 
     def _responses(
-        self, executor: Executor, levels: FloatArray, stiffness: Sequence[GasketStiffness]
+        self, executor: Executor, levels: FloatArray, computed: Sequence[Computed]
     ) -> dict[str, FloatArray]:
         """Return the responses of drawings: stiffness, then worst of all loads. (n,) each"""
-        machines = [self._machine(at, one) for at, one in zip(levels, stiffness, strict=True)]
+        machines = [
+            self._machine(at, one.stiffness) for at, one in zip(levels, computed, strict=True)
+        ]
         cases = [
             Case(case.name, case.load, case.profile, parameters=machine)
             for machine in machines
@@ -295,7 +357,7 @@ class GeometryTask(Task):
             return np.asarray(table[name].values, dtype=float).reshape(shape)
 
         slopes = {
-            name: np.array([one.tables[name].nominal_stiffness for one in stiffness])
+            name: np.array([one.stiffness.tables[name].nominal_stiffness for one in computed])
             for name in (motion.name for motion in MOTIONS)
         }
         force = np.linalg.norm(of_runs("gasket_force"), axis=-1)
@@ -307,6 +369,7 @@ class GeometryTask(Task):
             GAP: 1e3 * of_runs("smallest_gap").min(axis=(1, 2)),
             "largest_amplitude_mm": 1e3 * of_runs("amplitude").max(axis=(1, 2)),
             "largest_gasket_force_N": force.max(axis=1),
+            "largest_stretch": np.array([one.stretch for one in computed]),
         }
 
     def _machine(self, levels: FloatArray, stiffness: GasketStiffness) -> MachineParameters:

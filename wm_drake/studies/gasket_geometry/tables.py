@@ -45,6 +45,8 @@ def as_plain_data(result: GeometryResult) -> dict[str, Any]:
     shown = {
         "gasket": result.name,
         "loads": list(result.loads),
+        "limits": result.limits,
+        "keeps_limits": bool(result.keeps_limits),
         "degree": result.surfaces["smallest_gap_mm"].degree,
         "drawings": drawings_table(result).to_dict("records"),
         "contributions": contributions_table(result).to_dict("records"),
