@@ -47,12 +47,12 @@ WORSE = 0.5
 def main() -> None:
     """Calibrate to planted machines and print the coverage."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="two seeds and two starts")
+    parser.add_argument("--quick", action="store_true", help="one seed and one start")
     parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--out", type=Path, help="also write the result to this file")
     arguments = parser.parse_args()
-    starts = 2 if arguments.quick else CalibrateOptions.model_fields["starts"].default
-    seeds = range(2 if arguments.quick else arguments.seeds)
+    starts = 1 if arguments.quick else CalibrateOptions.model_fields["starts"].default
+    seeds = range(1 if arguments.quick else arguments.seeds)
     machine = build_machine(load_machine("reference"))
     free = _few(load_free(Path(__file__).with_name("reference_free.yaml")))
     parameter_map = parameter_map_of(machine, free)
