@@ -19,6 +19,11 @@ def drawing(*corners, bulk=500.0 * SHEAR, fillet=0.0):
     return GasketDrawing(meridian=tuple(points), rubber=Rubber(c1=C1, bulk_modulus=bulk))
 
 
+def bush(inner, outer, length, bulk=500.0 * SHEAR):
+    """Return a washer bonded at its inner and outer radius: a wall along the radius. [m]"""
+    return drawing((inner, 0.0, length), (outer, 0.0, length), bulk=bulk)
+
+
 def antisymmetric(ring):
     """Return the locked directions of half a ring for motions along z: x and y in the plane z = 0."""
     locked = np.zeros_like(ring.locked)

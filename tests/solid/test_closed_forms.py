@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rubber_walls import C1, SHEAR, antisymmetric, drawing
+from rubber_walls import C1, SHEAR, antisymmetric, bush, drawing
 
 from wm_drake.solid import curves, equilibrium
 from wm_drake.solid.curves import AXIAL, RADIAL, TILT, TWIST, Gasket, Mesh, curve
@@ -15,11 +15,6 @@ from wm_drake.solid.equilibrium import Solver
 from wm_drake.solid.mesh import half_ring, wedge
 
 YEOH = np.array([0.3e6, 0.05e6, 0.02e6])
-
-
-def bush(inner, outer, length, bulk=500.0 * SHEAR):
-    """Return a washer bonded at its inner and outer radius: a wall along the radius. [m]"""
-    return drawing((inner, 0.0, length), (outer, 0.0, length), bulk=bulk)
 
 
 def cube(rng, size=0.01):
