@@ -196,8 +196,9 @@ def test_record_can_be_loaded_and_agrees(plain):
 
 def test_table_of_amplitudes_agrees(plain):
     table = pd.read_csv(plain.folder / "out" / "amplitudes.csv")
-    assert list(table.columns) == ["load", "gasket", "source", *SENSORS]
+    assert list(table.columns) == ["load", "gasket", "source", *SENSORS, "band"]
     (computed,) = table[table["source"] == "wm_drake"].to_dict("records")
+    assert computed["band"] == "0.5 to 20 Hz"
     assert [computed[name] for name in SENSORS] == pytest.approx(
         list(plain.case["amplitudes_mm"].values()), abs=1e-4
     )

@@ -262,7 +262,7 @@ def test_everything_missing_is_several_lines(write):
     assert [problem.split(": ", 1)[1] for problem in problems] == [
         f"{key}: is missing"
         for key in (
-            "gravity", "sensors", "clearance", "loads", "profile",
+            "gravity", "sensors", "loads", "profile",
         )
     ]  # fmt: skip
 
@@ -338,3 +338,9 @@ def test_a_replaced_vector_keeps_its_own_source(write):
     assert again.bodies["drum"].centre_of_mass == (0.0, 0.05, 0.0)
     assert again.sources[key] == "fit: new"
     assert again.sources["bodies.drum.mass"] == machine.sources["bodies.drum.mass"]
+
+
+def test_without_clearance_the_point_of_the_first_sensor_counts(write, reference):
+    read = load_machine(write("extends: reference\nclearance: null\n"))
+    assert read.clearance_frame == "sensor_Xr"
+    assert reference.clearance_frame == "detergent_point"

@@ -51,6 +51,11 @@ def machine_check(
         raise InputError(unusual)
     for problem in unusual:
         typer.echo(f"warning: {problem}", err=True)
+    if not parameters.clearance:
+        say(
+            f"{file}: assumption: without 'clearance' the tub point nearest to the detergent box "
+            f"is frame '{parameters.clearance_frame}', that of the first sensor"
+        )
     say(f"{file}: machine '{parameters.name}' is valid")
 
 

@@ -274,7 +274,7 @@ class MachineSystems:
         else:
             residual = put_to_rest(self.plant, plant_context, layout, elements.at_rest())
             q = self.plant.GetPositions(plant_context)
-        parts = parameters.sensors, parameters.clearance, parameters.accelerometers
+        parts = parameters.sensors, parameters.clearance_frame, parameters.accelerometers
         points = poses.placed("points", parts, lambda: tub_points(poses, parameters))
         measured = measured_points(points, q[layout.tub])
         cabinet = None

@@ -114,4 +114,5 @@ def _attachments(
     for table in ("sensors", "accelerometers"):
         for name, sensor in getattr(parameters, table).items():
             yield f"{table}.{name}.frame", "tub", sensor.frame
-    yield "clearance.detergent_frame", "tub", parameters.clearance.detergent_frame
+    if parameters.clearance:
+        yield "clearance.detergent_frame", "tub", parameters.clearance.detergent_frame

@@ -44,7 +44,7 @@ class TubPoints:
 def tub_points(poses: FramePoses, parameters: MachineParameters) -> TubPoints:
     """Return the measured points of the tub."""
     sensors = {name: poses("tub", sensor.frame)[0] for name, sensor in parameters.sensors.items()}
-    detergent = poses("tub", parameters.clearance.detergent_frame)[0]
+    detergent = poses("tub", parameters.clearance_frame)[0]
     frames = parameters.accelerometer_frames()
     accelerometers = {name: poses("tub", frame)[0] for name, frame in frames.items()}
     axes = tuple(AXES.index(sensor.axis) for sensor in parameters.sensors.values())

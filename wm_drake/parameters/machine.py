@@ -178,7 +178,8 @@ class MachineParameters(Frozen):
         elements: Elements of kinds that other packages register, by name.
         sensors: Displacement sensors, by name.
         accelerometers: Vibration sensors, by name.
-        clearance: The point whose distance to the detergent box counts.
+        clearance: The point whose distance to the detergent box counts; by default that of the
+            first sensor.
         cabinet: The cabinet on its feet; null for no loads of the feet.
         unbalance_planes: Positions of the masses of a spin cycle.
         imperfections: Imperfections of the drum and its bearing.
@@ -209,7 +210,7 @@ class MachineParameters(Frozen):
     elements: dict[Name, AnyElement] = {}
     sensors: dict[Name, Sensor]
     accelerometers: dict[Name, Accelerometer] = {}
-    clearance: Clearance
+    clearance: Clearance | None = None
     cabinet: Cabinet | None = None
     unbalance_planes: UnbalancePlanes | None = None
     imperfections: Imperfections = Imperfections()
@@ -318,6 +319,15 @@ class MachineParameters(Frozen):
     def cabinet_moves(self) -> bool:
         """Whether the cabinet moves on its feet; else the housing is fixed."""
         return self.cabinet is not None and self.cabinet.moves
+
+    @property
+    def clearance_frame(self) -> str:
+        """Frame of the tub point whose distance to the detergent box counts.
+
+        A machine without `clearance` has the point of its first sensor, as an assumption.
+        """
+        first = next(iter(self.sensors.values()))
+        return self.clearance.detergent_frame if self.clearance else first.frame
 
     def accelerometer_frames(self) -> dict[str, str]:
         """Return the frame of each vibration sensor, by name.

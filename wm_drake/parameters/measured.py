@@ -18,6 +18,9 @@ if TYPE_CHECKING:  # slow to import: CSV files
 
 _KEYS = ["load", "gasket", "source"]
 
+BAND = "band"
+"""Optional last column of amplitudes: the pass band of the displacements."""
+
 OF = "of"
 """Column that only files of responses have. It says what a value belongs to."""
 
@@ -166,7 +169,7 @@ def _check_entries(table: "pd.DataFrame", column: str, allowed: tuple[str, str],
 
 
 def _read(path: str, sensors: list[str]) -> "pd.DataFrame":
-    table = read_csv(path, _KEYS + sensors, key="measured")
+    table = read_csv(path, _KEYS + sensors, key="measured", optional=BAND)
     _check_entries(table, "gasket", ("yes", "no"), path)
     values = finite_numbers(table[sensors], path, key="measured")
-    return table.assign(**dict(zip(sensors, values.T, strict=True)))
+    return table[_KEYS].assign(**dict(zip(sensors, values.T, strict=True)))

@@ -107,7 +107,7 @@ def _sensor_frames(parameters: MachineParameters) -> dict[str, str]:
     for name, sensor in parameters.sensors.items():
         names.setdefault(sensor.frame, []).insert(0, f"sensor {name}, along {sensor.axis}")
     return {
-        parameters.clearance.detergent_frame: "point whose distance to the detergent box counts",
+        parameters.clearance_frame: "point whose distance to the detergent box counts",
         **{frame: "; ".join(words) for frame, words in names.items()},
     }
 

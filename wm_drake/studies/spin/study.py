@@ -125,9 +125,9 @@ class SpinResult(Result):
     def tables(self) -> "dict[str, pd.DataFrame]":
         """Return the amplitudes, and of a machine with rings of balls what they do."""
         from wm_drake.studies.spin.balance import balance_frame, ball_table
-        from wm_drake.studies.spin.tables import amplitude_table
+        from wm_drake.studies.spin.tables import banded_amplitudes
 
-        tables = {"amplitudes": amplitude_table(self)}
+        tables = {"amplitudes": banded_amplitudes(self)}
         if rings_of(self.parameters) and any(c.record.sizes["time"] for c in self.results):
             tables |= {"balance": balance_frame(self), "balls": ball_table(self)}
         return tables

@@ -8,6 +8,7 @@ import pandas as pd
 import xarray as xr
 
 from wm_drake.parameters import Load, measured_amplitudes, quantities
+from wm_drake.parameters.measured import BAND
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report.formatting import (
     MM_PER_M,
@@ -76,6 +77,15 @@ def amplitude_table(result: SpinResult) -> pd.DataFrame:
             pd.DataFrame([{"load": case.case.name, "gasket": gasket, "source": OURS, **values}])
         )
     return pd.concat([part for part in parts if len(part)], ignore_index=True)
+
+
+def banded_amplitudes(result: SpinResult) -> pd.DataFrame:
+    """Return the amplitudes, and in the column `band` the pass band of each computed row."""
+    table = amplitude_table(result)
+    table.loc[table["source"] == OURS, BAND] = [
+        band_text(case).replace("–", " to ") for case in result.results
+    ]
+    return table.fillna({BAND: ""})
 
 
 def rows_of(table: pd.DataFrame, case: CaseResult) -> pd.DataFrame:
@@ -184,10 +194,13 @@ def variable_table(result: SpinResult, variable: Variable, decimals: int | None 
 
 def largest_values(result: SpinResult) -> Table:
     """Return D, F and M of [B] for each case."""
+    parameters = result.parameters
+    assumed = f" (assumption: frame {parameters.clearance_frame}, as the first sensor)"
     caption = (
         "D: largest displacement, from the rest position, of the tub point nearest to the "
-        "detergent box. F, M: largest force and moment of the gasket on the housing. All are the "
-        "largest absolute values over the whole run, for each axis."
+        f"detergent box{'' if parameters.clearance else assumed}. F, M: largest force and moment "
+        "of the gasket on the housing. All are the largest absolute values over the whole run, "
+        "for each axis."
     )
     header: Columns = (
         "load",

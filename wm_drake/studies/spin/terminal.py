@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import pandas as pd
 
 from wm_drake.parameters import MachineParameters
+from wm_drake.parameters.measured import BAND
 from wm_drake.parameters.units import Unit
 from wm_drake.report.table import Column, table_of
 from wm_drake.simulation.balance import balance_of
@@ -21,8 +22,10 @@ if TYPE_CHECKING:
 
 def amplitude_lines(title: str, amplitudes: pd.DataFrame) -> "Table":
     """Return amplitudes as a table for the terminal: words at the left, numbers at the right."""
-    columns = {str(name): Column(str(name), decimals=1) for name in amplitudes.columns}
-    return table_of(amplitudes, columns=columns).terminal(title)
+    bands = " and ".join(filter(None, amplitudes[BAND].unique()))
+    shown = amplitudes.drop(columns=BAND)
+    columns = {str(name): Column(str(name), decimals=1) for name in shown.columns}
+    return table_of(shown, columns=columns).terminal(f"{title}, {bands}")
 
 
 def case_lines(parameters: MachineParameters, case: CaseResult) -> list[str]:
