@@ -18,6 +18,7 @@ from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.cabinet import Cabinet
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.mounts import mount_names
+from wm_drake.simulation.netcdf import netcdf_bytes
 from wm_drake.simulation.outputs import AXES, branch_names, others_by_kind, variables_of
 
 Record: TypeAlias = xr.Dataset
@@ -127,7 +128,7 @@ def save_record(record: Record, path: Path) -> None:
         >>> path.exists()
         True
     """
-    path.write_bytes(record.to_netcdf(engine="h5netcdf"))
+    path.write_bytes(netcdf_bytes(record))
 
 
 def load_record(path: Path) -> Record:

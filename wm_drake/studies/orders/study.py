@@ -17,6 +17,7 @@ from wm_drake.parameters.lab_signals import SPEED as DRUM_SPEED
 from wm_drake.parameters.lab_signals import TIME_NAMES, available_channels, clock_of, on_clock
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report.formatting import RPM_PER_RAD_S, plain
+from wm_drake.simulation.netcdf import netcdf_bytes
 from wm_drake.simulation.orders import REVOLUTIONS, frequency_map, order_map
 from wm_drake.simulation.records import read_measured
 from wm_drake.studies.inputs import channels_of, existing_file
@@ -91,7 +92,7 @@ class Orders(Result):
         super().write(folder)
         maps = self.orders.assign_coords(signal=self.signals.names)
         maps.name, maps.attrs["units"] = "amplitude", self.signals.unit
-        maps.to_netcdf(folder / "orders.nc", engine="h5netcdf")
+        (folder / "orders.nc").write_bytes(netcdf_bytes(maps.to_dataset()))
 
     def as_json(self) -> dict[str, Any]:
         """Return the table by columns."""
