@@ -53,13 +53,7 @@ KINDS = {
     "comparison": _one("sections.html", "spin", "--compare-gasket", "--load", "middle", "--load", "front"),
     "rig_damper": _one("sections.html", "rig", "damper", *DAMPER, "-f", "1,10 Hz", "-a", "0.3,1 mm"),
     "rig_gasket": _one("sections.html", "rig", "gasket", "--axis", "axial", "--matrix", "A"),
-    "rig_bushing": _one("sections.html", "rig", "bushing", "--machine", "free_stroke", "--axis", "radial", "-f", "1,5 Hz", "-a", "1 mm"),
     "identify_damper": _fit("sections.html", ("damper", *DAMPER, "-f", "1,10 Hz", "-a", "0.3,1 mm"), "damper", "*"),
-    "identify_gasket": _fit(
-        "sections.html",
-        ("gasket", "--machine", "free_stroke", "--axis", "radial", "-f", "1,5 Hz", "-a", "1,10 mm"),
-        "gasket", "*", "--axis", "radial",
-    ),
     "identify_table": _fit(
         "sections.html", ("gasket", "--axis", "axial", "-f", "1,5 Hz", "-a", "1,10 mm"),
         "gasket", "*", "--axis", "axial", "--law", "table",

@@ -30,6 +30,10 @@ SLOWLY = [
     for name in STUDIES
 ]
 SHORTER["tolerance"] = [(*KINDS["tolerance"].commands[0], "--samples", "32", "--subset", "0")]
+SHORTER["gasket"] = [("study", "gasket", "--response", "D")]
+SHORTER["balancer"] = [
+    ("study", "balancer", "--place", "0 mm", "--damping", "100 %", "--rate", "80 rpm/s")
+]
 
 
 @pytest.fixture
