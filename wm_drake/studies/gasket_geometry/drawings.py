@@ -1,6 +1,7 @@
 """Drawings of a design: a drawing with changed wall, folds and hardness."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,9 @@ from pydantic import ValidationError
 from wm_drake.errors import input_error
 from wm_drake.parameters.gasket_drawing import GasketDrawing, MeridianPoint, Rubber
 from wm_drake.parameters.types import FloatArray
+
+FOLDS, MOST_FOLDS = "folds", 6
+"""Name of the factor that repeats the folds, and its largest value."""
 
 
 @dataclass(frozen=True)
@@ -20,6 +24,7 @@ class Factor:
         words: Words for reading.
         unit: Unit of its values.
         middle, half: Value of the drawing, and half the range.
+        values: The only values that it may have; empty if it has all of its range.
     """
 
     name: str
@@ -27,18 +32,42 @@ class Factor:
     unit: str
     middle: float
     half: float
+    values: tuple[float, ...] = ()
+
+    def levels(self, evenly: FloatArray) -> FloatArray:
+        """Return the levels of evenly distributed numbers from 0 to 1."""
+        if not self.values:
+            return 2.0 * evenly - 1.0
+        chosen = np.array(self.values)[(evenly * len(self.values)).astype(int)]
+        return np.asarray((chosen - self.middle) / self.half)
 
     def value(self, coded: float) -> float:
         """Return the value at a level from -1 to 1."""
         return self.middle + coded * self.half
 
 
-def factors_of(drawing: GasketDrawing) -> tuple[Factor, ...]:
+def factors_of(drawing: GasketDrawing, folds: Sequence[int] = (1,)) -> tuple[Factor, ...]:
     """Return the factors of a drawing.
 
+    Args:
+        drawing: The drawing.
+        folds: Numbers of repetitions of its folds; a factor if there are several.
+
     Raises:
-        InputError: the rubber is not given by its hardness.
+        InputError: the rubber is not given by its hardness, or a number is not allowed.
     """
+    numbers = sorted(set(folds))
+    if not numbers or not 1 <= numbers[0] <= numbers[-1] <= MOST_FOLDS:
+        raise input_error(f"allowed are numbers from 1 to {MOST_FOLDS}", where="--folds")
+    repeated: tuple[Factor, ...] = ()
+    if len(numbers) > 1:
+        ends = numbers[0], numbers[-1]
+        middle, half, values = (
+            0.5 * sum(ends),
+            0.5 * (ends[1] - ends[0]),
+            tuple(map(float, numbers)),
+        )
+        repeated = (Factor(FOLDS, "folds of the drawing repeated", "times", middle, half, values),)
     if drawing.rubber.shore_a is None:
         raise input_error(
             "needs shore_a: the hardness is a factor of this study", key="rubber.shore_a"
@@ -48,6 +77,7 @@ def factors_of(drawing: GasketDrawing) -> tuple[Factor, ...]:
         Factor("depth", "depth of folds, of that of the drawing", "%", 100.0, 12.0),
         Factor("fillet", "radius of folds, of that of the drawing", "%", 92.0, 8.0),
         Factor("hardness", "hardness", "Shore A", drawing.rubber.shore_a, 6.0),
+        *repeated,
     )
 
 
@@ -104,6 +134,8 @@ def changed(
         InputError: the drawing cannot be built there.
     """
     values = [factor.value(float(level)) for factor, level in zip(factors, coded, strict=True)]
+    if len(values) > 4:
+        drawing = with_folds(drawing, round(values[4]))
     thickness, depth, fillet = (0.01 * value for value in values[:3])
     places = np.array([(point.radius, point.y) for point in drawing.meridian])
     along = places[-1] - places[0]

@@ -20,8 +20,11 @@ class GeometryOptions(Options):
     )
     drawings: int = option(27, "Drawings of the design.", "N", ge=6, le=400)
     fresh: int = option(4, "Fresh drawings that test the response surfaces.", "N", ge=2, le=100)
-    folds: int = option(
-        1, "Times that the folds of the drawing are repeated, each narrower.", "N", ge=1, le=6
+    folds: tuple[int, ...] = option(
+        (1,),
+        "Times that the folds of the drawing are repeated, each narrower, 1 to 6. Repeat it to "
+        "make the number of folds a factor.",
+        "N",
     )
     limit: tuple[str, ...] = option(
         (),

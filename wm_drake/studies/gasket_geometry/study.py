@@ -1,7 +1,7 @@
 """The study: a design of drawings, finite elements of each, runs, surfaces, the best drawing."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,7 +29,13 @@ from wm_drake.studies.gasket_curves.machine import (
     with_gasket,
 )
 from wm_drake.studies.gasket_curves.study import curve_values, positive
-from wm_drake.studies.gasket_geometry.drawings import Factor, changed, factors_of, with_folds
+from wm_drake.studies.gasket_geometry.drawings import (
+    FOLDS,
+    Factor,
+    changed,
+    factors_of,
+    with_folds,
+)
 from wm_drake.studies.gasket_geometry.options import GeometryOptions
 from wm_drake.studies.gasket_geometry.surface import Surface, fit
 from wm_drake.studies.inputs import pairs_of, selected_cases
@@ -87,6 +93,7 @@ class GeometryResult(Result):
         best: The drawing whose runs have the largest gap.
         loads: Names of the loads.
         limits: Largest values of responses that the best drawing may have.
+        sample: Levels that are distributed as those of the design. (m, factors)
     """
 
     name: str
@@ -98,6 +105,7 @@ class GeometryResult(Result):
     best: GasketDrawing
     loads: tuple[str, ...]
     limits: dict[str, float]
+    sample: FloatArray
 
     @property
     def kinds(self) -> list[str]:
@@ -228,9 +236,10 @@ class GeometryTask(Task):
             raise input_error(
                 "the machine has no gasket, whose frames the new one takes", key="machine"
             )
-        self.drawing = with_folds(load_gasket_drawing(options.file), options.folds)
-        self.limits = limits_of(options.limit)
-        self.factors = factors_of(self.drawing)
+        self.drawing, self.limits = load_gasket_drawing(options.file), limits_of(options.limit)
+        self.factors = factors_of(self.drawing, options.folds)
+        if len(set(options.folds)) == 1:
+            self.drawing = with_folds(self.drawing, options.folds[0])
         self.cases = selected_cases(self.machine, options.load, True, options.profile)
         self.frequency = positive(options.frequency, Unit("Hz", "Hz"), "--frequency")
         self.values = {
@@ -242,9 +251,29 @@ class GeometryTask(Task):
         self.mesh = Mesh(options.elements, options.around)
         sampler = LatinHypercube(len(self.factors), rng=options.seed)
         parts = [sampler.random(count) for count in (options.drawings, options.fresh, CANDIDATES)]
-        self.design, self.fresh, self.candidates = (2.0 * part - 1.0 for part in parts)
+        self.design, self.fresh, self.candidates = (
+            np.column_stack([
+                factor.levels(column) for factor, column in zip(self.factors, part.T, strict=True)
+            ])
+            for part in parts
+        )  # fmt: skip
         for levels in (*self.design, *self.fresh):
-            Gasket(changed(self.drawing, self.factors, levels), self.mesh)
+            self._gasket(levels)
+
+    def _mesh(self, levels: FloatArray) -> Mesh:
+        """Return the mesh of a drawing: more elements along the meridian for more folds."""
+        values = {factor.name: factor.value(float(level))
+                  for factor, level in zip(self.factors, levels, strict=True)}  # fmt: skip
+        times = round(values.get(FOLDS, max(self.options.folds)))
+        return replace(self.mesh, meridian=times * self.mesh.meridian)
+
+    def _gasket(self, levels: FloatArray) -> Gasket:
+        """Return the gasket of a drawing.
+
+        Raises:
+            InputError: the drawing cannot be built.
+        """
+        return Gasket(changed(self.drawing, self.factors, levels), self._mesh(levels))
 
     @property
     def identity(self) -> dict[str, Any]:
@@ -252,6 +281,7 @@ class GeometryTask(Task):
         options = self.options
         return {
             "drawing": self.drawing,
+            "folds": sorted(set(self.options.folds)),
             "mesh": self.mesh,
             "values": self.values,
             "profile": self.cases[0].profile,
@@ -288,6 +318,7 @@ class GeometryTask(Task):
             changed(self.drawing, self.factors, levels[ranked(every, self.limits)[0]]),
             tuple(case.name for case in self.cases),
             self.limits,
+            self.candidates,
         )
 
     def _best(self, surfaces: dict[str, Surface]) -> FloatArray:
@@ -295,7 +326,7 @@ class GeometryTask(Task):
         expected = {name: surface.at(self.candidates) for name, surface in surfaces.items()}
         for at in ranked(expected, self.limits):
             try:
-                Gasket(changed(self.drawing, self.factors, self.candidates[at]), self.mesh)
+                self._gasket(self.candidates[at])
             except WmDrakeError:
                 continue
             return np.asarray(self.candidates[at])
@@ -307,10 +338,10 @@ class GeometryTask(Task):
         Raises:
             WmDrakeError: a curve ends early.
         """
-        drawing = changed(self.drawing, self.factors, levels)
-        key = key_of(drawing=drawing, mesh=self.mesh, values=self.values, sources=sources_version())
+        drawing, mesh = changed(self.drawing, self.factors, levels), self._mesh(levels)
+        key = key_of(drawing=drawing, mesh=mesh, values=self.values, sources=sources_version())
         if key not in ledger:
-            gasket, curves = Gasket(drawing, self.mesh), {}
+            gasket, curves = Gasket(drawing, mesh), {}
             for motion in MOTIONS:
                 curve = gasket.curve(motion, self.values[motion.name], lambda _: None)
                 if curve.stopped:

@@ -42,25 +42,30 @@ class Surface:
         """Return the response at levels. (n, factors) to (n,)"""
         return np.asarray(basis(levels, self.degree) @ self.coefficients)
 
-    def contributions(self) -> FloatArray:
+    def contributions(self, sample: FloatArray) -> FloatArray:
         """Return the part of each factor in the variance, and that of all pairs. (factors + 1,)
 
-        The variance is that for levels evenly distributed from -1 to 1: the polynomials are
-        orthogonal, and their mean squares are 1/3, 1/5 and 1/9.
+        Args:
+            sample: Levels over which the variance is taken. (n, factors)
         """
-        count, squares = self.factors, self.coefficients[1:] ** 2
-        main = squares[:count] / 3.0
-        pairs = 0.0
+        count, terms = self.factors, basis(sample, self.degree) * self.coefficients
+        main = terms[:, 1 : count + 1]
         if self.degree == 2:
-            main = main + squares[count : 2 * count] / 5.0
-            pairs = float(squares[2 * count :].sum()) / 9.0
-        total = float(main.sum()) + pairs
-        return np.append(main, pairs) / total if total else np.zeros(count + 1)
+            main = main + terms[:, count + 1 : 2 * count + 1]
+        pairs = terms[:, 2 * count + 1 :].sum(axis=1) if self.degree == 2 else np.zeros(len(terms))
+        parts = np.append(main.var(axis=0), pairs.var())
+        total = float(parts.sum())
+        return parts / total if total else parts
 
 
 def fit(levels: FloatArray, response: FloatArray) -> Surface:
-    """Return the least-squares surface of runs at levels (n, factors)."""
+    """Return the least-squares surface of runs at levels (n, factors).
+
+    The square of a factor with two levels is constant: it has the coefficient 0.
+    """
     terms = basis(levels[:1], 2).shape[1]
     degree = 2 if len(levels) >= terms + SPARE else 1
-    coefficients = np.linalg.lstsq(basis(levels, degree), response, rcond=None)[0]
+    columns = basis(levels, degree)
+    columns[:, 1:] *= np.ptp(columns[:, 1:], axis=0) > 1e-12
+    coefficients = np.linalg.lstsq(columns, response, rcond=None)[0]
     return Surface(levels.shape[1], degree, np.asarray(coefficients))

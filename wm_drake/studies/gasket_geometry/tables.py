@@ -26,8 +26,8 @@ def contributions_table(result: GeometryResult) -> pd.DataFrame:
     rows = []
     for name in RESPONSES:
         surface = result.surfaces[name]
-        parts = 100.0 * surface.contributions()
-        row: dict[str, Any] = {"response": name, "mean": float(surface.coefficients[0])}
+        parts = 100.0 * surface.contributions(result.sample)
+        row: dict[str, Any] = {"response": name, "mean": float(surface.at(result.sample).mean())}
         for number, factor in enumerate(result.factors):
             ends = np.zeros((2, len(result.factors)))
             ends[:, number] = -1.0, 1.0
