@@ -344,3 +344,10 @@ def test_without_clearance_the_point_of_the_first_sensor_counts(write, reference
     read = load_machine(write("extends: reference\nclearance: null\n"))
     assert read.clearance_frame == "sensor_Xr"
     assert reference.clearance_frame == "detergent_point"
+
+
+def test_repr_leaves_out_what_has_its_default(reference):
+    shown = repr(reference.gasket)
+    assert "stiffness_x=2180.0" in shown
+    assert "maxwell" not in shown
+    assert len(shown) < 500

@@ -5,6 +5,7 @@ import pytest
 import xarray as xr
 from scipy.signal import find_peaks
 
+import wm_drake as wm
 from wm_drake.parameters import SpinProfile
 from wm_drake.simulation.displacements import (
     envelopes,
@@ -179,3 +180,13 @@ def test_replay_shows_the_stretch_around_the_largest_motion():
     assert np.diff(times).max() < 0.04  # s
     alone, _ = largest_motion(record_of([0.0]))
     assert alone.tolist() == [0.0]
+
+
+def test_measures_are_a_table_in_units_for_reading(machine):
+    measures = measure(wm.simulate(machine, "middle"))
+    rows = measures.to_dataframe().set_index(["measure", "of"])
+    assert rows.value["amplitude", "Xr"] == 1e3 * measures.amplitude.sel(sensor="Xr")
+    assert rows.unit["amplitude", "Xr"] == "mm"
+    assert "<td>Xr</td>" in measures._repr_html_()
+    bars = measures.plot().patches
+    assert [bar.get_height() for bar in bars] == pytest.approx(1e3 * measures.amplitude.values)

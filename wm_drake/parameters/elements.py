@@ -1,6 +1,7 @@
 """Springs, dampers, bushings of a machine: frozen, SI; fields are the keys of the machine file."""
 
 import itertools
+from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
 import numpy as np
@@ -17,6 +18,13 @@ class Frozen(BaseModel):
     model_config = ConfigDict(
         frozen=True, extra="forbid", json_schema_serialization_defaults_required=True
     )
+
+    def __repr_args__(self) -> Iterator[tuple[str | None, Any]]:
+        """Yield what differs from its default: a gasket has 57 numbers, most of which are zero."""
+        fields = type(self).model_fields
+        for name, value in super().__repr_args__():
+            if name not in fields or value != fields[name].default:
+                yield name, value
 
 
 LINEAR_PART = 0.2

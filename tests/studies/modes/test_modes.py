@@ -290,6 +290,9 @@ def test_friction_damps_a_mode_as_the_energy_of_a_cycle_says():
 
 def test_modes_of_the_reference_machine(machine):
     result = wm.modes(machine, "middle", amplitude=1e-4)
+    sliding = result.to_dataframe().query("linearisation == 'sliding'")
+    assert sliding["mode"].tolist() == [mode.name for mode in result.modes["sliding"]]
+    assert repr(result).startswith("<Modes of 'reference', sliding friction: sway 1.")
     assert len(result.modes[STUCK]) == len(result.modes[SLIDING]) == 6
     stuck = {mode.name: mode for mode in result.modes[STUCK]}
     for value in result.at_amplitude:  # a tenth of a millimetre: friction still sticks

@@ -3,7 +3,7 @@
 import functools
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -13,6 +13,7 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cabinet import Walk, walk
 from wm_drake.simulation.drive import DriveMeasures, drive_measures
 from wm_drake.simulation.feet import FootLoads, foot_loads
+from wm_drake.simulation.measures.as_json import labelled_values
 from wm_drake.simulation.measures.kind import Measure
 from wm_drake.simulation.measures.registry import MEASURES
 from wm_drake.simulation.measures.run import FeetLoaded, Need, Run
@@ -23,6 +24,9 @@ from wm_drake.simulation.outputs import AXES
 from wm_drake.simulation.records import Record, cabinet_in, profile_of, sample_period
 from wm_drake.simulation.spring_tension import smallest_tensions
 from wm_drake.simulation.vibration import tub_motion_of
+
+if TYPE_CHECKING:  # slow to import
+    import pandas as pd
 
 _VARIABLES: dict[Need, tuple[str, ...]] = {
     "sensors": ("displacement",),
@@ -62,6 +66,35 @@ class Measures:
         if name.startswith("__") or name not in self.table:
             raise AttributeError(f"there is no measure '{name}'")
         return self.table[name]
+
+    def to_dataframe(self) -> "pd.DataFrame":
+        """Return a row for each number: measure, what it is of, value, unit for reading.
+
+        Example:
+            >>> import wm_drake as wm
+            >>> table = wm.measure(wm.simulate("reference", "middle")).to_dataframe()
+            >>> table.loc[0, ["measure", "of", "unit"]].tolist()
+            ['detergent_displacement', 'x', 'mm']
+        """
+        import pandas as pd  # slow to import
+
+        rows = [
+            (variable.name, " ".join(labels), value, variable.unit_text)
+            for measure in MEASURES.values()
+            for variable in measure.variables
+            if variable.name in self.table
+            for labels, value in labelled_values(self.table, variable)
+        ]
+        return pd.DataFrame(rows, columns=["measure", "of", "value", "unit"])
+
+    def plot(self) -> Any:
+        """Return bars of the amplitudes at the sensors, drawn with matplotlib."""
+        table = self.to_dataframe()
+        return table[table.measure == "amplitude"].plot.bar("of", "value", ylabel="amplitude, mm")
+
+    def _repr_html_(self) -> str:
+        """Return the table for a notebook."""
+        return str(self.to_dataframe().to_html(index=False, max_rows=60))
 
     @property
     def values(self) -> list[FloatArray]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -20,6 +21,9 @@ from wm_drake.studies.modes.linearisation import MODES, Linearisation, Spectrum
 from wm_drake.studies.modes.sensitivity import Sensitivity, numbers_of, sensitivities
 from wm_drake.studies.modes.shapes import Mode, modes_of
 from wm_drake.studies.threads import on_one_thread
+
+if TYPE_CHECKING:  # slow to import
+    import pandas as pd
 
 STUCK, SLIDING, AMPLITUDE = "stuck", "sliding", "amplitude"
 """Linearisations.
@@ -70,7 +74,7 @@ class NaturalModes:
     at_amplitude: list[AmplitudeValue]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class MachineModes(NaturalModes):
     """All modes of a machine.
 
@@ -99,6 +103,30 @@ class MachineModes(NaturalModes):
     def critical_speeds(self) -> FloatArray:
         """Return the speeds at which the unbalance meets a mode with sliding friction. [rad/s]"""
         return np.array([c.speed for c in self.critical[SLIDING] if c.order == 1.0])
+
+    def to_dataframe(self) -> "pd.DataFrame":
+        """Return a row for each mode of each linearisation, in units for reading."""
+        from wm_drake.studies.modes.page import modes_frame
+
+        return modes_frame(self)
+
+    def plot(self) -> Any:
+        """Return the Campbell diagram, drawn with matplotlib; a notebook shows it."""
+        from wm_drake.report.drawing import matplotlib_of
+        from wm_drake.studies.modes.figures import campbell_figure
+
+        return matplotlib_of(campbell_figure(self))
+
+    def _repr_html_(self) -> str:
+        """Return the table of modes for a notebook."""
+        return str(self.to_dataframe().to_html(index=False))
+
+    def __repr__(self) -> str:
+        """Return frequencies and damping ratios of the modes with sliding friction, in one line."""
+        shown = (
+            f"{m.name} {m.frequency_hz:.2f} Hz ({m.damping_ratio:.3f})" for m in self.modes[SLIDING]
+        )
+        return f"<Modes of '{self.parameters.name}', sliding friction: {', '.join(shown)}>"
 
 
 @on_one_thread
