@@ -12,19 +12,36 @@ bearing housings with the curve that the paper computed and with the points that
 import argparse
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from compare_ball_balancer import PLANE
 
 import wm_drake as wm
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report.drawing import matplotlib_of
-from wm_drake.report.figure import MEASURED, OURS, QUIET, Axis, Figure, Line, Panel, Points
+from wm_drake.report.figure import (
+    MEASURED,
+    OURS,
+    QUIET,
+    Axis,
+    Figure,
+    Line,
+    Mark,
+    Panel,
+    Points,
+    Text,
+    in_grid,
+)
 from wm_drake.studies.modes.study import SLIDING, MachineModes
 
 HERE = Path(__file__).parent
+BASE = -100.0
+"""Height at which the drawn supports stand. [mm]"""
+ALL_ROUND = np.linspace(0.0, 2.0 * np.pi, 80)
 LOAD, HOLDS = "washers_3", 20
 COMPUTED, MEASURED_RPM = (1457.5, 1700.0, 1917.5, 2280.0), (1415.0, 1675.0, 1944.0, 2310.0)
 MARKS = "<!-- rig: begin -->", "<!-- rig: end -->"
@@ -121,6 +138,73 @@ def figure(
     ]
     x, y = Axis(label="speed, rpm"), Axis(label="A_max, mm", is_log=True)
     return Figure(panels=(Panel(marks=tuple(marks), x=x, y=y),), height=420.0)
+
+
+def frames_figure(machine: Machine) -> Figure:
+    """Return the rig from the side and from the front, with the frames of the machine file."""
+    places = {k: 1e3 * p for k, p in machine.set_up(LOAD).points.accelerometers.items()}
+    ring = 1e3 * PLANE
+    grey, outline = {"color": QUIET, "width": 1.5}, {"color": OURS, "width": 2.0}
+    side: list[Mark] = [
+        box(-180.0, 140.0, 8.0, **outline),
+        box(ring - 5.0, ring + 5.0, 50.0, **outline),
+        Line((-190.0, 150.0), (BASE, BASE), **grey),
+        Points((0.0,), (0.0,), color="#1a1a1a", size=7.0),
+        label(52.0, 14.0, "To: centre of mass C"),
+        label(ring, -56.0, f"balls, y = {ring:g} mm"),
+    ]
+    for name, place in places.items():
+        side += [
+            box(place[1] - 7.0, place[1] + 7.0, 20.0, color=MEASURED, width=2.0),
+            spring(place[1], -20.0, BASE, is_upright=True),
+            label(place[1], 26.0, f"{name}, y = {place[1]:g} mm"),
+            label(place[1], BASE - 10.0, f"support_{name[-1]}"),
+        ]
+    turn = np.linspace(0.25, 1.2, 30)
+    front: list[Mark] = [
+        *(Line(r * np.sin(ALL_ROUND), r * np.cos(ALL_ROUND), **outline) for r in (8.0, 50.0)),
+        Line(60.0 * np.sin(turn), 60.0 * np.cos(turn), color="#1a1a1a", width=1.5),
+        Points((60.0 * np.sin(turn[-1]),), (60.0 * np.cos(turn[-1]),), color="#1a1a1a", size=6.0),
+        label(62.0, 62.0, "positive speed"),
+        spring(0.0, -50.0, BASE, is_upright=True),
+        spring(0.0, 50.0, -BASE, is_upright=False),
+        label(0.0, BASE - 10.0, "stiffness_z"),
+        label(-BASE - 20.0, -14.0, "stiffness_x"),
+    ]
+    up = Axis(label="z, mm (X of the rig)", range=(-120.0, 80.0))
+    axes = [
+        (Axis(label="y, mm (axis Z of the rig)", range=(-200.0, 160.0)), up),
+        (Axis(label="x, mm (Y of the rig)", range=(-60.0, 140.0)), up),
+    ]
+    panels = [
+        Panel(title=title, marks=tuple(marks), x=x, y=y, is_square=True)
+        for title, marks, (x, y) in zip(
+            ("from the side", "from the front"),
+            (side, front),
+            axes,
+            strict=True,
+        )
+    ]
+    return Figure(panels=in_grid(panels, 2), height=300.0, widths=(1.8, 1.0))
+
+
+def box(left: float, right: float, reach: float, **look: Any) -> Line:
+    """Return a rectangle around the axis, `reach` up and down."""
+    x, y = (left, right, right, left, left), (-reach, -reach, reach, reach, -reach)
+    return Line(x, y, **look)
+
+
+def spring(at: float, begin: float, end: float, *, is_upright: bool) -> Line:
+    """Return a zigzag from a begin to an end, upright or across."""
+    along = np.linspace(begin, end, 12)
+    aside = at + 4.0 * np.array([0.0, 0.0, *[1.0, -1.0] * 4, 0.0, 0.0])
+    x, y = (aside, along) if is_upright else (along, aside)
+    return Line(x, y, color=QUIET, width=1.5)
+
+
+def label(x: float, y: float, text: str) -> Text:
+    """Return a text at a place of a drawing."""
+    return Text(x, y, text, size=11.0)
 
 
 def tables(
@@ -257,6 +341,7 @@ def main() -> None:
         after = rest.partition(MARKS[1])[2]
         arguments.page.write_text(f"{before}{MARKS[0]}\n\n{text}\n\n{MARKS[1]}{after}")
         pictures = {
+            "rotor_rig_frames.png": frames_figure(machine),
             "rotor_rig.png": figure(steady, runs["up"], paper, measured),
             "rotor_rig_campbell.png": campbell_figure(found),
         }
