@@ -104,6 +104,22 @@ def test_half_a_ring_has_the_contact_of_a_wedge(bellows):
     assert len(parts[1].in_column(2).rows) == len(parts[0].rows)
 
 
+def test_equilibrium_of_half_a_ring_with_contact_is_that_of_a_wedge(bellows):
+    """Also the unknowns that are numbered cut by cut while folds touch."""
+    ends = []
+    for ring in (wedge(bellows, 12), half_ring(bellows, 12, 3)):
+        solver, solved = Solver(ring, bellows.rubber, True), None
+        for value in (-0.01, -0.02, -0.03, -0.035, -0.04):
+            rim = AXIAL.of_rim(ring, value)
+            start = solved or solver.at_rest()
+            for part in np.linspace(0.25, 1.0, 4):
+                between = start.u[ring.moved] + part * (rim - start.u[ring.moved])
+                solved = solver.solve(between, solved or start)
+        assert solver.touching(solved.u) is not None
+        ends.append((ring.copies * solved.forces[ring.moved, 1].sum(), solved.energy))
+    assert ends[1] == pytest.approx(ends[0], rel=5e-3)
+
+
 def test_a_bellows_stiffens_as_its_folds_touch(bellows):
     """Work is energy, the folds stay apart within 5 % of the wall, both halves are alike."""
     ring = wedge(bellows, 16)
