@@ -38,7 +38,7 @@ COMMANDS = {
     "spin": ("spin", "--load", "middle", "--json"),
     "compared": ("spin", "--load", "middle", "--compare-gasket", "--json"),
     "gasket": ("study", "gasket", "--load", "middle", "--trials", "24", "--model", "main", "--response", NAME, "--json"),
-    "tolerance": ("study", "tolerance", "friction.yaml", "--samples", "64", "--sensitivity", "0",
+    "tolerance": ("study", "tolerance", "friction.yaml", "--samples", "64", "--sensitivity", "0", "--subset", "0",
                   "--response", NAME, "--limits", "limits.yaml", "--json"),
     "design": ("study", "design", "design.yaml", "--evaluations", "16", "--population", "8", "--json"),
 }  # fmt: skip
