@@ -45,7 +45,7 @@ def geometry_page(result: GeometryResult, facts: Facts) -> str:
         ],
         made,
         warnings=(*facts.warnings, *result.warnings()),
-        about="Wall thickness, depth and radius of folds, hardness: what moves the tub least.",
+        about="Wall, folds, hardness: which drawing leaves the largest gap.",
         method=METHOD,
     ).html()
 
