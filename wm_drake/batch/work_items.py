@@ -117,6 +117,7 @@ class Preparation:
         self._context: Context | None = None
         self._drawn: list[tuple[object, DrawnBodies]] = []
         self._known_bodies: dict[tuple[Load, ...], FloatArray] = {}
+        self._have_place: set[tuple[SpinProfile, float]] = set()
         self._known_numbers: dict[tuple[_Identity, bool, SpinProfile], PackedParameters] = {}
 
     def batches(self, cases: Iterable[Case]) -> Iterator[tuple[BatchKey, list[WorkItem]]]:
@@ -174,7 +175,9 @@ class Preparation:
             if len(self._known_numbers) >= KEPT_NUMBERS:
                 del self._known_numbers[next(iter(self._known_numbers))]
             period = (case.parameters or self.machine.parameters).output_period
-            check_size(case.profile, self.step, period, self.at_once)
+            if (case.profile, period) not in self._have_place:  # reads files of the system
+                check_size(case.profile, self.step, period, self.at_once)
+                self._have_place.add((case.profile, period))
             empty = self._bodies(case.parameters or self.machine.parameters, None)
             setup = self._set_up(case)
             elements, layout = pack_elements(setup)
