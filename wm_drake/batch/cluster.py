@@ -219,6 +219,31 @@ def simulate_on_cluster(
     return as_table(machine.parameters, distinct, rows)
 
 
+def map_on_cluster(
+    function: Callable[[Any], Any], items: Iterable[Any], client: Any
+) -> Iterator[tuple[int, Any]]:
+    """Yield number and result of a function for each item, as they end on a cluster.
+
+    Args:
+        function: Function at the level of a module.
+        items: Its arguments.
+        client: Client of the cluster, from `cluster_client`.
+
+    Raises:
+        WmDrakeError: as for `simulate_on_cluster`, or raised by the function.
+    """
+    from distributed import as_completed
+
+    with _cluster_errors():
+        sent = client.map(function, list(items), pure=False, retries=RETRY_LIMIT)
+        numbers = {future.key: number for number, future in enumerate(sent)}
+        try:
+            for future in _as_they_end(as_completed(sent, loop=client.loop), client):
+                yield numbers[future.key], future.result()
+        finally:
+            client.cancel(sent)
+
+
 def _as_they_end(running: Any, client: Any) -> Iterator[Any]:
     """Yield the work items of a cluster as they end, as long as the cluster has workers.
 

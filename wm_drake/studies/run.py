@@ -134,6 +134,22 @@ class Executor:
         with progress_bar(len(listed), what) as report:
             return self._run(machine, measures, listed, report)
 
+    def each(
+        self, function: Callable[[Any], Any], items: Sequence[Any]
+    ) -> Iterator[tuple[int, Any]]:
+        """Yield number and result of a function for each item, as they end: here or on a cluster.
+
+        Args:
+            function: Function at the level of a module, for work that is no run of a machine.
+            items: Its arguments.
+        """
+        if self.client is None:
+            yield from ((number, function(item)) for number, item in enumerate(items))
+            return
+        from wm_drake.batch.cluster import map_on_cluster
+
+        yield from map_on_cluster(function, items, self.client)
+
     def records(
         self,
         machine: "Machine",

@@ -68,5 +68,4 @@ GASKET_GEOMETRY = Study(
         "twist": "0.5 deg",
         "tilt": "0.2 deg",
     },
-    has_cluster=False,
 )

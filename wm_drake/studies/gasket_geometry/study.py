@@ -1,6 +1,6 @@
 """The study: a design of drawings, finite elements of each, runs, surfaces, the best drawing."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from wm_drake.batch import sources_version
-from wm_drake.batch.ledger import Ledger, key_of
+from wm_drake.batch.ledger import key_of
 from wm_drake.errors import WmDrakeError, input_error
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
@@ -220,6 +220,31 @@ def drawing_tree(drawing: GasketDrawing) -> dict[str, Any]:
     return tree if drawing.contact else tree | {"contact": False}
 
 
+def computed_curves(
+    work: tuple[GasketDrawing, Mesh, Mapping[str, Sequence[float]]],
+) -> dict[str, Any] | str:
+    """Return tables, coupling and largest stretch of a drawing; the reason if a curve ends early.
+
+    Args:
+        work: Drawing, mesh, and ends of the motion by name.
+    """
+    drawing, mesh, values = work
+    gasket, curves = Gasket(drawing, mesh), {}
+    for motion in MOTIONS:
+        curve = gasket.curve(motion, values[motion.name], lambda _: None)
+        if curve.stopped:
+            return curve.stopped
+        curves[motion.name] = curve
+    made = stiffness_of(curves)
+    stretch = max(
+        deformed(curve.ring, drawing.rubber, curve.points[end].u).stretch
+        for curve in curves.values()
+        for end in (0, -1)
+    )
+    tables = {name: np.array(table.curve) for name, table in made.tables.items()}
+    return {**tables, "coupling": made.coupling, "stretch": stretch}
+
+
 class GeometryTask(Task):
     """The study with checked options."""
 
@@ -293,18 +318,15 @@ class GeometryTask(Task):
         """Compute all drawings, fit the surfaces, and verify the best drawing."""
         assert executor.ledger is not None
         levels = np.concatenate([self.design, self.fresh])
-        computed = []
         with executor.progress(len(levels), "drawings") as progress:
-            for number, at in enumerate(levels):
-                computed.append(self._computed(executor.ledger, at))
-                progress(number + 1)
+            computed = self._all_computed(executor, levels, progress)
         responses = self._responses(executor, levels, computed)
         count = len(self.design)
         surfaces = {
             name: fit(self.design, response[:count]) for name, response in responses.items()
         }
         proposed = self._best(surfaces)
-        made = self._computed(executor.ledger, proposed)
+        (made,) = self._all_computed(executor, proposed[None], lambda _: None)
         verified = self._responses(executor, proposed[None], [made])
         levels = np.vstack([levels, proposed])
         every = {name: np.concatenate([responses[name], verified[name]]) for name in responses}
@@ -332,36 +354,44 @@ class GeometryTask(Task):
             return np.asarray(self.candidates[at])
         raise WmDrakeError("no drawing of the range can be built")
 
-    def _computed(self, ledger: Ledger, levels: FloatArray) -> Computed:
-        """Return what the curves of a drawing give, from the ledger if it has them.
+    def _all_computed(
+        self, executor: Executor, levels: FloatArray, progress: Callable[[int], None]
+    ) -> list[Computed]:
+        """Return what the curves of drawings give, from the ledger where it has them.
 
         Raises:
             WmDrakeError: a curve ends early.
         """
-        drawing, mesh = changed(self.drawing, self.factors, levels), self._mesh(levels)
-        key = key_of(drawing=drawing, mesh=mesh, values=self.values, sources=sources_version())
-        if key not in ledger:
-            gasket, curves = Gasket(drawing, mesh), {}
-            for motion in MOTIONS:
-                curve = gasket.curve(motion, self.values[motion.name], lambda _: None)
-                if curve.stopped:
-                    raise WmDrakeError(
-                        f"{curve.stopped}, in the drawing with {self._text(levels)}; choose "
-                        "smaller ranges of motion. Finished drawings are kept"
-                    )
-                curves[motion.name] = curve
-            made = stiffness_of(curves)
-            kept_tables = {name: np.array(table.curve) for name, table in made.tables.items()}
-            stretch = max(
-                deformed(curve.ring, drawing.rubber, curve.points[end].u).stretch
-                for curve in curves.values()
-                for end in (0, -1)
-            )
-            ledger.put(key, {**kept_tables, "coupling": made.coupling, "stretch": stretch})
-        kept = ledger.get(key).values
-        tables = {motion.name: _table(motion.rotates, kept[motion.name]) for motion in MOTIONS}
-        stiffness = GasketStiffness(tables, float(kept["coupling"]))
-        return Computed(stiffness, float(kept["stretch"]))
+        ledger = executor.ledger
+        assert ledger is not None
+        sources = sources_version()
+        works = [
+            (changed(self.drawing, self.factors, at), self._mesh(at), self.values) for at in levels
+        ]
+        keys = [
+            key_of(drawing=drawing, mesh=mesh, values=values, sources=sources)
+            for drawing, mesh, values in works
+        ]
+        missing = [number for number, key in enumerate(keys) if key not in ledger]
+        done = len(keys) - len(missing)
+        progress(done)
+        for place, made in executor.each(computed_curves, [works[number] for number in missing]):
+            if isinstance(made, str):
+                raise WmDrakeError(
+                    f"{made}, in the drawing with {self._text(levels[missing[place]])}; choose "
+                    "smaller ranges of motion. Finished drawings are kept"
+                )
+            ledger.put(keys[missing[place]], made)
+            done += 1
+            progress(done)
+        return [self._kept(ledger.get(key).values) for key in keys]
+
+    @staticmethod
+    def _kept(values: Mapping[str, Any]) -> Computed:
+        """Return what the ledger has of a drawing."""
+        tables = {motion.name: _table(motion.rotates, values[motion.name]) for motion in MOTIONS}
+        stiffness = GasketStiffness(tables, float(values["coupling"]))
+        return Computed(stiffness, float(values["stretch"]))
 
     def _text(self, levels: FloatArray) -> str:
         return ", ".join(
