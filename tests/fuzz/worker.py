@@ -14,7 +14,7 @@ from pkgutil import resolve_name
 from unittest import mock
 
 import typer
-from fuzz.cases import case_of
+from fuzz.cases import REQUESTS, STATE, case_of
 from fuzz.faults import faults
 from starlette.testclient import TestClient
 
@@ -183,6 +183,8 @@ def serve() -> None:
         os.environ["FUZZ_STUDIO"] = str(top / "studio")
         for name_of_machine in ("reference", "free_stroke"):  # imports and compiles
             run(["machine", "check", name_of_machine])
+        for name in ("run", "ranking"):  # an accepted run compiles too, for longer than a case may
+            answered("POST", f"api/{name}", json.dumps({**REQUESTS[name], "state": STATE}))
         for place in COMPUTATIONS:
             owner, _, function = place.rpartition(".")
             mock.patch.object(resolve_name(owner), function, accepted).start()
