@@ -113,10 +113,11 @@ def test_package_and_bodies_come_from_the_wheel(python, tmp_path):
         assert Path(line).exists()
 
 
-def test_command_lists_the_machines_and_writes_a_page(python, tmp_path):
-    """Read all machines, and write a page without compiled code: the wheel would compile its own."""
+def test_command_checks_a_machine_and_writes_a_page(python, tmp_path):
+    """Build a machine, which compiles code of the wheel, and write a page without any more."""
     command = python.parent / "wm-drake"
-    assert "reference" in run(command, "machine", "list", cwd=tmp_path)
+    checked = run(command, "machine", "check", "reference", cwd=tmp_path)
+    assert checked == "reference: machine 'reference' is valid\n"
     time = [0.01 * k for k in range(1000)]
     rows = [f"{t:g},{60.0 + 20.0 * t:g},{math.sin(6.28 * t + t * t):g}" for t in time]
     (tmp_path / "front.csv").write_text("\n".join(["time_s,speed_rpm,front", *rows]) + "\n")

@@ -1,5 +1,6 @@
 """A study on a dask cluster returns the tables of one computer, also if a worker dies."""
 
+import math
 import os
 import signal
 from concurrent.futures import CancelledError
@@ -11,6 +12,7 @@ from wm_drake.batch import cluster, simulate_many
 from wm_drake.batch.cluster import (
     check_workers,
     cluster_client,
+    map_on_cluster,
     run_work_item,
     simulate_on_cluster,
 )
@@ -55,7 +57,7 @@ def test_work_item_returns_results_by_key(reference, machine):
 
 
 def test_cluster_uses_step_and_integrator_of_the_machine(reference, tmp_path):
-    """The results of a machine with numbers of its own are those of this computer, bit by bit."""
+    """Compare the results of a machine with numbers of its own with those here, bit by bit."""
     from distributed import Client
 
     fine = with_value(with_value(reference, "step", 0.5e-3), "integrator", "runge_kutta")
@@ -70,6 +72,16 @@ def test_cluster_uses_step_and_integrator_of_the_machine(reference, tmp_path):
     assert there.equals(here)
     of_default = simulate_many(built, [case], measures=("extremes",), step=2.5e-3)
     assert not of_default.equals(here)
+
+
+def test_function_runs_on_a_cluster_for_each_item_and_its_error_is_a_message():
+    from distributed import Client
+
+    with Client(processes=False, dashboard_address=None, n_workers=1) as client:
+        found = dict(map_on_cluster(math.sqrt, [4.0, 9.0, 16.0], client))
+        assert found == {0: 2.0, 1: 3.0, 2: 4.0}
+        with pytest.raises(WmDrakeError, match="--cluster: ValueError: math domain error"):
+            list(map_on_cluster(math.sqrt, [4.0, -1.0], client))
 
 
 class Running:

@@ -74,7 +74,7 @@ def test_forces_are_in_balance(bellows):
 
 
 def test_two_plates_are_pressed_by_the_law_of_the_depth():
-    """The energy of two parallel washers is that of their depth d times their area."""
+    """Compare the energy of two parallel washers with that of their depth times their area."""
     t, gap, inner, outer = 0.002, 0.008, 0.1, 0.14
     whole = drawing((inner, 0.0, t), (outer, 0.0, t), (outer, gap, t), (inner, gap, t), fillet=3e-3)
     ring = wedge(whole, 40)

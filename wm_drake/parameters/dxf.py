@@ -37,8 +37,6 @@ LONGEST_ARC = math.radians(100.0)
 SMALLER = 1.0 - 1e-5
 """Factor of fillets, so that two of them fit between corners in spite of rounded numbers."""
 
-_METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
-
 
 class DxfLine(Frozen):
     """Middle line of the wall in a DXF file: x is the radius, y that of the gasket.
@@ -137,7 +135,7 @@ def _entities(path: Path) -> Iterator[list[tuple[int, str]]]:
 
 def _segments(entities: Iterator[list[tuple[int, str]]], line: DxfLine) -> Iterator[Segment]:
     """Yield the segments of the entities of a layer."""
-    metres = _METRES[line.unit]
+    metres = u.to_base(1.0, line.unit)
     for entity in entities:
         kind = entity[0][1]
         if line.layer and (8, line.layer) not in entity:

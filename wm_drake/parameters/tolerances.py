@@ -209,7 +209,7 @@ class OneSided(Frozen):
 
     @property
     def text(self) -> str:
-        """The limit as text."""
+        """Return the limit as text."""
         return self.at_least or self.at_most or ""
 
 

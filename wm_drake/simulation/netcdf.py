@@ -1,4 +1,4 @@
-"""Write a dataset as a netCDF-4 file, ten times as fast as xarray with h5netcdf.
+"""Write a dataset as a netCDF-4 file, five times as fast as xarray with h5netcdf.
 
 A netCDF-4 file is an HDF5 file with dimension scales: each dimension is a scale, which is the
 coordinate of the same name if there is one, and each variable names its scales. xarray encodes what

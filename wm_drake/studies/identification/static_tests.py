@@ -108,8 +108,8 @@ def _check_sponge(damper: Component) -> None:
     if not hasattr(damper.parameters, SPONGE):
         law = damper.parameters.law  # type: ignore[union-attr]
         raise input_error(
-            f"damper {damper.name} has the law {law}, in which no table can be put; a quasi-static "
-            "test gives the table of the sponge of the law free_stroke",
+            f"damper {damper.name} has the law {law}, which has no table; a quasi-static test "
+            "gives the table of the sponge of the law free_stroke",
             where="--static",
         )
 
