@@ -24,7 +24,7 @@ from wm_drake.studies.modes.figures import (
     shapes_figure,
 )
 from wm_drake.studies.modes.nearness import Nearness, about_nearness, nearness, parts
-from wm_drake.studies.modes.shapes import UNDAMPED, Mode
+from wm_drake.studies.modes.shapes import ANGLE_ARM, UNDAMPED, Mode
 from wm_drake.studies.modes.study import (
     AMPLITUDE,
     SLIDING,
@@ -215,8 +215,8 @@ class ModesResult(Result):
         caption = (
             "Smallest distance between tub and housing over the cycle of each mode, all at an "
             f"amplitude of {number(MM_PER_M * self.modes.amplitude, 1)} mm, with angles times "
-            "250 mm. Bold: the mode that brings them nearest. How large a mode becomes in a run "
-            "depends on load and speed."
+            f"{MM_PER_M * ANGLE_ARM:g} mm. Bold: the mode that brings them nearest. How large a "
+            "mode becomes in a run depends on load and speed."
         )
         columns = ("linearisation", "mode", "between", Column("smallest gap", "mm", 2))
         return [Table(caption, columns, groups, text_columns=3)] if groups else []
@@ -368,8 +368,8 @@ def _amplitude_picture(result: MachineModes) -> Picture:
     caption = (
         "Frequency and damping ratio over the amplitude, by harmonic balance of the free motion. "
         "Small amplitudes: friction sticks. Between: it dissipates most. The amplitude is the "
-        "displacement of the middle of the tub, with angles times 250 mm. A curve ends where the "
-        "motion cannot be followed."
+        f"displacement of the middle of the tub, with angles times {MM_PER_M * ANGLE_ARM:g} mm. "
+        "A curve ends where the motion cannot be followed."
     )
     return picture(amplitude_figure(result), "Frequency and damping over amplitude.", caption)
 
