@@ -67,11 +67,11 @@ def worker():
     worker.end()
 
 
-PARTS, EXAMPLES = 4, 60
+PARTS, EXAMPLES = 4, 105
 
 
 @pytest.mark.parametrize("part", range(PARTS))
-def test_240_hostile_inputs(worker, part):
+def test_420_hostile_inputs(worker, part):
     doors = range(part, len(DOORS), PARTS)
 
     @settings(
