@@ -10,7 +10,6 @@ The rooms, in the order of the data flow: `parameters`, `solid`, `laws`, `elemen
 """
 
 import importlib
-import importlib.metadata
 from typing import Any
 
 _HOMES = {
@@ -65,7 +64,9 @@ __all__ = sorted(_HOMES)
 def __getattr__(name: str) -> Any:
     """Load a public name from its room when it is first used, because importing Drake takes 1 s."""
     if name == "__version__":
-        return importlib.metadata.version("wm-drake")
+        from importlib.metadata import version  # slow to import
+
+        return version("wm-drake")
     if name not in _HOMES:
         raise AttributeError(f"module 'wm_drake' has no attribute '{name}'")
     return getattr(importlib.import_module(f"wm_drake.{_HOMES[name]}"), name)

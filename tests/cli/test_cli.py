@@ -12,6 +12,7 @@ import pandas as pd
 import pytest
 
 from wm_drake import load_record
+from wm_drake.cli import COMMANDS
 from wm_drake.parameters import load_machine
 
 SENSORS = ["Xr", "Yr", "Zr", "Xf", "Yf", "Zf"]
@@ -306,12 +307,25 @@ def test_coulomb_friction_is_warned_of(wm_drake):
     assert "Coulomb" not in wm_drake("machine", "check", "reference").err
 
 
-def test_help_does_not_wait_for_slow_libraries(tmp_path):
-    code = (
-        "import sys, wm_drake.cli; "
-        "print({'pydrake', 'pandas', 'scipy', 'xarray', 'plotly', 'matplotlib'} & set(sys.modules))"
-    )
+def imported_by(code, folder):
+    """Return the names of all modules that are imported after a program has run."""
+    program = f"import sys\ntry:\n {code}\nfinally:\n print('\\n' + ' '.join(sys.modules))"
     ended = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
+        [sys.executable, "-c", program], cwd=folder, capture_output=True, text=True, check=True
     )
-    assert ended.stdout == "set()\n"
+    return set(ended.stdout.splitlines()[-1].split())
+
+
+def test_help_does_not_wait_for_slow_libraries(tmp_path):
+    slow = {"pydrake", "numpy", "pandas", "scipy", "xarray", "plotly", "matplotlib"}
+    imported = imported_by("from wm_drake.cli import main; sys.argv[1:] = ['-h']; main()", tmp_path)
+    assert not (slow | {"pydantic", "wm_drake.studies", "wm_drake.report"}) & imported
+    every = "from wm_drake.cli import COMMANDS, _command; list(map(_command, COMMANDS))"
+    assert not slow & imported_by(every, tmp_path)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_list_of_commands_says_what_each_command_says(wm_drake, name):
+    line = COMMANDS[name][1]
+    assert line in " ".join(wm_drake("-h").out.split())
+    assert line in " ".join(wm_drake(name, "-h").out.split())

@@ -6,38 +6,102 @@ May import: all other rooms; neither pydrake nor a plotting library.
 """
 
 import atexit
+import copy
+import functools
 import gc
+import pkgutil
 import sys
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand, TyperGroup
 
-from wm_drake.cli import export, gasket, identify, machine, record, rig, studio, study
 from wm_drake.cli.common import HELP_OPTIONS
-from wm_drake.cli.options import command_of
-from wm_drake.cli.quiet import give_quiet
 from wm_drake.errors import Problem, WmDrakeError, reason_of
-from wm_drake.studies.calibration.options import CALIBRATE
-from wm_drake.studies.spin.options import SPIN
-from wm_drake.studies.verdict.options import VERDICT
+
+COMMANDS = {
+    "verdict": (
+        "wm_drake.studies.verdict.options:VERDICT",
+        "Say whether the tub touches the housing, how likely that is, and what to change.",
+    ),
+    "spin": (
+        "wm_drake.studies.spin.options:SPIN",
+        "Simulate the run-up of the drum through the resonances, and report the motion of the tub.",
+    ),
+    "calibrate": (
+        "wm_drake.studies.calibration.options:CALIBRATE",
+        "Fit unknown numbers of a machine to measured amplitudes, within bounds and with priors.",
+    ),
+    "studio": (
+        "wm_drake.cli.studio:studio",
+        "Open a page on this computer that runs a machine again at each move of a slider.",
+    ),
+    "export": ("wm_drake.cli.export:app", "Export a machine to other programs."),
+    "gasket": ("wm_drake.cli.gasket:app", "Compute a gasket from its drawing."),
+    "identify": (
+        "wm_drake.cli.identify:app",
+        "Find the numbers of a component from measured loops.",
+    ),
+    "machine": ("wm_drake.cli.machine:app", "List, start, check and show machine files."),
+    "record": ("wm_drake.cli.record:app", "Look at records of runs and at measurements."),
+    "rig": (
+        "wm_drake.cli.rig:app",
+        "Test a component on a bench: harmonic motion, steady force loops.",
+    ),
+    "study": ("wm_drake.cli.study:app", "Run a study of many runs and write a report."),
+}
+"""Home and line of help of each command: a function, a declared study, or a group of commands."""
+
+
+class Commands(TyperGroup):
+    """Group of `COMMANDS`; each is imported when it is called, none for the list of them."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Return the names of all commands."""
+        return list(dict.fromkeys((*COMMANDS, *super().list_commands(ctx))))
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Return a command, or None if there is no such command."""
+        if cmd_name not in self.commands:
+            # all of them, for the names that typer proposes in place of an unknown one
+            names = [cmd_name] if cmd_name in COMMANDS else list(COMMANDS)
+            self.commands.update({name: _command(name) for name in names})
+        return super().get_command(ctx, cmd_name)
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write the help, with the lines of `COMMANDS`."""
+        listed = copy.copy(self)
+        listed.commands = {
+            name: TyperCommand(name, help=text) for name, (_, text) in COMMANDS.items()
+        }
+        super(Commands, listed).format_help(ctx, formatter)
+
+
+@functools.cache
+def _command(name: str) -> Any:
+    """Import a command."""
+    from wm_drake.cli.options import command_of
+    from wm_drake.cli.quiet import give_quiet
+    from wm_drake.studies.study import Study
+
+    home, text = COMMANDS[name]
+    declared = pkgutil.resolve_name(home)
+    single = typer.Typer(add_completion=False)
+    if isinstance(declared, typer.Typer):
+        single.add_typer(declared, name=name, help=text)
+    else:
+        single.command(name)(command_of(declared) if isinstance(declared, Study) else declared)
+    give_quiet(single)
+    return typer.main.get_group(single).commands[name]
+
 
 app = typer.Typer(
+    cls=Commands,
     help="Dynamics of front-loading washing machines.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     context_settings=HELP_OPTIONS,
 )
-app.add_typer(export.app, name="export")
-app.add_typer(gasket.app, name="gasket")
-app.add_typer(identify.app, name="identify")
-app.add_typer(machine.app, name="machine")
-app.add_typer(record.app, name="record")
-app.add_typer(rig.app, name="rig")
-app.add_typer(study.app, name="study")
-for declared in (VERDICT, SPIN, CALIBRATE):
-    app.command(declared.name)(command_of(declared))
-app.command()(studio.studio)
-give_quiet(app)
 
 
 def _print_version(requested: bool) -> None:

@@ -12,7 +12,7 @@ from wm_drake.export.options import FmuOptions
 from wm_drake.report.terminal import say
 from wm_drake.studies.inputs import load_parameters, located_in, machine_warnings
 
-app = typer.Typer(help="Export a machine to other programs.", no_args_is_help=True)
+app = typer.Typer(no_args_is_help=True)
 
 
 @app.callback()

@@ -5,7 +5,7 @@ import typer
 from wm_drake.cli.options import command_of
 from wm_drake.studies.gasket_curves.options import GASKET_CURVES
 
-app = typer.Typer(help="Compute a gasket from its drawing.", no_args_is_help=True)
+app = typer.Typer(no_args_is_help=True)
 
 
 @app.callback()

@@ -21,7 +21,7 @@ if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     from wm_drake.errors import Problem
     from wm_drake.model.machine import Machine
 
-app = typer.Typer(help="List, start, check and show machine files.", no_args_is_help=True)
+app = typer.Typer(no_args_is_help=True)
 
 
 @app.command("check")

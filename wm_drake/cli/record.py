@@ -5,7 +5,7 @@ import typer
 from wm_drake.cli.options import command_of
 from wm_drake.studies.orders.options import ORDERS
 
-app = typer.Typer(help="Look at records of runs and at measurements.", no_args_is_help=True)
+app = typer.Typer(no_args_is_help=True)
 
 
 @app.callback()

@@ -6,8 +6,6 @@ from wm_drake.cli.components import DamperCommand
 from wm_drake.cli.options import command_of
 from wm_drake.studies.rig.options import RIG
 
-app = typer.Typer(
-    help="Test a component on a bench: harmonic motion, steady force loops.", no_args_is_help=True
-)
+app = typer.Typer(no_args_is_help=True)
 for study in RIG.values():
     app.command(study.name, cls=DamperCommand)(command_of(study))

@@ -40,6 +40,4 @@ def _command(study: Study) -> Any:
     return typer.main.get_command(single)
 
 
-app = typer.Typer(
-    cls=StudyGroup, help="Run a study of many runs and write a report.", no_args_is_help=True
-)
+app = typer.Typer(cls=StudyGroup, no_args_is_help=True)
