@@ -1,8 +1,12 @@
 """Steps and drum motion from a spin profile."""
 
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+
 import numpy as np
 import pytest
 
+from wm_drake.engines import schedule as module
 from wm_drake.engines.schedule import schedule_of
 from wm_drake.parameters import SpinProfile
 
@@ -66,3 +70,17 @@ def test_acceleration_at_a_sample_is_that_of_the_piece_that_begins_there():
     np.testing.assert_allclose(
         schedule.acceleration[schedule.row >= 0][[0, 99, 100, 101, -1]], expected
     )
+
+
+def test_threads_share_one_schedule():
+    profile = SpinProfile(time=(0.0, 7.0), speed=(0.0, 15.0))
+    with ThreadPoolExecutor(4) as pool:
+        schedules = list(pool.map(partial(schedule_of, profile, 1e-3), [PERIOD] * 4))
+    assert len({id(schedule) for schedule in schedules}) == 1
+
+
+def test_pieces_of_the_drum_motion_are_those_of_the_whole(monkeypatch):
+    given = PROFILES["corners off samples"], 2.4e-3, PERIOD, 0.0
+    whole = schedule_of(*given)
+    monkeypatch.setattr(module, "MOST_NODES", 7)
+    np.testing.assert_array_equal(module._schedule_of.__wrapped__(*given).drum, whole.drum)

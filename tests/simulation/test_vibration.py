@@ -1,5 +1,7 @@
 """RMS displacements in regions: hand values, integrated acceleration, batch and single runs."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -50,6 +52,22 @@ def test_rms_by_hand():
 def test_regions_that_a_run_does_not_complete_are_nan():
     rms = region_rms(np.ones((1000, 2)), PERIOD, PROFILE)
     np.testing.assert_array_equal(rms, [[1.0, 1.0], [np.nan, np.nan]])
+
+
+def test_more_points_do_not_need_more_memory_at_once():
+    rng = np.random.default_rng(0)
+    motion, acceleration = rng.normal(size=(1801, 13)), rng.normal(size=(1801, 6))
+
+    def peak(points):
+        tracemalloc.start()
+        region_displacements(motion, acceleration, points, np.zeros(6), PERIOD, PROFILE)
+        largest = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return largest
+
+    few, many = rng.normal(size=(2, 3)), rng.normal(size=(12, 3))
+    peak(few)  # imports
+    assert peak(many) < 1.2 * peak(few)
 
 
 @pytest.mark.parametrize("frequency", [0.8, 3.0, 6.0, 20.0])

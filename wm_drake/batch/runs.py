@@ -354,17 +354,18 @@ class LaneRun(Run):
     def scene(self) -> Scene:
         return self._find_scene()
 
-    @functools.cached_property
-    def _samples(self) -> FloatArray:
-        return np.ascontiguousarray(self.lane.samples[: self.good])
-
     @property
     def tub_motion(self) -> FloatArray:
-        return self._samples[:, :STATE_SIZE]
+        return self._samples(slice(STATE_SIZE))
 
     @property
     def tub_acceleration(self) -> FloatArray:
-        return self._samples[:, len(self.item.begin) :][:, :RATES_SIZE]
+        begin = len(self.item.begin)
+        return self._samples(slice(begin, begin + RATES_SIZE))
+
+    def _samples(self, columns: slice) -> FloatArray:
+        """Return columns of the samples; they are not kept, in all lanes they are much memory."""
+        return np.ascontiguousarray(self.lane.samples[: self.good, columns])
 
     @property
     def accelerometer_points(self) -> FloatArray:

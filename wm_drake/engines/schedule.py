@@ -1,6 +1,7 @@
 """Steps of an integration through a spin profile, and the prescribed motion of the drum at them."""
 
 import functools
+import threading
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,7 +42,12 @@ class Schedule:
         return self.step, self.acceleration, self.drum, self.row, self.controls
 
 
-@functools.lru_cache(maxsize=8)
+MOST_NODES = 65536
+"""Number of nodes whose drum motion is computed at once; a run may have millions of them."""
+
+_ONE_AT_A_TIME = threading.Lock()
+
+
 def schedule_of(
     profile: SpinProfile, step: float, period: float, control_period: float = 0.0
 ) -> Schedule:
@@ -54,6 +60,14 @@ def schedule_of(
         control_period: Time between samples of a sampled controller, 0 for none. [s] Steps end at
             them, too.
     """
+    with _ONE_AT_A_TIME:  # threads that need the same schedule share it
+        return _schedule_of(profile, step, period, control_period)
+
+
+@functools.lru_cache(maxsize=8)
+def _schedule_of(
+    profile: SpinProfile, step: float, period: float, control_period: float
+) -> Schedule:
     time, corners = output_times(profile, period), np.array(profile.time)
     marks = np.union1d(time, corners)
     if control_period:
@@ -73,17 +87,27 @@ def schedule_of(
     if control_period:
         controls[first[_multiples(marks, control_period)[0]]] = True
     nodes = np.append(np.column_stack([begins, middles]).ravel(), marks[-1])
-    speed, angle = drum_motion(profile, nodes)
     acceleration = drum_acceleration(profile, np.minimum(middles, marks[-1]))
     return Schedule(
         step=lengths,
         acceleration=acceleration,
-        drum=np.column_stack([speed, np.cos(angle), np.sin(angle), angle]),
+        drum=_drum_at(profile, nodes),
         row=row,
         time=time,
         controls=controls,
         alike=_alike(lengths, acceleration),
     )
+
+
+def _drum_at(profile: SpinProfile, nodes: FloatArray) -> FloatArray:
+    """Return speed, cosine and sine of the angle, and the angle of the drum at times. (n, 4)"""
+    drum = np.empty((len(nodes), 4))
+    for begin in range(0, len(nodes), MOST_NODES):
+        speed, angle = drum_motion(profile, nodes[begin : begin + MOST_NODES])
+        drum[begin : begin + MOST_NODES] = np.column_stack(
+            [speed, np.cos(angle), np.sin(angle), angle]
+        )
+    return drum
 
 
 def _multiples(marks: FloatArray, period: float) -> tuple[np.ndarray, np.ndarray]:

@@ -54,17 +54,17 @@ def region_displacements(
         Two arrays (regions, k, 3) in W: from the displacement itself, and from the acceleration
         integrated twice. NaN where the run ended before the region did. [m]
     """
-    shape = (len(profile.regions), len(points), 3)
-    direct = point_displacements(motion, points, rest_pose).reshape(len(motion), -1)
-    integrated = integrated_twice(
-        point_accelerations(motion, acceleration, points).reshape(len(motion), -1), period
-    )
-    both = (
-        region_rms(high_passed(signal, period, HIGH_PASS_HZ), period, profile)
-        for signal in (direct, integrated)
-    )
-    rms_direct, rms_integrated = (rms.reshape(shape) for rms in both)
-    return rms_direct, rms_integrated
+
+    def rms(signal: FloatArray) -> FloatArray:
+        return region_rms(high_passed(signal, period, HIGH_PASS_HZ), period, profile)
+
+    # one point after the other: splines and filters take 30 times the memory of their signal
+    direct, integrated = [], []
+    for point in points[:, None]:
+        direct.append(rms(point_displacements(motion, point, rest_pose)[:, 0]))
+        at_point = point_accelerations(motion, acceleration, point)[:, 0]
+        integrated.append(rms(integrated_twice(at_point, period)))
+    return np.stack(direct, axis=1), np.stack(integrated, axis=1)
 
 
 def tub_motion_of(record: Record) -> tuple[FloatArray, FloatArray]:
