@@ -126,7 +126,7 @@ def test_likeness_changes_no_bit(machine, reference, cases):
     """Compare a runner that looks at the gap of the first run first with a plain one."""
     key, items = next(Preparation(machine, 2.5e-3, "auto").batches(cases[:5]))
     plain, alike = (
-        Runner(reference, ("gap",), histories=False, are_alike=of).run(key, items)
+        Runner(reference, ("gap",), histories=False).run(key, items, are_alike=of)
         for of in (False, True)
     )
     assert [run.gap for run in alike] == [run.gap for run in plain]

@@ -64,12 +64,12 @@ for name, words in json.loads(sys.argv[1]).items():
     run(name, words)
 
 parameters = wm.load_machine("short.yaml")
-from wm_drake.studio.answers import answer, runner_of
+from wm_drake.studio.answers import numbers, runner_of
 from wm_drake.studio.machines import OpenMachine
 from wm_drake.studio.state import State
 opened = OpenMachine(parameters, wm.build_machine(parameters), wm.Scene(parameters))
 state = State(machine="short", load="middle")
-shown = answer(opened, runner_of(opened), state, ["gasket.stiffness_x"])
+shown = numbers(opened, runner_of(opened), state, ["gasket.stiffness_x"])
 Path("studio.json").write_text(json.dumps([shown["rows"], shown["arrows"]]))
 """
 

@@ -14,6 +14,7 @@ from wm_drake.simulation.measures import measure
 from wm_drake.simulation.runs import simulate
 from wm_drake.studio.guard import LARGEST_BODY
 from wm_drake.studio.server import Studio, application
+from wm_drake.studio.state import DESCRIBED
 
 TOKEN, PORT = "token-of-the-test", 8765
 OWN = f"http://127.0.0.1:{PORT}"
@@ -40,14 +41,24 @@ def state(values=None, **others):
     return {"machine": "reference", "values": values or {}, "load": "middle", **others}
 
 
-def run(client, values=None, keys=(), **others):
-    body = {"page": "test", "state": state(values, **others), "keys": list(keys)}
-    return client.post("api/run", json=body)
+def run(client, values=None, **others):
+    return client.post("api/run", json={"page": "test", "state": state(values, **others)})
+
+
+def answered(client, values=None, keys=(), **others):
+    """Return both parts of an answer."""
+    body = {"page": "test", "state": state(values, **others)}
+    parts = (
+        client.post("api/run", json=body),
+        client.post("api/numbers", json=body | {"keys": list(keys)}),
+    )
+    assert [part.status_code for part in parts] == [200, 200]
+    return {**parts[0].json(), **parts[1].json()}
 
 
 @pytest.fixture(scope="module")
 def answer(client):
-    return run(client, {STIFFNESS: "4 N/mm"}, ["bodies.drum.mass", STIFFNESS]).json()
+    return answered(client, {STIFFNESS: "4 N/mm"}, ["bodies.drum.mass", STIFFNESS])
 
 
 @pytest.fixture(scope="module")
@@ -86,17 +97,17 @@ def test_answer_is_that_of_a_single_run(answer, machine, moved):
 
 
 def test_gap_with_each_load_is_that_of_its_run(client, answer):
-    body = {"page": "test", "state": state({STIFFNESS: "4 N/mm"})}
-    found = {of["load"]: of for of in client.post("api/loads", json=body).json()["loads"]}
-    assert found["middle"]["gap"] == pytest.approx(answer["gap"], abs=2e-3)
+    found = {of["load"]: of for of in answer["loads"]}
+    assert found["middle"]["gap"] == answer["gap"]
     other = run(client, {STIFFNESS: "4 N/mm"}, load="back").json()
     assert found["back"]["gap"]["distance"] == pytest.approx(other["gap"]["distance"], abs=2e-3)
     assert list(found) == ["middle", "counter", "back", "front"]
+    assert [of["load"] for of in other["loads"]] == ["back", "middle", "counter", "front"]
 
 
 def test_arrow_is_the_difference_of_two_runs(client, answer):
     arrow = next(of for of in answer["arrows"] if of["key"] == STIFFNESS)
-    other = run(client, {STIFFNESS: f"{4.0 + arrow['step']!r} N/mm"}).json()
+    other = answered(client, {STIFFNESS: f"{4.0 + arrow['step']!r} N/mm"})
     before, after = values_of(answer), values_of(other)
     for title, change in zip(before, arrow["changes"], strict=True):
         expected = after[title] - before[title]
@@ -113,9 +124,8 @@ def test_every_number_can_be_turned_or_is_left_out(client):
 
 
 def test_number_that_was_zero_builds_its_element(client, answer):
-    found = run(client, {STIFFNESS: "4 N/mm", "gasket.cross_stiffness_x_z": "0.5 N/mm"})
-    assert found.status_code == 200
-    assert values_of(found.json())["Xr, mm"] != pytest.approx(values_of(answer)["Xr, mm"], rel=1e-6)
+    found = answered(client, {STIFFNESS: "4 N/mm", "gasket.cross_stiffness_x_z": "0.5 N/mm"})
+    assert values_of(found)["Xr, mm"] != pytest.approx(values_of(answer)["Xr, mm"], rel=1e-6)
 
 
 def test_smallest_gap_is_drawn_where_it_is(answer):
@@ -128,15 +138,22 @@ def test_smallest_gap_is_drawn_where_it_is(answer):
 def test_measured_amplitudes_stand_beside(client, answer):
     experiment = next(of for of in answer["measured"] if of["source"] == "experiment")
     assert experiment["amplitude"]["Xr"] == 29.1
-    without = run(client, gasket=False).json()
+    without = answered(client, gasket=False)
     assert without["measured"][0]["amplitude"]["Xr"] == 23.6
     assert not any(name.startswith("gasket") for name in without["forces"]["bands"])
 
 
 def test_described_load_runs(client, answer):
     mass = {"mass": "500 g", "radius": "235 mm", "y": "0 mm", "phase": "0 deg"}
-    found = run(client, masses=[mass]).json()
+    found = answered(client, masses=[mass])
     assert values_of(found)["Xr, mm"] < 0.8 * values_of(answer)["Xr, mm"]
+    assert [of["load"] for of in found["loads"]] == [
+        DESCRIBED,
+        "middle",
+        "counter",
+        "back",
+        "front",
+    ]
     assert found["measured"] == []
     wrong = run(client, masses=[mass | {"mass": "3"}])
     assert wrong.json()["problems"][0]["key"] == "masses.0.mass"

@@ -47,6 +47,28 @@ _NONE = np.empty(0, dtype=np.int64)
 
 
 @dataclass(frozen=True)
+class TubMotion:
+    """The motion of a run, for a picture; a record, with all forces, takes much longer.
+
+    Attributes:
+        time: Of each sample. (n,) [s]
+        poses: Poses of the tub: roll, pitch, yaw, x, y, z. (n, 6) [rad, m]
+        rest_pose: Pose of the tub at rest. (6,) [rad, m]
+        drum_angle, drum_speed: Of the drum against the tub. (n,) [rad, rad/s]
+        filtered: Filtered displacements at the sensors. (n, sensors) [m]
+        largest: Sample of the largest amplitude of all sensors.
+    """
+
+    time: FloatArray
+    poses: FloatArray
+    rest_pose: FloatArray
+    drum_angle: FloatArray
+    drum_speed: FloatArray
+    filtered: FloatArray
+    largest: int
+
+
+@dataclass(frozen=True)
 class RunResult:
     """The result of one run.
 
@@ -57,6 +79,7 @@ class RunResult:
         diverged: When and why the run stopped early; "" if it did not.
         record: Its history; None if histories were not requested.
         gap: Where the smallest gap is; None if it was not measured.
+        motion: Its motion; None if it was not requested, or has fewer than two samples.
     """
 
     number: int
@@ -65,6 +88,7 @@ class RunResult:
     diverged: str
     record: Record | None
     gap: Gap | None = None
+    motion: TubMotion | None = None
 
 
 class Runner:
@@ -77,7 +101,7 @@ class Runner:
         histories: bool | Container[int],
         scenes: list[Scene] | None = None,
         *,
-        are_alike: bool = False,
+        motions: Container[int] = (),
     ) -> None:
         """Prepare for a machine.
 
@@ -86,20 +110,28 @@ class Runner:
             measures: Keys of `MEASURES`.
             histories: Whether results have records, or the numbers of the cases that have one.
             scenes: Scenes of the machine that no thread uses; the runner takes them from the list.
-            are_alike: Whether the runs of a batch differ little, so that the smallest gap of the
-                first leads to those of the others.
+            motions: Numbers of the cases whose results have a motion; the measures must need
+                sensors and shapes.
         """
-        self.are_alike = are_alike
         self.parameters = parameters
-        self.measures, self.histories = [MEASURES[name] for name in measures], histories
+        self.measures = [MEASURES[name] for name in measures]
+        self.histories, self.motions = histories, motions
         self.needs = {need for measure in self.measures for need in measure.needs}
         self.stopped = threading.Event()
         self._memory = threading.local()
         self._spare = [] if scenes is None else scenes
         self.scenes: list[Scene] = []
 
-    def run(self, key: BatchKey, work_items: list[WorkItem]) -> list[RunResult]:
+    def run(
+        self, key: BatchKey, work_items: list[WorkItem], *, are_alike: bool = False
+    ) -> list[RunResult]:
         """Run up to `WIDTH` work items side by side and measure them.
+
+        Args:
+            key: What they have in common.
+            work_items: The work items.
+            are_alike: Whether they differ little, so that the smallest gap of the first leads to
+                those of the others.
 
         Returns:
             A result for each work item; none if `stopped` was set meanwhile.
@@ -156,7 +188,7 @@ class Runner:
             LaneRun(item, schedule, self.scene, Lane(*(array[..., lane] for array in arrays)))
             for lane, item in enumerate(work_items)
         ]
-        if self.are_alike and "shapes" in self.needs:
+        if are_alike and "shapes" in self.needs:
             near = runs[0].find_gap()
             for run in runs[1:]:
                 run.find_gap(near)
@@ -219,7 +251,8 @@ class Runner:
         keeps = keeps if isinstance(keeps, bool) else item.number in keeps
         record = self._record(item, run.schedule, run.lane.samples.copy()) if keeps else None
         gap = run.find_gap() if "shapes" in self.needs else None
-        return RunResult(item.number, item.case, values, run.diverged, record, gap)
+        motion = run.motion() if item.number in self.motions else None
+        return RunResult(item.number, item.case, values, run.diverged, record, gap, motion)
 
     def _record(self, item: WorkItem, schedule: Schedule, samples: FloatArray) -> Record:
         trajectory = trajectory_of(samples, schedule, item.packed, item.numbers.layout)
@@ -349,6 +382,25 @@ class LaneRun(Run):
     @property
     def rest_pose(self) -> FloatArray:
         return self.item.begin[:6]
+
+    def motion(self) -> TubMotion | None:
+        """Return the motion of the run; None if it has fewer than two samples."""
+        if self.good < 2:
+            return None
+        sizes, at = self.amplitudes
+        if not np.isnan(sizes).all():
+            largest = at[np.nanargmax(sizes)]
+        else:  # too short to be filtered
+            largest = np.argmax(np.abs(self.displacement).max(axis=1))
+        return TubMotion(  # copies: the next batch uses the memory again
+            self.time,
+            self.poses.copy(),
+            self.rest_pose.copy(),
+            self.drum_angle.copy(),
+            self.drum_speed.copy(),
+            self.filtered.copy(),
+            int(largest),
+        )
 
     @property
     def scene(self) -> Scene:

@@ -234,27 +234,25 @@ def axis_motion(record: Record, y: float) -> FloatArray:
     return point_positions(pose, np.array([[0.0, y, 0.0]]))[:, 0]
 
 
-def largest_motion(record: Record, largest: int | None = None) -> tuple[FloatArray, FloatArray]:
-    """Return the motion around the largest amplitude of a record, sampled for a replay.
+def replay_samples(time: FloatArray, largest: int) -> slice:
+    """Return the samples of a replay around the sample `largest`."""
+    ends = time[largest] - REPLAY_SPAN / 2, time[largest] + REPLAY_SPAN / 2
+    begin, end = np.searchsorted(time, ends[0]), np.searchsorted(time, ends[1], side="right")
+    period = float(time[1] - time[0]) if len(time) > 1 else 1.0 / REPLAY_RATE
+    return slice(int(begin), int(end), max(1, round(1.0 / (REPLAY_RATE * period))))
 
-    Args:
-        record: The record.
-        largest: `moment_of_largest_amplitude` if it is known already.
+
+def largest_motion(record: Record) -> tuple[FloatArray, FloatArray]:
+    """Return the motion around the largest amplitude of a record, sampled for a replay.
 
     Returns:
         Times (n,) and positions of the plant (n, >= 7): roll, pitch, yaw, x, y, z of the tub and
         the drum angle; then, for each damper tube that is a body, roll, pitch, yaw, x, y, z of the
         outer tube and the extension of the damper. [s; rad, m]
     """
-    largest = moment_of_largest_amplitude(record) if largest is None else largest
-    middle = float(record.time[largest])
+    samples = replay_samples(record.time.values, moment_of_largest_amplitude(record))
     tubes = [f"tube_{part}" for part in ("angle", "position", "extension") if "tube" in record.dims]
-    moving = record[["tub_angle", "tub_position", "drum_angle", *tubes]]
-    stretch = moving.sel(time=slice(middle - REPLAY_SPAN / 2, middle + REPLAY_SPAN / 2))
-    period = (
-        float(record.time[1] - record.time[0]) if record.sizes["time"] > 1 else 1.0 / REPLAY_RATE
-    )
-    frames = stretch.isel(time=slice(None, None, max(1, round(1.0 / (REPLAY_RATE * period)))))
+    frames = record[["tub_angle", "tub_position", "drum_angle", *tubes]].isel(time=samples)
     parts = [frames.tub_angle.values, frames.tub_position.values, frames.drum_angle.values]
     for tube in frames.tube.values if "tube" in frames.dims else ():
         one = frames.sel(tube=tube)

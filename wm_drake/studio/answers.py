@@ -1,7 +1,11 @@
 """Run what a page has chosen, and return what it draws, as plain numbers for JSON.
 
-One run has eight lanes: the first has the chosen numbers and its history, the others have one
-number turned by a hundredth of its slider. They cost little, and give the sensitivity arrows.
+The page gets its answer in two parts. The first is the picture: motion, gap and contact. The second
+is the numbers: table of measures, forces and arrows; a picture that is overtaken has none.
+
+A run has eight lanes, which together cost little more than one. The first has the chosen load. In
+a picture, the others have the other loads of the machine. In the numbers, they have one number each
+turned by a hundredth of its slider, which gives the sensitivity arrows.
 """
 
 import itertools
@@ -12,10 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from wm_drake.batch.runs import Runner, RunResult
+from wm_drake.batch.runs import Runner, RunResult, TubMotion
 from wm_drake.batch.work_items import BatchKey, Preparation, WorkItem
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.errors import InputError, Problem
+from wm_drake.model.machine import Setup
 from wm_drake.model.plausibility import unusual_springs
 from wm_drake.model.scene import Gap
 from wm_drake.parameters import MachineParameters, SpinProfile
@@ -25,23 +30,13 @@ from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import plain, shape_name
 from wm_drake.simulation.band import band_warnings, pass_band
 from wm_drake.simulation.cases import Case
-from wm_drake.simulation.displacements import (
-    amplitudes,
-    filtered_displacement,
-    largest_motion,
-    local_maxima,
-    moment_of_largest_amplitude,
-)
+from wm_drake.simulation.displacements import local_maxima, replay_samples
 from wm_drake.simulation.measures import MEASURES, Variable
 from wm_drake.simulation.measures.labels import LABELS
+from wm_drake.simulation.outputs import point_displacements
 from wm_drake.simulation.records import Record
 from wm_drake.studies.inputs import friction_warnings
-from wm_drake.studies.spin.figures import (
-    ORBIT_REVOLUTIONS,
-    axis_path_mm,
-    have_one_orbit,
-    orbit_window,
-)
+from wm_drake.studies.spin.figures import ORBIT_REVOLUTIONS, have_one_orbit, orbit_window
 from wm_drake.studio.machines import OpenMachine, is_same
 from wm_drake.studio.parts import words_of
 from wm_drake.studio.state import State
@@ -74,20 +69,72 @@ def shown_measures() -> tuple[str, ...]:
     return (*FIRST, *(name for name in shown if name not in FIRST))
 
 
+def picture_runner_of(machine: OpenMachine) -> Runner:
+    """Return the runner of the pictures of a machine: the first run of a batch has a motion."""
+    return Runner(machine.parameters, ("amplitudes", "gap"), histories=False, motions={0})
+
+
 def runner_of(machine: OpenMachine) -> Runner:
-    """Return the runner of the pages of a machine: the first run of a batch has a history."""
-    return Runner(machine.parameters, shown_measures(), histories={0}, are_alike=True)
+    """Return the runner of the numbers of a machine: the first run of a batch has a history."""
+    return Runner(machine.parameters, shown_measures(), histories={0})
 
 
-def gap_runner_of(machine: OpenMachine) -> Runner:
-    """Return the runner of the gaps with all loads of a machine."""
-    return Runner(machine.parameters, ("gap",), histories=False)
+def picture(machine: OpenMachine, runner: Runner, state: State) -> dict[str, Any]:
+    """Run what a page has chosen and return the motion, and the gap with each load.
+
+    Args:
+        machine: The open machine.
+        runner: From `picture_runner_of`.
+        state: What the page has chosen.
+
+    Raises:
+        InputError: a number or the load is wrong.
+    """
+    with machine.lock:
+        case = machine.case(state)
+        assert case.parameters is not None  # a page's case has parameters of its own
+        others = [
+            replace(case, name=name, load=load)
+            for name, load in case.parameters.loads.items()
+            if state.masses or name != state.load
+        ]
+        batches = list(machine.preparation(case.parameters).batches([case, *others]))
+        batch_key, items = next(batch for batch in batches if batch[1][0].number == 0)
+        setup = items[0].numbers.setup
+        profile, period = batch_key.profile, batch_key.period
+        warnings = [
+            *(Problem("", "profile.band", text) for text in band_warnings(profile, period)),
+            *unusual_numbers(setup.parameters, state.values),
+            *unusual_springs(setup),
+            *_friction_that_jumps(setup.parameters),
+        ]
+    runs = sorted((run for batch in batches for run in runner.run(*batch)), key=lambda r: r.number)
+    main = runs[0]
+    return {
+        **_motion(main, setup),
+        "duration": profile.duration,
+        "profile": {
+            "time": list(profile.time),
+            "rpm": [speed * RPM_PER_RAD_S for speed in profile.speed],
+        },
+        "values": machine.shown_values(case, state),
+        **_gap_of(main),
+        "gap_points": _gap_points(runner, main),
+        "loads": [{"load": run.case.name, **_gap_of(run)} for run in runs],
+        "measured": machine.measured(state),
+        "warnings": [{"key": p.key, "message": p.message} for p in warnings],
+        "band": pass_band(profile, period),
+        "stepping": {
+            "integrator": batch_key.stepping.integrator,
+            "step_ms": MS_PER_S * batch_key.stepping.step,
+        },
+    }
 
 
-def answer(
+def numbers(
     machine: OpenMachine, runner: Runner, state: State, keys: Sequence[str] = ()
 ) -> dict[str, Any]:
-    """Run what a page has chosen and return all that it draws.
+    """Run what a page has chosen and return measures, forces and arrows.
 
     Args:
         machine: The open machine.
@@ -98,64 +145,14 @@ def answer(
     Raises:
         InputError: a number, the load or a key is wrong.
     """
-    with machine.lock:
-        case = machine.case(state)
-        turned = _turned(machine, case, keys[:LANES])
-        batch_key, items = _batch(machine, [case, *(other for _, _, other in turned)])
-        setup = items[0].numbers.setup
-        profile, period = batch_key.profile, batch_key.period
-        warnings = [
-            *(Problem("", "profile.band", text) for text in band_warnings(profile, period)),
-            *unusual_numbers(setup.parameters, state.values),
-            *unusual_springs(setup),
-            *_friction_that_jumps(setup.parameters),
-        ]
-    results = {run.number: run for run in runner.run(batch_key, items)}
-    main = results[0]
+    turned, results = _run_turned(machine, runner, state, keys)
+    record = results[0].record
+    assert record is not None  # the runner keeps that of the first run
     return {
-        **_measures(machine, main),
-        **_histories(main),
-        "values": machine.shown_values(case, state),
-        "gap_points": _gap_points(runner, main),
+        "rows": _rows_of(machine, results[0]),
+        "forces": _forces(record) if record.sizes["time"] > 1 else None,
         "arrows": _arrows(machine, turned, results),
-        "warnings": [{"key": p.key, "message": p.message} for p in warnings],
-        "diverged": main.diverged,
-        "band": pass_band(profile, period),
-        "stepping": {
-            "integrator": batch_key.stepping.integrator,
-            "step_ms": MS_PER_S * batch_key.stepping.step,
-        },
     }
-
-
-def gaps_of_loads(machine: OpenMachine, runner: Runner, state: State) -> list[dict[str, Any]]:
-    """Return the smallest gap with each load of the machine, as a page has it now.
-
-    Args:
-        machine: The open machine.
-        runner: From `gap_runner_of`.
-        state: What the page has chosen; its load makes no difference.
-
-    Raises:
-        InputError: a number is wrong.
-    """
-    names = machine.parameters.loads
-    with machine.lock:
-        cases = [
-            machine.case(state.model_copy(update={"load": name, "masses": ()})) for name in names
-        ]
-        parameters = cases[0].parameters
-        assert parameters is not None  # a page's case has parameters of its own
-        batches = list(machine.preparation(parameters).batches(cases))
-    runs = sorted((run for batch in batches for run in runner.run(*batch)), key=lambda r: r.number)
-    return [
-        {
-            "load": name,
-            "gap": None if run.gap is None else _gap(run.gap, run.case.profile),
-            "diverged": run.diverged,
-        }
-        for name, run in zip(names, runs, strict=True)
-    ]
 
 
 def _friction_that_jumps(parameters: MachineParameters) -> list[Problem]:
@@ -177,11 +174,7 @@ def arrows(
     Raises:
         InputError: a number or the load is wrong.
     """
-    with machine.lock:
-        case = machine.case(state)
-        turned = _turned(machine, case, keys[:LANES])
-        batch_key, items = _batch(machine, [case, *(other for _, _, other in turned)])
-    return _arrows(machine, turned, {run.number: run for run in runner.run(batch_key, items)})
+    return _arrows(machine, *_run_turned(machine, runner, state, keys))
 
 
 def influential_keys(machine: OpenMachine, state: State) -> list[str]:
@@ -196,6 +189,18 @@ def influential_keys(machine: OpenMachine, state: State) -> list[str]:
         and (not key.startswith("loads.") or key.startswith(prefix))
         and (state.gasket or not key.startswith("gasket."))
     ]
+
+
+def _run_turned(
+    machine: OpenMachine, runner: Runner, state: State, keys: Sequence[str]
+) -> tuple[list[tuple[str, float, Case]], dict[int, RunResult]]:
+    """Run a case and its turned cases side by side; return these and the results by number."""
+    with machine.lock:
+        case = machine.case(state)
+        turned = _turned(machine, case, keys[:LANES])
+        batch_key, items = _batch(machine, [case, *(other for _, _, other in turned)])
+    results = runner.run(batch_key, items, are_alike=True)
+    return turned, {run.number: run for run in results}
 
 
 def _turned(machine: OpenMachine, case: Case, keys: Iterable[str]) -> list[tuple[str, float, Case]]:
@@ -244,19 +249,15 @@ def _batch(machine: OpenMachine, cases: list[Case]) -> tuple[BatchKey, list[Work
     raise AssertionError("the first case is in some batch")
 
 
-def _measures(machine: OpenMachine, run: RunResult) -> dict[str, Any]:
-    """Return the rows of the table of measures, in units for reading, and the smallest gap."""
-    gap = run.gap
-    return {
-        "rows": [
-            row
-            for name in shown_measures()
-            for variable in MEASURES[name].variables
-            if variable.studio is not None
-            for row in _rows(machine, run, variable)
-        ],
-        "gap": None if gap is None else _gap(gap, run.case.profile),
-    }
+def _rows_of(machine: OpenMachine, run: RunResult) -> list[dict[str, Any]]:
+    """Return the rows of the table of measures, in units for reading."""
+    return [
+        row
+        for name in shown_measures()
+        for variable in MEASURES[name].variables
+        if variable.studio is not None
+        for row in _rows(machine, run, variable)
+    ]
 
 
 def _rows(machine: OpenMachine, run: RunResult, variable: Variable) -> list[dict[str, Any]]:
@@ -279,6 +280,12 @@ def _rows(machine: OpenMachine, run: RunResult, variable: Variable) -> list[dict
             }
         )
     return rows
+
+
+def _gap_of(run: RunResult) -> dict[str, Any]:
+    """Return the smallest gap of a run, and why it diverged if it did."""
+    gap = None if run.gap is None else _gap(run.gap, run.case.profile)
+    return {"gap": gap, "diverged": run.diverged}
 
 
 def _gap(gap: Gap, profile: SpinProfile) -> dict[str, Any]:
@@ -308,7 +315,7 @@ def _arrow(
     """Return what a number does when it is moved up by a hundredth of its slider."""
     up = math.copysign(1.0, step)
     unit = machine.sliders[key].unit
-    before, after = (_measures(machine, one)["rows"] for one in (main, run))
+    before, after = (_rows_of(machine, one) for one in (main, run))
     changes = [
         _difference(now["value"], was["value"], up) for now, was in zip(after, before, strict=True)
     ]
@@ -319,48 +326,35 @@ def _difference(after: float | None, before: float | None, up: float) -> float |
     return None if after is None or before is None else up * (after - before)
 
 
-def _histories(run: RunResult) -> dict[str, Any]:
-    """Return the curves of a run: envelopes, orbits, forces, and the motion around its largest."""
-    record = run.record
-    assert record is not None  # the runner keeps that of the first run
-    if record.sizes["time"] < 2:
-        return {"envelopes": [], "orbits": [], "forces": None, "motion": None, "duration": 0.0}
-    displacement = filtered_displacement(record).values
-    largest = _moment_of_largest(record, displacement)
-    profile = run.case.profile
+def _motion(run: RunResult, setup: Setup) -> dict[str, Any]:
+    """Return the curves of a motion: envelopes, orbits, and the motion around its largest."""
+    motion = run.motion
+    if motion is None:
+        return {"envelopes": [], "orbits": [], "motion": None}
+    largest, replay = motion.largest, replay_samples(motion.time, motion.largest)
     return {
-        "envelopes": _envelopes(record, displacement),
-        "orbits": _orbits(record, largest),
-        "forces": _forces(record),
-        "motion": _motion(record, largest),
-        "largest": {
-            "time": float(record.time.values[largest]),
-            "rpm": float(record.drum_speed.values[largest]) * RPM_PER_RAD_S,
+        "envelopes": _envelopes(motion),
+        "orbits": _orbits(motion, setup),
+        "motion": {  # times [s] and poses of the tub (roll, pitch, yaw, x, y, z) [rad, m]
+            "time": np.round(motion.time[replay], 4).tolist(),
+            "poses": np.round(motion.poses[replay], 6).tolist(),
+            "rest": np.round(motion.rest_pose, 6).tolist(),
         },
-        "duration": profile.duration,
-        "profile": {
-            "time": list(profile.time),
-            "rpm": [speed * RPM_PER_RAD_S for speed in profile.speed],
+        "largest": {
+            "time": float(motion.time[largest]),
+            "rpm": float(motion.drum_speed[largest]) * RPM_PER_RAD_S,
         },
     }
 
 
-def _moment_of_largest(record: Record, displacement: FloatArray) -> int:
-    """Return `measures.moment_of_largest_amplitude`, from displacements filtered already."""
-    size, samples = amplitudes(displacement)
-    if np.isnan(size).all():
-        return moment_of_largest_amplitude(record)
-    return int(samples[np.nanargmax(size)])
-
-
-def _envelopes(record: Record, displacement: FloatArray) -> list[dict[str, Any]]:
+def _envelopes(motion: TubMotion) -> list[dict[str, Any]]:
     """Return the corners of the upper and lower envelope of each sensor: straight lines between.
 
     They are `measures.envelopes`, which are lines from peak to peak, without the samples between.
     """
-    time = np.rint(record.time.values * MS_PER_S).astype(int)
+    time = np.rint(motion.time * MS_PER_S).astype(int)
     corners: list[dict[str, Any]] = []
-    for column in displacement.T:
+    for column in motion.filtered.T:
         sides: dict[str, Any] = {}
         if np.isnan(column[0]):  # too short to be filtered
             corners.append({"upper": [[], []], "lower": [[], []]})
@@ -373,15 +367,18 @@ def _envelopes(record: Record, displacement: FloatArray) -> list[dict[str, Any]]
     return corners
 
 
-def _orbits(record: Record, largest: int) -> list[dict[str, Any]]:
-    depths = record.sensor_point.values[:, 1]
-    window = orbit_window(record, largest, ORBIT_REVOLUTIONS)
-    orbits = []
-    front, rear = float(depths.min()), float(depths.max())
-    for y in (front,) if have_one_orbit(front, rear) else (front, rear):
-        path = axis_path_mm(record, y)[window] / MM_PER_M
-        orbits.append({"y": y * MM_PER_M, "x": _whole(path[:, 0]), "z": _whole(path[:, 2])})
-    return orbits
+def _orbits(motion: TubMotion, setup: Setup) -> list[dict[str, Any]]:
+    """Return the paths of the drum axis around the largest amplitude, at the sensors' depths."""
+    depths = [point[1] for point in setup.sensor_points.values()]
+    front, rear = float(min(depths)), float(max(depths))
+    window = orbit_window(motion.time, motion.drum_angle, motion.largest, ORBIT_REVOLUTIONS)
+    at = (front,) if have_one_orbit(front, rear) else (front, rear)
+    points = np.array([[0.0, y, 0.0] for y in at])
+    paths = point_displacements(motion.poses[window], points, motion.rest_pose)
+    return [
+        {"y": y * MM_PER_M, "x": _whole(path[:, 0]), "z": _whole(path[:, 2])}
+        for y, path in zip(at, np.moveaxis(paths, 1, 0), strict=True)
+    ]
 
 
 def _forces(record: Record) -> dict[str, Any]:
@@ -412,23 +409,12 @@ def _forces(record: Record) -> dict[str, Any]:
     }
 
 
-def _motion(record: Record, largest: int) -> dict[str, Any]:
-    """Return times [s] and poses of the tub (roll, pitch, yaw, x, y, z) around the largest."""
-    time, positions = largest_motion(record, largest)
-    return {
-        "time": np.round(time, 4).tolist(),
-        "poses": np.round(positions[:, :6], 6).tolist(),
-        "rest": np.round(np.asarray(record.attrs["rest_pose"]), 6).tolist(),
-    }
-
-
 def _gap_points(runner: Runner, run: RunResult) -> dict[str, Any] | None:
     """Return the two nearest points in W [m] and the pose of the tub at the smallest gap."""
-    gap, record = run.gap, run.record
-    if gap is None or record is None:
+    gap, motion = run.gap, run.motion
+    if gap is None or motion is None:
         return None
-    at = int(np.argmin(np.abs(record.time.values - gap.time)))
-    pose = np.concatenate([record.tub_angle.values[at], record.tub_position.values[at]])
+    pose = motion.poses[int(np.argmin(np.abs(motion.time - gap.time)))]
     points = runner.scene().nearest_points(pose, gap.moving, gap.fixed)
     return {"points": points.tolist(), "pose": pose.tolist()}
 

@@ -1,12 +1,11 @@
 """Machines that a page can open, and machines that are open: built once, moved many times."""
 
 import threading
+from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
-
-import pandas as pd
+from typing import Any, TypeAlias
 
 from wm_drake.batch.work_items import Preparation
 from wm_drake.errors import InputError, Problem, input_error, nearest_names
@@ -48,6 +47,9 @@ MOST_OPEN = 16
 """Largest number of machines that are kept open."""
 
 _SUFFIXES = (".yaml", ".yml")
+
+_Measured: TypeAlias = dict[tuple[str, str], list[dict[str, object]]]
+"""Source and amplitudes of measurements, by load and whether the gasket is in (yes, no)."""
 
 
 @dataclass(frozen=True)
@@ -138,7 +140,7 @@ class OpenMachine:
     _preparations: dict[tuple[int, float, str], Preparation] = field(default_factory=dict)
     _others: list[Machine] = field(default_factory=list)
     _sliders: dict[str, Slider] = field(default_factory=dict)
-    _measured: list[pd.DataFrame] = field(default_factory=list)
+    _measured: list[_Measured] = field(default_factory=list)
 
     @property
     def sliders(self) -> Mapping[str, Slider]:
@@ -251,15 +253,16 @@ class OpenMachine:
         """Return what was measured of the machine with a load: source and amplitudes [mm]."""
         if state.masses:
             return []
-        if not self._measured:  # reading the files takes as long as a third of a run
-            self._measured.append(measured_amplitudes(self.parameters))
-        table = self._measured[0]
         gasket = "yes" if state.gasket and self.parameters.gasket else "no"
-        rows = table[(table.load == state.load) & (table.gasket == gasket)]
-        return [
-            {"source": str(row.pop("source")), "amplitude": _by_sensor(row, self.parameters)}
-            for row in rows.to_dict("records")
-        ]
+        if not self._measured:  # reading the files takes as long as a third of a run
+            by_load: _Measured = defaultdict(list)
+            for row in measured_amplitudes(self.parameters).to_dict("records"):
+                amplitude = _by_sensor(row, self.parameters)
+                by_load[row["load"], row["gasket"]].append(
+                    {"source": str(row["source"]), "amplitude": amplitude}
+                )
+            self._measured.append(by_load)
+        return self._measured[0].get((state.load, gasket), [])
 
     def for_page(self) -> dict[str, object]:
         """Return all that a page needs to know of the machine before the first run."""

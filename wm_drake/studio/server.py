@@ -25,11 +25,11 @@ from wm_drake.errors import InputError, input_error
 from wm_drake.report.provenance import program
 from wm_drake.studio.answers import (
     LANES,
-    answer,
     arrows,
-    gap_runner_of,
-    gaps_of_loads,
     influential_keys,
+    numbers,
+    picture,
+    picture_runner_of,
     runner_of,
 )
 from wm_drake.studio.forms import forms
@@ -62,14 +62,12 @@ class RunRequest(_Body):
 
     page: Text
     state: State
+
+
+class NumbersRequest(RunRequest):
+    """The same with some numbers turned."""
+
     keys: Annotated[list[Text], Field(max_length=LANES)] = []
-
-
-class LoadsRequest(_Body):
-    """A run of all loads of the machine that a page has chosen."""
-
-    page: Text
-    state: State
 
 
 class SaveRequest(_Body):
@@ -99,34 +97,31 @@ class Studio:
         self._executor = ThreadPoolExecutor(self._workers, thread_name_prefix="studio")
         self.cheap = ThreadPoolExecutor(2, thread_name_prefix="studio-cheap")
         self.turns = Turns(self._executor, self._workers)
-        self._runners: WeakKeyDictionary[OpenMachine, Runner] = WeakKeyDictionary()
-        self._gap_runners: WeakKeyDictionary[OpenMachine, Runner] = WeakKeyDictionary()
+        self._runners: WeakKeyDictionary[OpenMachine, tuple[Runner, Runner]] = WeakKeyDictionary()
         self._rankings: dict[str, asyncio.Task[list[dict[str, Any]]]] = {}
 
-    def opened(self, identifier: str) -> tuple[OpenMachine, Runner]:
-        """Return an open machine and its runner."""
+    def opened(self, identifier: str) -> tuple[OpenMachine, Runner, Runner]:
+        """Return an open machine, the runner of its pictures and that of its numbers."""
         machine = self.machines.open(identifier)
         if machine not in self._runners:
-            self._runners.setdefault(machine, runner_of(machine))
+            runners = picture_runner_of(machine), runner_of(machine)
+            self._runners.setdefault(machine, runners)
             # a full collection over all that an open machine keeps takes as long as an answer
             gc.freeze()
-        return machine, self._runners[machine]
+        return machine, *self._runners[machine]
 
-    def run(self, state: State, keys: list[str]) -> dict[str, Any]:
-        """Return the answer to a page."""
+    def picture(self, state: State) -> dict[str, Any]:
+        """Return the first part of the answer to a page, with the time that it took."""
         begin = time.perf_counter(), time.thread_time()
-        machine, runner = self.opened(state.machine)
-        answered = answer(machine, runner, state, keys) | {"measured": machine.measured(state)}
+        machine, runner, _ = self.opened(state.machine)
+        drawn = picture(machine, runner, state)
         passed = time.perf_counter() - begin[0], time.thread_time() - begin[1]
-        return answered | {"server_s": {"wall": passed[0], "cpu": passed[1]}}
+        return drawn | {"server_s": {"wall": passed[0], "cpu": passed[1]}}
 
-    def gaps(self, state: State) -> list[dict[str, Any]]:
-        """Return the smallest gap with each load."""
-        machine, _ = self.opened(state.machine)
-        runner = self._gap_runners.get(machine)
-        if runner is None:
-            runner = self._gap_runners.setdefault(machine, gap_runner_of(machine))
-        return gaps_of_loads(machine, runner, state)
+    def numbers(self, state: State, keys: list[str]) -> dict[str, Any]:
+        """Return the second part of the answer to a page."""
+        machine, _, runner = self.opened(state.machine)
+        return numbers(machine, runner, state, keys)
 
     async def ranking(self, state: State) -> list[dict[str, Any]]:
         """Return the arrows of all numbers that influence a run; pages share the work."""
@@ -141,7 +136,7 @@ class Studio:
 
     async def _rank(self, key: str, state: State) -> list[dict[str, Any]]:
         take = partial(self.turns.take, f"ranking {key}", background=True)
-        machine, runner = await take(lambda: self.opened(state.machine))
+        machine, _, runner = await take(lambda: self.opened(state.machine))
         keys = await take(partial(influential_keys, machine, state))
         effects: list[dict[str, Any]] = []
         for begin in range(0, len(keys), LANES):
@@ -172,7 +167,7 @@ def application(studio: Studio, token: str, port: int) -> Guard:
             Route("/api/machines", routes.machines),
             Route("/api/machine", routes.machine),
             Route("/api/run", routes.run, methods=["POST"]),
-            Route("/api/loads", routes.loads, methods=["POST"]),
+            Route("/api/numbers", routes.numbers, methods=["POST"]),
             Route("/api/place", routes.place),
             Route("/api/ranking", routes.ranking, methods=["POST"]),
             Route("/api/save", routes.save, methods=["POST"]),
@@ -221,21 +216,22 @@ class _Routes:
         return _json(await _in_thread(opened))
 
     async def run(self, request: Request) -> Response:
-        """Run what a page has chosen; a request that is overtaken is dropped."""
+        """Return the picture of what a page has chosen; a request that is overtaken is dropped."""
         body = RunRequest.model_validate_json(await request.body())
-        try:
-            run = partial(self.studio.run, body.state, body.keys)
-            return _json(await self.studio.turns.take(f"page {body.page}", run))
-        except OvertakenError:
-            return _json({"overtaken": True})
+        run = partial(self.studio.picture, body.state)
+        return await self._in_turn(f"page {body.page}", run)
 
-    async def loads(self, request: Request) -> Response:
-        """Return the gap with each load; a request that is overtaken is dropped."""
-        body = LoadsRequest.model_validate_json(await request.body())
+    async def numbers(self, request: Request) -> Response:
+        """Return the numbers to a picture; a request that is overtaken is dropped."""
+        body = NumbersRequest.model_validate_json(await request.body())
+        run = partial(self.studio.numbers, body.state, body.keys)
+        return await self._in_turn(f"numbers {body.page}", run, background=True)
+
+    async def _in_turn(
+        self, page: str, calculate: Callable[[], Any], *, background: bool = False
+    ) -> Response:
         try:
-            run = partial(self.studio.gaps, body.state)
-            gaps = await self.studio.turns.take(f"loads {body.page}", run, background=True)
-            return _json({"loads": gaps})
+            return _json(await self.studio.turns.take(page, calculate, background=background))
         except OvertakenError:
             return _json({"overtaken": True})
 
@@ -254,7 +250,7 @@ class _Routes:
         body = SaveRequest.model_validate_json(await request.body())
 
         def save() -> str:
-            machine, _ = self.studio.opened(body.state.machine)
+            machine, *_ = self.studio.opened(body.state.machine)
             with machine.lock:
                 return save_machine(
                     self.studio.machines, machine, body.state, body.name, body.overwrite
@@ -271,7 +267,7 @@ class _Routes:
         body = StudyRequest.model_validate_json(await request.body())
 
         def start() -> str:
-            machine, _ = self.studio.opened(body.state.machine)
+            machine, *_ = self.studio.opened(body.state.machine)
             with machine.lock:
                 return self.studio.jobs.start(
                     self.studio.machines, machine, body.state, body.study, body.options

@@ -120,13 +120,14 @@ def orbits_figure(record: Record, y_front: float, y_rear: float) -> Figure:
     titles = _depths(y_front, y_rear)
     paths = [axis_path_mm(record, y) for y in (y_front, y_rear)[: len(titles)]]
     largest = moment_of_largest_amplitude(record)
-    windows = [orbit_window(record, largest, turns) for turns in (ORBIT_REVOLUTIONS, 1.0)]
+    moments, angle = record.time.values, record.drum_angle.values
+    windows = [orbit_window(moments, angle, largest, turns) for turns in (ORBIT_REVOLUTIONS, 1.0)]
     x_limit, z_limit = orbit_limits([path[windows[0]] for path in paths])
     x = Axis(label="x, to the right, mm", range=(-x_limit, x_limit))
     z = Axis(label="z, up, mm", range=(-z_limit, z_limit))
     speed = record.drum_speed.values[largest] * RPM_PER_RAD_S
-    moment = f"largest amplitude: {record.time.values[largest]:.2f} s, {number(speed, 0)} rpm"
-    time = record.time.values[windows[0]]
+    moment = f"largest amplitude: {moments[largest]:.2f} s, {number(speed, 0)} rpm"
+    time = moments[windows[0]]
     keys = (f"{time[0]:.1f} s to {time[-1]:.1f} s", "revolution around it", moment)
     panels = [
         Panel(title=title, marks=_orbit(path, windows, largest, keys), x=x, y=z, is_square=True)
@@ -178,14 +179,15 @@ def axis_path_mm(record: Record, y: float) -> FloatArray:
     return (axis_motion(record, y) - at_rest) * MM_PER_M
 
 
-def orbit_window(record: Record, index: int, revolutions: float) -> BoolArray:
+def orbit_window(
+    time: FloatArray, drum_angle: FloatArray, index: int, revolutions: float
+) -> BoolArray:
     """Return which samples (n,) an orbit shows.
 
     These are the samples within the given number of drum revolutions around the sample `index`, but
     not beyond the longest time of an orbit.
     """
-    turned = np.abs(record.drum_angle.values - record.drum_angle.values[index])
-    passed = np.abs(record.time.values - record.time.values[index])
+    turned, passed = np.abs(drum_angle - drum_angle[index]), np.abs(time - time[index])
     return np.asarray((turned <= np.pi * revolutions) & (passed <= 0.5 * LONGEST_ORBIT))
 
 

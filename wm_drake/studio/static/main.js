@@ -13,6 +13,7 @@ const PAGE = crypto.randomUUID();
 const MASS = {mass: '0.5 kg', radius: '235 mm', y: '0 mm', phase: '0 deg'};
 const MOST_VARIANTS = 4;
 const DESCRIBED = '— described —';
+const QUIET = 80;      // ms without a move after which the numbers to a picture are asked for
 
 const history_ = new History();
 const list = new NumberList(byId('numbers'), move);
@@ -22,15 +23,16 @@ const panels = {envelopes: new Map(), forces: new Map(), orbits: []};
 
 let state = null;      // what is chosen, as the server reads it
 let machine = null;    // the opened machine
-let answer = null;     // the answer that is drawn
+let answer = null;     // the answer that is drawn: a picture, and the latest numbers
 let ghost = null;      // the answer of the machine as it was, with the same load
-let loads = null;      // gap with each load, and the number of the request
 let variants = [];     // {name, state, answer}
 let turned = [];       // keys of the seven numbers
 let ranking = [];      // arrows of all numbers
 let asked = 0;         // number of the latest request
-let settled = 0;       // number of the latest request that has an answer or a problem
-let drawn = 0;         // number of the request that is drawn
+let settled = 0;       // number of the latest request that has a picture or a problem
+let drawn = 0;         // number of the request whose picture is drawn
+let numbered = 0;      // number of the request whose numbers are shown
+let pending = 0;       // how many requests wait for an answer
 
 /* ---- what is chosen ---- */
 
@@ -121,42 +123,59 @@ function chooseLoad(what) {
 
 async function run() {
   const number = ++asked;
-  showBusy();
   showPlace(number);
+  await busyWith(async () => {
+    await runPicture(number);
+    await runNumbers(number);
+  });
+}
+
+async function runPicture(number) {
   const begin = performance.now();
   try {
-    const found = await post('run', {page: PAGE, state, keys: turned});
+    const found = await post('run', {page: PAGE, state});
     if (found.overtaken || number < drawn) return;
     drawn = number;
-    answer = found;
-    showAnswer();
+    answer = {...answer, ...found};
+    showPicture();
     showProblems([], found.warnings);
     status(`${fixed(performance.now() - begin, 0)} ms · ${found.stepping.integrator}, ${digits(found.stepping.step_ms, 3)} ms steps`);
-    runLoads(number);
   } catch (error) {
     if (number !== asked) return;
     showProblems(error instanceof Problems ? error.problems : [{key: '', message: error.message}]);
     status('not run');
   } finally {
     settled = Math.max(settled, number);
-    showBusy();
   }
 }
 
-/** Ask for the gap with every load, after the answer to the chosen one, unless that is overtaken. */
-async function runLoads(number) {
-  if (number !== asked) return;
+/** Ask for the numbers to a picture, unless a later one is asked for meanwhile. */
+async function runNumbers(number) {
+  if (number === drawn) await new Promise((resolve) => setTimeout(resolve, QUIET));
+  if (number !== asked || number !== drawn) return;
   try {
-    const found = await post('loads', {page: PAGE, state});
-    if (found.overtaken || number < (loads?.number ?? 0)) return;
-    loads = {number, gaps: found.loads};
-    showVerdict();
-  } catch { /* a wrong number is shown by the run itself */ }
+    const found = await post('numbers', {page: PAGE, state, keys: turned});
+    if (found.overtaken || number !== asked) return;
+    numbered = number;
+    answer = {...answer, ...found};
+    showNumbers();
+  } catch { /* what is wrong is shown by the run itself */ }
 }
 
 /** Tell readers of the page, also those of a screen reader, whether an answer is under way. */
-function showBusy() {
-  document.body.setAttribute('aria-busy', String(settled < asked));
+async function busyWith(work) {
+  const show = () => document.body.setAttribute('aria-busy', String(pending > 0));
+  pending += 1;
+  show();
+  await work();
+  pending -= 1;
+  show();
+}
+
+/** Return a complete answer: its picture and its numbers. */
+async function wholeAnswer(page, of) {
+  const body = {page: `${PAGE} ${page}`, state: of};
+  return {...await post('run', body), ...await post('numbers', body)};
 }
 
 /** Show how many runs come before the last one, while it waits. */
@@ -175,7 +194,7 @@ async function runGhost() {
   const wanted = JSON.stringify(as);
   runGhost.wanted = wanted;
   try {
-    const found = await post('run', {page: `${PAGE} ghost`, state: as, keys: []});
+    const found = await wholeAnswer('ghost', as);
     if (found.overtaken || runGhost.wanted !== wanted) return;
     ghost = found;
     if (answer) showAnswer();
@@ -198,13 +217,13 @@ const NOT_DESIGNED = /^(loads|profile|sensors|imperfections|measured|step|output
 
 /** Take the seven numbers of the design that change the chosen measure most. */
 function chooseTurned() {
-  if (!answer) return;
+  if (!answer?.rows) return;
   const kind = byId('rank-by').value;
   const size = (of) => Math.max(0, ...of.changes.map((value, place) => (answer.rows[place]?.kind === kind ? Math.abs(value ?? 0) : 0)));
   const influences = ranking.filter(({key}) => !NOT_DESIGNED.test(key)).map((of) => ({key: of.key, size: size(of)})).filter((of) => of.size > 0);
   influences.sort((a, b) => b.size - a.size);
   turned = influences.slice(0, 7).map((of) => of.key);
-  run();
+  busyWith(() => runNumbers(asked));
 }
 
 /** Offer every kind of measure of the first answer for the choice of the seven numbers. */
@@ -224,7 +243,8 @@ function makePanels() {
   panels.envelopes = new Map(Object.keys(machine.sensors).map((name) => [name, new BandPanel(byId('envelopes'), name, 'mm', times.envelopes)]));
   panels.forces = new Map();
   panels.orbits = ['front', 'rear'].map((name) => new OrbitPanel(byId('orbits'), name));
-  answer = ghost = loads = null;
+  answer = ghost = null;
+  drawn = ++asked; // answers of the machine before are overtaken
 }
 
 const envelopeBand = (sides) => ({
@@ -237,33 +257,47 @@ const sizeOf = (bands) => Math.max(0, ...bands.map((band) => band
 
 function showAnswer() {
   if (!answer) return;
-  offerKinds();
+  showPicture();
+  showNumbers();
+}
+
+function showPicture() {
   showVerdict();
-  showMeasures(byId('measures'), answer, ghost, labelOf);
   list.show(state.values, answer.values);
   showEnvelopes();
-  showForces();
   showOrbits();
   showMotion();
+  showWhetherOld();
+}
+
+function showNumbers() {
+  if (!answer.rows) return;
+  offerKinds();
+  showMeasures(byId('measures'), answer, ghost, labelOf);
+  showForces();
   showVariants();
+  showWhetherOld();
+}
+
+/** Show table and forces paler until they are those of the picture. */
+function showWhetherOld() {
+  for (const id of ['measures', 'forces', 'variants']) byId(id).classList.toggle('old', numbered < drawn);
 }
 
 const touches = ({gap, diverged}) => Boolean(diverged || (gap && gap.distance <= 0));
 
 /** Say beside the sliders whether the tub touches the housing: the load that decides comes first. */
 function showVerdict() {
-  const {gap, diverged} = answer;
-  const chosen = {load: state.masses.length ? DESCRIBED : state.load, gap, diverged};
-  const others = (loads?.gaps ?? []).filter(({load}) => load !== chosen.load);
+  const [chosen] = answer.loads;
   const size = (of) => (of.diverged ? -Infinity : of.gap?.distance ?? Infinity);
-  const all = [chosen, ...others].sort((a, b) => size(a) - size(b));
+  const all = [...answer.loads].sort((a, b) => size(a) - size(b));
   const [first] = all;
   byId('verdict').classList.toggle('alarm', touches(first));
   if (first.diverged) byId('verdict').textContent = `The run with load ${first.load} diverged: no answer.`;
   else if (!first.gap) byId('verdict').textContent = 'The machine has no shapes: no gap is known.';
   else {
     const distance = fixed(first.gap.distance);
-    const which = others.length ? ` with load ${first.load}` : '';
+    const which = all.length > 1 ? ` with load ${first.load}` : '';
     byId('verdict').replaceChildren(
       make('strong', {}, touches(first) ? `The tub touches${which}: ${distance} mm` : `No contact: gap ${distance} mm${which}`),
       `${first.gap.moving} to ${first.gap.fixed} at ${fixed(first.gap.rpm, 0)} rpm`,
@@ -271,16 +305,15 @@ function showVerdict() {
   }
 }
 
-/** A button with the gap of a load, which shows that load; the others follow the chosen one. */
+/** A button with the gap of a load, which shows that load. */
 function gapOfLoad(of, isChosen) {
-  const now = of.diverged ? 'diverged' : fixed(of.gap.distance);
-  const before = isChosen && ghost?.gap && !ghost.diverged ? fixed(ghost.gap.distance) : now;
-  const text = `${of.load} ${now}${before === now ? '' : `, was ${before}`}`;
-  const isOld = !isChosen && loads.number < drawn;
+  const text = (one) => (one.diverged ? 'diverged' : fixed(one.gap.distance));
+  const before = ghost?.loads.find(({load}) => load === of.load);
+  const change = before && text(before) !== text(of) ? `, was ${text(before)}` : '';
   return make('button', {
-    class: [isOld && 'old', touches(of) && 'alarm'].filter(Boolean).join(' '), 'aria-pressed': String(isChosen),
-    title: `show load ${of.load}`, onclick: () => showOtherLoad(of.load),
-  }, text);
+    class: touches(of) ? 'alarm' : '', 'aria-pressed': String(isChosen),
+    title: `show load ${of.load}`, onclick: () => { if (!isChosen) showOtherLoad(of.load); },
+  }, `${of.load} ${text(of)}${change}`);
 }
 
 function showOtherLoad(name) {
@@ -445,9 +478,9 @@ function goTo(variant) {
 function keepVariant() {
   const names = new Set(variants.map((of) => of.name));
   const name = [...'ABCD'].find((letter) => !names.has(letter));
-  variants.push({name, state: copyOf(state), answer});
+  variants.push({name, state: copyOf(state), answer: numbered === asked ? answer : null});
   intoLink(state, variants);
-  showAnswer();
+  runVariants();
 }
 
 function removeVariant(variant) {
@@ -459,7 +492,7 @@ function removeVariant(variant) {
 async function runVariants() {
   for (const variant of variants.filter((of) => !of.answer)) {
     try {
-      variant.answer = await post('run', {page: `${PAGE} ${variant.name}`, state: variant.state, keys: []});
+      variant.answer = await wholeAnswer(variant.name, variant.state);
     } catch { variant.answer = null; } // its machine is gone: the table shows dashes
   }
   showAnswer();
