@@ -324,6 +324,20 @@ def test_help_does_not_wait_for_slow_libraries(tmp_path):
     assert not slow & imported_by(every, tmp_path)
 
 
+def test_a_shown_machine_does_not_wait_for_tables_and_statistics(tmp_path):
+    show = "from wm_drake.cli import main; sys.argv[1:] = ['machine', 'show', 'reference']; main()"
+    slow = {"pandas", "xarray", "pint", "h5py", "scipy.optimize", "scipy.stats", "matplotlib"}
+    imported = imported_by(show, tmp_path)
+    assert "wm_drake.model.build" in imported
+    assert not slow & imported
+
+
+def test_a_spin_page_does_not_wait_for_solvers_and_statistics(tmp_path):
+    modules = "wm_drake.studies.spin.page, wm_drake.studies.spin.task, wm_drake.studies.modes.study"
+    slow = {"scipy.optimize", "scipy.stats", "scipy.signal", "matplotlib", "plotly"}
+    assert not slow & imported_by(f"import {modules}", tmp_path)
+
+
 @pytest.mark.parametrize("name", COMMANDS)
 def test_the_list_of_commands_says_what_each_command_says(wm_drake, name):
     line = COMMANDS[name][1]

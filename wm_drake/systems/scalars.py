@@ -22,8 +22,9 @@ def define_system(name: str, module: str) -> Callable[[Callable[[type], Any]], A
     """Return the decorator of a system that converts between `SCALARS`.
 
     It is `TemplateSystem.define` of Drake. For each class Drake reads all frames of the stack,
-    twice, which takes seconds in total during an import of this package. The class for float is
-    therefore defined in a thread of its own, whose stack is short.
+    twice, which takes seconds in total during an import of this package. The first system of the
+    template needs the classes for all scalars. They are therefore defined in a thread of their own,
+    whose stack is short.
 
     Args:
         name: Name of the template.
@@ -33,7 +34,7 @@ def define_system(name: str, module: str) -> Callable[[Callable[[type], Any]], A
 
     def decorate(of_scalar: Callable[[type], Any]) -> Any:
         template = TemplateSystem.define(name, T_list=SCALARS, scope=scope)(of_scalar)
-        thread = threading.Thread(target=template.__getitem__, args=[None])
+        thread = threading.Thread(target=lambda: [template[scalar] for scalar in SCALARS])
         thread.start()
         thread.join()
         return template

@@ -15,7 +15,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.modes.linearisation import Spectrum
@@ -103,6 +102,8 @@ def _joined(
     halvings: int,
 ) -> tuple[Spectrum, FloatArray]:
     """Return the same modes at the next speed, and the least MAC on the way of each."""
+    from scipy.optimize import linear_sum_assignment  # slow to import: modes over the speed
+
     there = spectrum_at(after)
     table = mac(here, there)
     modes, partners = linear_sum_assignment(-table)

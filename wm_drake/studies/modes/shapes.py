@@ -1,6 +1,7 @@
 """Names and participation of modes: which coordinates move, which elements store and dissipate."""
 
 from dataclasses import dataclass
+from itertools import permutations
 
 import numpy as np
 
@@ -115,12 +116,10 @@ def names_of(shares: FloatArray) -> list[str]:
     Args:
         shares: Participation of the six coordinates in up to six modes. (modes, 6)
     """
-    from scipy.optimize import linear_sum_assignment  # slow to import: names of modes
-
-    modes, coordinates = linear_sum_assignment(-shares)
-    words = [NAMES[coordinate] for coordinate in COORDINATES]
-    names = {int(mode): words[c] for mode, c in zip(modes, coordinates, strict=True)}
-    return [names.get(mode, "other") for mode in range(len(shares))]
+    count = len(shares)
+    choices = np.array(list(permutations(range(len(COORDINATES)), count)))
+    best = np.argmax(shares[np.arange(count), choices].sum(axis=1))
+    return [NAMES[COORDINATES[coordinate]] for coordinate in choices[best]]
 
 
 def energies(

@@ -71,8 +71,9 @@ def simplified_indices(x: FloatArray, y: FloatArray, tolerance: float) -> IndexA
     while pieces:
         first, last = pieces.pop()
         piece = slice(first, last + 1)
-        error = np.abs(y[piece] - np.interp(x[piece], x[[first, last]], y[[first, last]]))
-        worst = first + int(np.argmax(error))
+        slope = (y[last] - y[first]) / ((x[last] - x[first]) or 1.0)
+        error = np.abs(y[piece] - (slope * (x[piece] - x[first]) + y[first]))
+        worst = first + int(error.argmax())
         if first < worst < last and error[worst - first] > tolerance:
             kept.add(worst)
             pieces += [(first, worst), (worst, last)]
