@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from ordinary_machine import ORDINARY
 
 from wm_drake import load_record
 from wm_drake.cli import COMMANDS
@@ -25,6 +26,40 @@ def test_check_of_the_reference(wm_drake):
     assert (ended.code, ended.out) == (0, "reference: machine 'reference' is valid\n")
     # warnings of what is unusual (wm_drake/model/expectations.py), and nothing else
     assert all(line.startswith("warning: ") and " unusual" in line for line in ended.messages)
+
+
+def test_check_of_several_machines_tells_all_problems(wm_drake):
+    Path("good.yaml").write_text(ORDINARY)
+    Path("typo.yaml").write_text("extends: reference\ngasket: {stifness_x: 3 N/mm}\n")
+    Path("two.yaml").write_text("extends: reference\ngravity: 9 kg\noutput_period: -1 ms\n")
+    ended = wm_drake("machine check good.yaml typo.yaml two.yaml nosuch.yaml --page pages")
+    assert ended.code == 2
+    assert ended.out.splitlines()[-1] == "good.yaml: machine 'ordinary' is valid"
+    problems = [line for line in ended.messages if not line.startswith("warning: ")]
+    assert [line.partition(":")[0] for line in problems] == [
+        *("typo.yaml", "two.yaml", "two.yaml", "nosuch.yaml")
+    ]
+    alone = [wm_drake(f"machine check {name}.yaml").err for name in ("typo", "two", "nosuch")]
+    assert "\n".join(problems) + "\n" == "".join(alone)
+    assert not Path("pages").exists()
+
+
+def test_check_of_several_machines_draws_a_page_of_each(wm_drake):
+    Path("good.yaml").write_text(ORDINARY)
+    ended = wm_drake("machine check good.yaml free_stroke good.yaml --page pages")
+    assert ended.code == 0
+    assert sorted(path.name for path in Path("pages").iterdir()) == [
+        "free_stroke.html",
+        "good.html",
+    ]
+    assert "ordinary" in Path("pages/good.html").read_text(encoding="utf-8")
+    for page, words in {
+        "pages/good.html": "folder",
+        "pages": "good.yaml and ./good.yaml would have the same page",
+    }.items():
+        refused = wm_drake(f"machine check good.yaml ./good.yaml --page {page}")
+        assert refused.code == 2
+        assert words in refused.err
 
 
 def test_shown_machine_is_complete(wm_drake, reference):

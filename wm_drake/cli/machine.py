@@ -1,7 +1,8 @@
 """Command `wm-drake machine`: list, start, check and show machine files."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -9,7 +10,7 @@ import typer
 
 from wm_drake.cli.common import JsonOption, SetOption
 from wm_drake.cli.new_machine import machine_new_with_options
-from wm_drake.errors import InputError, input_error, shortened
+from wm_drake.errors import InputError, WmDrakeError, input_error, shortened
 from wm_drake.report.terminal import say
 from wm_drake.studies.inputs import (
     built_with_problems,
@@ -26,7 +27,7 @@ app = typer.Typer(no_args_is_help=True)
 
 @app.command("check")
 def machine_check(
-    file: Annotated[str, typer.Argument(metavar="NAME|FILE")],
+    files: Annotated[list[str], typer.Argument(metavar="NAME|FILE...")],
     strict: Annotated[
         bool, typer.Option("--strict", help="Treat unusual values as errors.")
     ] = False,
@@ -34,19 +35,49 @@ def machine_check(
         Path | None,
         typer.Option(
             help="Write a page that draws the machine: parts, springs, dampers, gasket and sensors "
-            "at rest, natural frequencies, warnings.",
-            metavar="FILE.html",
+            "at rest, natural frequencies, warnings. For several machines: a folder, with a page "
+            "for each, written if all are valid.",
+            metavar="FILE.html|FOLDER",
         ),
     ] = None,
 ) -> None:
-    """Check a machine file. The exit code is 0, or 2 with one line per problem.
+    """Check machine files. The exit code is 0, or 2 with one line per problem of any file.
 
     Values outside the usual range are warned of.
     """
+    files = list(dict.fromkeys(files))
+    if len(files) == 1:
+        _check(files[0], strict, partial(_write_page, page) if page else None)
+        return
+    paths = _pages_in(page, files) if page else {}
+    texts: dict[Path, str] = {}
+    errors: list[InputError] = []
+    for file in files:
+        try:
+            _check(file, strict, partial(texts.__setitem__, paths[file]) if page else None)
+        except InputError as error:
+            errors.append(error)
+    if errors:
+        raise WmDrakeError("\n".join(map(str, errors)))
+    for path, text in texts.items():
+        _write_page(path, text)
+
+
+def _check(file: str, strict: bool, draw: Callable[[str], None] | None) -> None:
+    """Check a machine file and say what is unusual.
+
+    Args:
+        file: Name or path.
+        strict: Whether unusual values are errors.
+        draw: Called with the page of the machine.
+
+    Raises:
+        InputError: the machine cannot be used.
+    """
     parameters = load_parameters(file, None)
     machine, unusual = built_with_problems(file, parameters)
-    if page is not None:
-        _write_page(page, machine_page_of(machine, unusual))
+    if draw is not None:
+        draw(machine_page_of(machine, unusual))
     if unusual and strict:
         raise InputError(unusual)
     for problem in unusual:
@@ -57,6 +88,26 @@ def machine_check(
             f"is frame '{parameters.clearance_frame}', that of the first sensor"
         )
     say(f"{file}: machine '{parameters.name}' is valid")
+
+
+def _pages_in(folder: Path, files: Sequence[str]) -> dict[str, Path]:
+    """Return the path of the page of each of several machines.
+
+    Raises:
+        InputError: the folder is a file, or two machines would have the same page.
+    """
+    if folder.is_file() or folder.suffix == ".html":
+        raise input_error(
+            f"several machines have a folder of pages; {folder} is a file", where="--page"
+        )
+    paths = {file: folder / f"{Path(file).stem}.html" for file in files}
+    for path in paths.values():
+        same = [file for file in files if paths[file] == path]
+        if len(same) > 1:
+            raise input_error(
+                f"{' and '.join(same)} would have the same page, {path}", where="--page"
+            )
+    return paths
 
 
 def machine_page_of(machine: "Machine", unusual: "Sequence[Problem]") -> str:
@@ -73,6 +124,7 @@ def _write_page(path: Path, text: str) -> None:
         InputError: the file cannot be written.
     """
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")
     except OSError as error:
         raise input_error(f"cannot be written to: {error.strerror}", where=str(path)) from None
