@@ -53,6 +53,11 @@ def simulate(
         diverges, the record ends there, attrs["diverged"] gives the reason, and a
         DivergenceWarning is issued.
 
+        A record is an xarray Dataset. A notebook shows it with its variables and units. Each
+        variable has `plot`, and `to_pandas` or `to_dataframe`. The Dataset has no plot of its own,
+        since its variables have different units. Its table would have a row for each combination
+        of all labels; choose variables first.
+
     Raises:
         InputError: the load or the engine is unknown, the step size does not divide the output
             period, or the machine cannot be set up with the parameters of the case.
@@ -62,6 +67,12 @@ def simulate(
         >>> record = wm.simulate("reference", "middle")
         >>> record.displacement.dims, float(record.time[-1])
         (('time', 'sensor'), 70.0)
+        >>> lines = record.displacement.plot.line(x="time")  # a line for each sensor
+        >>> curve = record.mount_force.sel(mount="gasket", axis="x").plot()
+        >>> record.displacement.to_pandas().columns.tolist()
+        ['Xr', 'Yr', 'Zr', 'Xf', 'Yf', 'Zf']
+        >>> record[["drum_speed", "motor_torque"]].to_dataframe().shape
+        (14001, 2)
     """
     machine = machine_of(machine)
     if engine not in ENGINES:
