@@ -87,6 +87,12 @@ def test_design_depends_on_the_seed_only():
     assert not np.array_equal(first, other)
 
 
+def test_a_design_is_searched_for_once(monkeypatch):
+    first = d_optimal_levels(4, 70, "main+2fi", 3)
+    monkeypatch.setattr("wm_drake.studies.doe.exchange._exchanged", None)
+    np.testing.assert_array_equal(d_optimal_levels(4, 70, "main+2fi", 3), first)
+
+
 def oapackage_array(levels):
     return oapackage.array_link(np.ascontiguousarray(levels + 1, dtype=np.int32))
 

@@ -1,7 +1,10 @@
 """D-optimal designs by the modified Fedorov exchange of trials, with rank-two updates."""
 
+import hashlib
+
 import numpy as np
 
+from wm_drake.compiler.kept import kept
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.doe.coding import Levels, level_matrix, model_matrix
 from wm_drake.studies.threads import on_one_thread
@@ -18,7 +21,7 @@ SMALLEST_GAIN = 2e-4
 
 @on_one_thread
 def d_optimal_levels(factors: int, trials: int, model: str, seed: int) -> Levels:
-    """Search for distinct trials with the largest det X'X.
+    """Search for distinct trials with the largest det X'X; a design that was found is kept on disk.
 
     From a random start, each trial in turn is exchanged for the trial of the grid that raises the
     determinant most, until a pass over all trials raises it by too little [Cook and Nachtsheim
@@ -39,9 +42,18 @@ def d_optimal_levels(factors: int, trials: int, model: str, seed: int) -> Levels
     rng = np.random.default_rng(seed)
     grid = _grid(factors, rng)
     candidates = model_matrix(grid, model)
+    start = _independent_start(candidates, trials, rng)
+    inputs = hashlib.sha256(candidates.tobytes() + start.tobytes()).hexdigest()
+    best = kept(f"D-optimal exchange: {inputs}", lambda: _exchanged(candidates, start).tobytes())
+    chosen = np.frombuffer(best, start.dtype)
+    levels = grid[chosen]
+    return levels[np.lexsort(levels.T[::-1])]
+
+
+def _exchanged(candidates: FloatArray, start: np.ndarray) -> np.ndarray:
+    """Return the indices of the chosen trials after all passes, from those of the start."""
     columns = np.ascontiguousarray(candidates.T)
-    log_determinant = -np.inf
-    chosen = _independent_start(candidates, trials, rng)
+    chosen, log_determinant = start.copy(), -np.inf
     for _ in range(MOST_PASSES):
         _pass(columns, chosen)
         last, log_determinant = (
@@ -50,8 +62,7 @@ def d_optimal_levels(factors: int, trials: int, model: str, seed: int) -> Levels
         )
         if log_determinant - last < SMALLEST_GAIN * candidates.shape[1]:
             break
-    levels = grid[chosen]
-    return levels[np.lexsort(levels.T[::-1])]
+    return chosen
 
 
 def _grid(factors: int, rng: np.random.Generator) -> Levels:
