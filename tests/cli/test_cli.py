@@ -362,6 +362,7 @@ def test_help_does_not_wait_for_slow_libraries(tmp_path):
 def test_a_shown_machine_does_not_wait_for_tables_and_statistics(tmp_path):
     show = "from wm_drake.cli import main; sys.argv[1:] = ['machine', 'show', 'reference']; main()"
     slow = {"pandas", "xarray", "pint", "h5py", "scipy.optimize", "scipy.stats", "matplotlib"}
+    slow |= {"wm_drake.studies.run", "rich.progress"}
     imported = imported_by(show, tmp_path)
     assert "wm_drake.model.build" in imported
     assert not slow & imported

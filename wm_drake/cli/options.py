@@ -15,12 +15,6 @@ from pydantic.fields import FieldInfo
 from wm_drake.cli.common import JsonOption, folder_of
 from wm_drake.report.provenance import command_line
 from wm_drake.report.terminal import Console, say
-from wm_drake.studies.run import (
-    StudyInterrupted,
-    execute,
-    options_of_driver,
-    order_of,
-)
 from wm_drake.studies.study import Facts, Result, Study
 
 MOST_NAMED = 6
@@ -29,6 +23,8 @@ MOST_NAMED = 6
 
 def command_of(study: Study) -> Callable[..., None]:
     """Return the function of the command of a study, with a signature that typer understands."""
+    # slow to import, and not for commands without a study
+    from wm_drake.studies.run import StudyInterrupted, execute, options_of_driver, order_of
 
     def run(context: typer.Context, as_json: bool, **given: Any) -> None:
         chosen = {name: value for name, value in given.items() if _is_set(context, name)}
