@@ -8,7 +8,7 @@ A page asks for a text by a mark:
 - `<!-- public names -->`: the public names of the package;
 - `<!-- pages of decisions -->`: the decisions, below their list in the navigation;
 - `<!-- functions of MODULE -->`: the functions of a module of laws, or `MODULE: NAME NAME` of them;
-- `<!-- picture NAME -->`: a picture that is drawn from the code (`pictures.py`);
+- `<!-- picture NAME -->`: a picture that is drawn from the code (`pictures.py`, `schematics.py`);
 - `<!-- architecture -->`: the rooms of the package and their imports (`architecture.py`).
 """
 
@@ -23,6 +23,7 @@ from typing import Any
 
 import architecture
 import machine_keys
+import schematics  # noqa: F401  (registers its pictures)
 import typer
 from equations import mathml_of, with_indices
 from jupyter_cache import get_cache
