@@ -61,7 +61,7 @@ def test_light_tubes_on_stiff_bushings_move_as_the_strut_machine(built, tmp_path
         machine = build_machine(stiffer_and_lighter(built, share))
         errors.append(relative_error(regions(machine, 2.5e-4 / share), strut).max())
     assert errors[1] < 0.3 * errors[0]  # the error is proportional to mass and compliance
-    assert errors[1] < 6e-3
+    assert errors[1] < 8e-3
 
 
 @pytest.mark.slow

@@ -462,13 +462,13 @@ def test_telescopic_dampers_move_as_the_engine_moves_them():
 
 @pytest.mark.slow
 def test_response_follows_dampers_that_spin():
-    """Check 220 rpm, where the left damper turns by 2 degrees in a revolution of the drum.
+    """Check 200 rpm, where the left damper turns by a degree in a revolution of the drum.
 
     The engine never settles: its amplitudes follow the angles of the dampers. At each of these
     angles the harmonic balance has the same amplitudes.
     """
     machine = build_machine(wm.load_machine("free_stroke"))
-    setup, speed = machine.set_up("front"), 220.0 * RPM
+    setup, speed = machine.set_up("front"), 200.0 * RPM
     balance = HarmonicBalance(setup, Series(HARMONICS, 128))
     sizes = []
     for revolutions in (71, 271, 371):
@@ -482,8 +482,8 @@ def test_response_follows_dampers_that_spin():
         np.testing.assert_allclose(amplitudes(setup, own)[large], sizes[-1][large], rtol=5e-3)
         rates = balance.derivative(balance.states(motion, speed))[:, balance.derivative.free]
         spins = balance.kinematics.spin_rates(motion[0], rates.mean(axis=0))
-        assert 1.0 < 360.0 * abs(spins[0]) / speed < 3.0
-    assert np.ptp(sizes, axis=0).max() > 0.3e-3  # they vary by 3 % of 15 mm
+        assert 0.5 < 360.0 * abs(spins[0]) / speed < 3.0
+    assert np.ptp(sizes, axis=0).max() > 0.2e-3  # they vary by 2 % of 13 mm
 
 
 def test_telescopic_dampers_begin_at_any_speed():
