@@ -43,7 +43,16 @@ BOUND_PERCENT = {True: 0.1, False: 0.3}
 
 SPONGE = {"sponge_stiffness": 176e3, "sponge_damping": 90.0, "slider_damping": 400.0}  # [C]
 DAMPERS: dict[str, dict[str, object] | None] = {
-    "MSTV (reference)": None,
+    "HAVSIN (reference)": None,
+    "MSTV": {  # the dampers of the machine reference_2026_11
+        "law": "mstv",
+        "friction_force": 19.02,
+        "friction_damping": 0.0,
+        "regularisation_velocity": 1e-6,
+        "sponge_stiffness": 17.09e3,
+        "sponge_damping": 80.84,
+        "slider_damping": 45.01,
+    },
     "HAVSIN, full friction from 0.1 m/s": {
         "law": "havsin",
         "friction_force": 25.0,
@@ -157,7 +166,7 @@ def main() -> None:
     dampers = DAMPERS
     if arguments.quick:
         profiles = {"200 rpm": SpinProfile(time=(0.0, 3.0), speed=(0.0, 21.0))}
-        dampers = {"MSTV (reference)": None}
+        dampers = {"HAVSIN (reference)": None}
     text = []
     for name, damper in dampers.items():
         for speed, profile in profiles.items():

@@ -2,8 +2,8 @@
 
 MuJoCo moves tub and drum with the inertia of the machine, a free joint and a hinge, by its own
 Runge-Kutta scheme of fourth order at the default step. A callback that numba compiles evaluates the
-forces of springs, dampers and gasket, with the laws of this package; the deformations of the
-sponges are states of actuators without force. The drum follows the profile as in the Drake
+forces of springs, dampers and gasket, with the laws of this package. The gasket has constant
+stiffnesses, and the dampers have no states. The drum follows the profile as in the Drake
 diagram: its hinge has an armature of 1e8 kg m2 and the torque that accelerates it.
 
 MuJoCo leaves out: outputs of forces, motor torque and measures; corners of the profile between two
@@ -20,7 +20,7 @@ from pathlib import Path
 import mujoco
 import numba
 import numpy as np
-from compare_speed import gasket_cases
+from compare_speed import gasket_cases, linear_machine
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
@@ -64,7 +64,7 @@ def inertial(inertia: object) -> str:
 
 
 def mjcf(setup: Setup, step: float) -> str:
-    """Return the MuJoCo model of tub and drum, with a state for each sponge."""
+    """Return the MuJoCo model of tub and drum."""
     plant, context = setup.machine.plant, setup.plant_context
     joint = drum_joint(plant, setup.parameters.drive.joint)
     tub = plant.GetBodyByName("tub")
@@ -79,30 +79,27 @@ def mjcf(setup: Setup, step: float) -> str:
         " ".join(f"{value:.17g}" for value in vector)
         for vector in (X_TF.rotation() @ joint.revolute_axis(), X_TF.translation())
     )
-    sponges = '<general joint="drive" dyntype="user" gainprm="0"/>' * len(setup.dampers)
     return f"""<mujoco>
       <option timestep="{step}" integrator="RK4" gravity="0 0 {-setup.parameters.gravity}"/>
       <worldbody><body name="tub"><freejoint/>{inertial(of_tub)}
         <body name="drum"><joint name="drive" axis="{axis}" pos="{origin}"
           armature="{REFLECTED_INERTIA}"/>{inertial(of_drum)}</body></body></worldbody>
-      <actuator>{sponges}</actuator></mujoco>"""
+      </mujoco>"""
 
 
 def set_forces(data: mujoco.MjData, setup: Setup) -> list[object]:
     """Let MuJoCo call compiled force laws; return what must live as long as it does."""
     packed, layout = pack(setup)
-    rates = np.zeros(len(layout.dampers))
-    arrays = (data.qpos, data.qvel, data.act, data.qfrc_passive, packed, rates)
-    qpos, qvel, act, force, p_at, rates_at = (array.ctypes.data for array in arrays)
-    size, dampers, count = len(packed), layout.dampers, len(rates)
+    arrays = (data.qpos, data.qvel, data.qfrc_passive, packed)
+    qpos, qvel, force, p_at = (array.ctypes.data for array in arrays)
+    size, dampers = len(packed), layout.dampers
     springs, bushings = layout.springs, layout.bushings
 
     @numba.njit(error_model="numpy", fastmath={"contract", "nsz"})
     def apply() -> None:
         q, v = numba.carray(at_address(qpos), 8), numba.carray(at_address(qvel), 7)
-        z, total = numba.carray(at_address(act), count), numba.carray(at_address(force), 7)
+        total = numba.carray(at_address(force), 7)
         p = number_array(numba.carray(at_address(p_at), size))
-        sponge_rates = numba.carray(at_address(rates_at), count)
         w, x, y, u = q[3], q[4], q[5], q[6]
         r = (
             1.0 - 2.0 * (y * y + u * u), 2.0 * (x * y - w * u), 2.0 * (x * u + w * y),
@@ -120,10 +117,10 @@ def set_forces(data: mujoco.MjData, setup: Setup) -> list[object]:
             f = plus(f, spring_strut_wrench(motion, p, at)[0])
         for at in bushings:
             f = plus(f, six_component_bushing_wrench(motion, p, at)[0])
-        for d in range(count):
-            arm, line = friction_damper_line(motion, p, dampers[d])
-            tension, sponge_rates[d] = friction_damper_tension(line[1], z[d], p, dampers[d])
-            f = plus(f, friction_damper_wrench(motion, arm, line, tension, p, dampers[d]))
+        for at in dampers:
+            arm, line = friction_damper_line(motion, p, at)
+            tension, _ = friction_damper_tension(line[1], 0.0, p, at)
+            f = plus(f, friction_damper_wrench(motion, arm, line, tension, p, at))
         for k in range(3):
             total[k] += f[3 + k]
             total[3 + k] += r[k] * f[0] + r[3 + k] * f[1] + r[6 + k] * f[2]
@@ -132,13 +129,8 @@ def set_forces(data: mujoco.MjData, setup: Setup) -> list[object]:
     def passive(_model, _state):  # type: ignore[no-untyped-def]
         apply()
 
-    @numba.cfunc(types.float64(types.voidptr, types.voidptr, types.int32))
-    def sponge_rate(_model, _state, number):  # type: ignore[no-untyped-def]
-        return numba.carray(at_address(rates_at), count)[number]
-
     mujoco.set_mjcb_passive(passive.ctypes)
-    mujoco.set_mjcb_act_dyn(sponge_rate.ctypes)
-    return [packed, rates, apply, passive, sponge_rate]
+    return [packed, apply, passive]
 
 
 def run(setup: Setup, profile: SpinProfile, step: float) -> tuple[np.ndarray, float]:
@@ -159,14 +151,13 @@ def run(setup: Setup, profile: SpinProfile, step: float) -> tuple[np.ndarray, fl
         positions.append(data.qpos[:3].copy())
     spent = time.process_time() - begin
     mujoco.set_mjcb_passive(None)
-    mujoco.set_mjcb_act_dyn(None)
     assert alive
     return np.array(positions), spent
 
 
 def compared(profile: SpinProfile, count: int) -> list[str]:
     """Return the lines of the comparison."""
-    machine = build_machine(load_machine("reference"))
+    machine = build_machine(linear_machine())
     step = machine.parameters.step
     case = Case("middle", machine.parameters.loads["middle"], profile)
     positions, spent = run(machine.set_up(case.load), profile, step)

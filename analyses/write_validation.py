@@ -9,9 +9,9 @@ MSTV damper of [C]. It renews verification, validation and prediction on a page:
 
 Explanations of results that are missed are in validation_reasons.yaml, the tests of the
 verification in verification.yaml. Loads held out of the calibration, and fits with fewer free
-quantities, take hours: calibrate_reference.py wrote them to reference_held_out.csv and
-reference_fewer.csv. The script takes about two minutes; with --tests, which runs the tests
-except those marked `hours`, three to five more.
+quantities, take hours: calibrate_reference.py wrote them for the machine `reference_2026_11` to
+reference_2026_11_held_out.csv and reference_2026_11_fewer.csv. The script takes about two minutes;
+with --tests, which runs the tests except those marked `hours`, three to five more.
 """
 
 import argparse
@@ -57,7 +57,7 @@ from wm_drake.studies.validation import page, rows
 
 HERE = Path(__file__).parent
 REASONS, VERIFICATION = HERE / "validation_reasons.yaml", HERE / "verification.yaml"
-HELD_OUT, FEWER = HERE / "reference_held_out.csv", HERE / "reference_fewer.csv"
+HELD_OUT, FEWER = HERE / "reference_2026_11_held_out.csv", HERE / "reference_2026_11_fewer.csv"
 SHOWN_BY_A = ("2", "5", "29")  # cases of [A] Table 9 that [A] describes
 
 
@@ -111,7 +111,7 @@ def compared(reference: MachineParameters, quick: bool, means_kind: str) -> list
 
 
 def simpler_machines() -> pd.DataFrame:
-    """Return the reference machine's fits with fewer free quantities, as a table of texts."""
+    """Return the fits of `reference_2026_11` with fewer free quantities, as a table of texts."""
     table = pd.read_csv(FEWER, keep_default_na=False)
     names = [str(text).replace(" ", ", ").replace("_", " ") for text in table.set_to_expected]
     return pd.DataFrame(
@@ -194,7 +194,7 @@ def main() -> None:
     ]
     reasons = {str(key): str(text) for key, text in read_yaml(REASONS).items()}
     groups = YAML(typ="safe").load(VERIFICATION)
-    fewer = {"Reference machine with fewer free quantities": simpler_machines()}
+    fewer = {"Machine reference_2026_11 with fewer free quantities": simpler_machines()}
     text = page.origin(command, notes)
     text += page.verified(groups, run_tests(groups) if arguments.tests else {})
     text += page.compared(table, rows.FITTED, reasons, fewer)

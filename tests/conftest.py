@@ -27,6 +27,12 @@ def reference():
 
 
 @pytest.fixture(scope="session")
+def earlier():
+    """Return the earlier reference machine: constant gasket stiffnesses, dampers with a sponge."""
+    return load_machine("reference_2026_11")
+
+
+@pytest.fixture(scope="session")
 def shipped():
     """Return a function that builds a shipped machine, each once; tests set up their own Context."""
     return functools.cache(lambda name: build_machine(load_machine(name)))

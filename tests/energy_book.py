@@ -135,18 +135,11 @@ class EnergyBook:
             length, direction, velocity = self._strut(placed)
             rate = np.sum(direction * velocity, axis=1)
             tension = self.record.damper_tension.values[:, index]
-            deformation = self.record.damper_deformation.values[:, index]
-            # s = k1 delta + c1 delta' gives delta', and w = v - delta'
-            deformation_rate = (tension - kind.sponge_stiffness * deformation) / kind.sponge_damping
-            w = rate - deformation_rate
-            friction = tension - kind.slider_damping * w
-            stored = stored + 0.5 * kind.sponge_stiffness * deformation**2
-            power = (
-                power
-                + kind.sponge_damping * deformation_rate**2
-                + kind.slider_damping * w**2
-                + friction * w
-            )
+            if hasattr(kind, "sponge_stiffness"):
+                energy, lost = self._sponge(kind, index, rate, tension)
+                stored, power = stored + energy, power + lost
+            else:
+                power = power + tension * rate
             line = placed.p_ToA_T - placed.p_WH
             axis = line / np.linalg.norm(line)
             w_strut = np.cross(direction, velocity) / length[:, None]
@@ -170,6 +163,15 @@ class EnergyBook:
                     + b.friction_torque * np.sin(np.pi / 2 * full) * speed
                 )
         return stored, power
+
+    def _sponge(self, kind, index, rate, tension):
+        """Return stored energy [J] and dissipated power [W] of a damper with a sponge."""
+        deformation = self.record.damper_deformation.values[:, index]
+        # s = k1 delta + c1 delta' gives delta', and w = v - delta'
+        deformation_rate = (tension - kind.sponge_stiffness * deformation) / kind.sponge_damping
+        w = rate - deformation_rate
+        power = kind.sponge_damping * deformation_rate**2 + tension * w
+        return 0.5 * kind.sponge_stiffness * deformation**2, power
 
     def balance(self):
         """Return work of the drive, change of stored energy and dissipated energy. [J]"""
@@ -203,7 +205,7 @@ def dense_record(machine, case, step):
     def sample(alpha):
         time.append(context.get_time())
         state.append(machine.plant.GetPositionsAndVelocities(plant_context))
-        deformation.append([c.get_continuous_state_vector().GetAtIndex(0) for c in dampers])
+        deformation.append([sum(c.get_continuous_state_vector().CopyToVector()) for c in dampers])
         stretches.append(
             np.concatenate([c.get_continuous_state_vector().CopyToVector() for c in bushings])
         )

@@ -4,6 +4,7 @@ import numpy as np
 
 from wm_drake.parameters import Load, SpinProfile, Unbalance, load_machine, with_values
 from wm_drake.parameters.machine import BodyOverride, InertiaMatrix
+from wm_drake.parameters.variation import number_at
 
 STIFFNESS = 7000.0  # N/m
 DAMPING = 55.0  # N s/m
@@ -44,6 +45,11 @@ def isotropic_machine(stiffness=STIFFNESS, damping=DAMPING, rotational_stiffness
     return type(reference).model_validate(tree)
 
 
+def at_rest(parameters, name):
+    """Return a stiffness of the gasket at rest, N/m or N m/rad."""
+    return number_at(parameters, f"gasket.{name}").nominal
+
+
 def with_gasket_tables(parameters):
     """Return a machine whose gasket gets stiffer with displacement and angle.
 
@@ -53,8 +59,8 @@ def with_gasket_tables(parameters):
     displacement, angle = 15e-3 * STEPS, 0.05 * STEPS
     tables = {}
     for axis in "xyz":
-        force = getattr(parameters.gasket, f"stiffness_{axis}") * 15e-3 * HARDENING
-        torque = getattr(parameters.gasket, f"rotational_stiffness_{axis}") * 0.05 * HARDENING
+        force = at_rest(parameters, f"stiffness_{axis}") * 15e-3 * HARDENING
+        torque = at_rest(parameters, f"rotational_stiffness_{axis}") * 0.05 * HARDENING
         tables[f"gasket.stiffness_{axis}"] = {
             "displacement": displacement.tolist(),
             "force": force.tolist(),

@@ -18,6 +18,7 @@ from wm_drake.parameters.designs import load_design
 from wm_drake.parameters.free import FreeFile, load_free
 from wm_drake.parameters.gasket_drawing import load_gasket_drawing
 from wm_drake.parameters.tolerances import load_limits, load_tolerances
+from wm_drake.parameters.variation import number_at
 from wm_drake.report.diagram import mermaid
 from wm_drake.simulation.measures import measure
 from wm_drake.simulation.runs import simulate
@@ -112,9 +113,9 @@ def test_the_python_snippets_run(path):
     assert names["record"].sizes["time"] == round(SHORT.duration / 5e-3) + 1
     if path == page("batch"):
         table = names["table"]
-        assert list(table.case.values[:2]) == ["0 % softer", "5 % softer"]
+        assert list(table.case.values[:2]) == ["0 % less", "5 % less"]
         assert len(set(table.gasket_force.sel(axis="x").values)) == 8
-        alone = measure(simulate(names["machine"], names["softer"](35)))
+        alone = measure(simulate(names["machine"], names["worn"](35)))
         assert table.gasket_force.values[7] == pytest.approx(alone.gasket_force.values, rel=1e-9)
 
 
@@ -123,17 +124,17 @@ def test_the_snippet_of_the_readme_is_short():
     assert len([line for line in code.splitlines() if line.strip()]) <= 5
 
 
-MACHINES = [  # page, index of the block, a number in it by key path, whether nothing in it is unusual
-    (README, 0, "bodies.upper_counterweight.mass", 9.5, True),
-    (page("own-machine"), 0, "bodies.upper_counterweight.mass", 9.5, True),
-    (page("own-machine"), 1, "spring_types.suspension.stiffness", None, True),
-    (page("own-machine"), 2, "imperfections.residual_imbalance.mass", 0.02, False),
-    (page("compliant-bearing"), 0, "imperfections.bearing.y", None, False),
-    (page("drive"), 0, "drive.belt_ratio", 12.0, False),
-    (page("extend"), 0, "elements.slow.coefficient", 400.0, False),
-    (page("floor"), 0, "cabinet.friction", 0.5, False),
-    (page("floor"), 1, "cabinet.foot_type.vertical_stiffness", 150e3, False),
-    (page("rubber"), 0, "gasket.dahl_force_y", 4.0, False),
+MACHINES = [  # page, index of the block, a number in it by key path
+    (README, 0, "bodies.upper_counterweight.mass", 9.5),
+    (page("own-machine"), 0, "bodies.upper_counterweight.mass", 9.5),
+    (page("own-machine"), 1, "spring_types.suspension.stiffness", None),
+    (page("own-machine"), 2, "imperfections.residual_imbalance.mass", 0.02),
+    (page("compliant-bearing"), 0, "imperfections.bearing.y", None),
+    (page("drive"), 0, "drive.belt_ratio", 12.0),
+    (page("extend"), 0, "elements.slow.coefficient", 400.0),
+    (page("floor"), 0, "cabinet.friction", 0.5),
+    (page("floor"), 1, "cabinet.foot_type.vertical_stiffness", 150e3),
+    (page("rubber"), 0, "gasket.dahl_force_y", 4.0),
 ]
 OTHERS = [
     (page("bench-to-machine"), 0, load_component),
@@ -146,10 +147,8 @@ OTHERS = [
 ]
 
 
-@pytest.mark.parametrize(("path", "index", "key", "value", "is_usual"), MACHINES)
-def test_the_machines_of_the_pages_are_in_order(
-    path, index, key, value, is_usual, tmp_path, wm_drake
-):
+@pytest.mark.parametrize(("path", "index", "key", "value"), MACHINES)
+def test_the_machines_of_the_pages_are_in_order(path, index, key, value, tmp_path, wm_drake):
     wm.register_element(DRAG_DAMPER)
     file = written(tmp_path, path, index)
     text = file.read_text(encoding="utf-8")
@@ -161,7 +160,7 @@ def test_the_machines_of_the_pages_are_in_order(
     setup = build_machine(mine).set_up(mine.loads.get("towel", mine.loads["middle"]))
     assert max(abs(setup.residual)) < 1e-9
     assert all(spring.preload > 0.0 for spring in setup.springs.values())
-    assert not is_usual or wm_drake("machine", "check", file, "--strict").code == 0
+    assert wm_drake("machine", "check", file).code == 0
 
 
 @pytest.mark.parametrize(("path", "index", "load"), OTHERS)
@@ -205,5 +204,8 @@ def test_the_free_file_of_the_calibration_fits_the_reference_machine(machine):
     free = load_free(CHECKOUT / "analyses" / "reference_free.yaml")
     parameter_map = parameter_map_of(machine, free)
     made = parameter_map.parameters_at(parameter_map.start)
-    tilts = made.gasket.rotational_stiffness_x + made.gasket.rotational_stiffness_z
-    assert tilts < made.gasket.stiffness_y * 0.18**2
+    tilt, axial = (
+        number_at(made, f"gasket.{name}").nominal
+        for name in ("rotational_stiffness_x", "stiffness_y")
+    )
+    assert 2.0 * tilt < axial * 0.18**2

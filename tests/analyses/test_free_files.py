@@ -14,7 +14,7 @@ from wm_drake.studies.calibration.parameter_map import parameter_map_of
 ANALYSES = Path(__file__).parents[2] / "analyses"
 
 
-@pytest.mark.parametrize("name", ["reference", "adams_2026"])
+@pytest.mark.parametrize("name", ["reference", "reference_2026_11"])
 def test_the_start_of_a_free_file_is_the_shipped_machine(name):
     machine = build_machine(load_machine(name))
     parameter_map = parameter_map_of(machine, load_free(ANALYSES / f"{name}_free.yaml"))

@@ -44,7 +44,11 @@ def test_rotations_give_moments(wm_drake):
 def test_the_machine_may_be_changed_on_the_command_line(wm_drake):
     change = ("--set", "damper_types.friction.friction_force=200 N", "--sponge-mass", "10 g")
     plain, changed = (
-        json.loads(wm_drake("rig damper -f '1 Hz' -a '10 mm' --json", *more).out)
+        json.loads(
+            wm_drake(
+                "rig damper --machine reference_2026_11 -f '1 Hz' -a '10 mm' --json", *more
+            ).out
+        )
         for more in ((), (*change, "--overwrite"))
     )
     assert changed["peak_force_N"] > 3.0 * plain["peak_force_N"]
@@ -102,7 +106,7 @@ def loops_of(wm_drake):
 
 def test_a_damper_goes_from_the_bench_into_a_machine(wm_drake, loops_of):
     files = loops_of("damper", "--component", "mstv_damper", "-f", "1,10 Hz", "-a", "0.3,1 mm")
-    ended = wm_drake("identify", "damper", *files, "--out", "fit", "--json")
+    ended = wm_drake("identify", "damper", *files, "--law", "mstv", "--out", "fit", "--json")
     assert ended.code == 0
     found = json.loads(ended.out)
     truth = load_component("mstv_damper").parameters
@@ -218,8 +222,9 @@ def test_other_changes_of_the_machine_are_kept(wm_drake, loops_of):
 
 
 def test_a_bad_fit_is_called_bad_first(wm_drake, loops_of):
-    files = loops_of("damper", "-f", "1,3 Hz", "-a", "1,5 mm")
-    ended = wm_drake("identify", "damper", *files, "--law", "coulomb", "--out", "fit")
+    sponge = ("--machine", "reference_2026_11")
+    files = loops_of("damper", *sponge, "-f", "1,3 Hz", "-a", "1,5 mm")
+    ended = wm_drake("identify", "damper", *files, *sponge, "--law", "coulomb", "--out", "fit")
     assert ended.code == 0
     assert ended.out.startswith("Poor fit: the lack of fit is ")
     assert re.search(r"RMSE [\d.]+ N\b", ended.out)
@@ -232,7 +237,7 @@ def test_a_bad_fit_is_called_bad_first(wm_drake, loops_of):
         table = pd.read_csv(path)
         table["force_N"] *= -1.0
         table.to_csv(path, index=False)
-    ended = wm_drake("identify", "damper", *files, "--out", "flipped", "--json")
+    ended = wm_drake("identify", "damper", *files, *sponge, "--out", "flipped", "--json")
     (hint,) = json.loads(ended.out)["judgement"]["hints"]
     assert "wrong sign in all 4 loops" in hint
 

@@ -44,7 +44,7 @@ ALIKE = {
     "reference": "test_fmu.py runs it",
     "light_cabinet": "the machine of rubber has its feet",
     "heavy_cabinet": "other numbers of light_cabinet",
-    "adams_2026": "laws and tables that free_stroke has",
+    "reference_2026_11": "other numbers of the reference machine, a law that motor_mstv has",
     "rodrigues_2010": "two bushings alone",
 }
 """Machines without compiled code that others do not have, and why."""

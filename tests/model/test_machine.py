@@ -67,9 +67,9 @@ def test_only_a_spring_that_pushes_may_have_a_compressive_preload(machine, refer
     [
         ("bodies.upper_counterweight.mass", 11.0),
         ("bodies.motor.centre_of_mass", (0.02, 0.13, -0.28)),
-        ("frames.damper_left_tub.position", (-0.22, -0.05, -0.17)),
-        ("frames.spring_left_housing.position", (-0.22, -0.06, 0.37)),
-        ("gasket.stiffness_x", 4000.0),
+        ("frames.damper_left_tub.position", (-0.23, -0.01, -0.15)),
+        ("frames.spring_left_housing.position", (-0.31, -0.19, 0.41)),
+        ("gasket.damping_x", 30.0),
         ("damper_types.friction.friction_force", 40.0),
     ],
 )
@@ -114,7 +114,7 @@ def test_an_unbalanced_override_finds_its_own_equilibrium(machine, reference):
     )
     setup = machine.set_up(parameters=changed)
     assert np.max(np.abs(setup.residual)) < 1e-9
-    assert 0.0 < np.max(np.abs(setup.rest_pose)) < 0.02
+    assert 0.0 < np.max(np.abs(setup.rest_pose)) < 0.03
 
 
 def test_springs_that_cannot_hold_the_tub_are_refused(machine, reference):

@@ -137,7 +137,7 @@ def test_curve_that_cannot_be_a_number_is_scaled(reference):
 
 FAULTS = {
     "falling": ("K_Lx=150 %..50 %", "do not rise"),
-    "zero": ("damper_types.friction.friction_damping", "do not rise (the value is 0)"),
+    "zero": ("gasket.friction_torque_x", "do not rise (the value is 0)"),
     "unit": ("K_Lx=1 N..2 N", "unit 'N' does not fit"),
     "form": ("K_Lx=1 N/mm", "is not of the form NAME=LOW..HIGH"),
     "range": ("K_Lx=-50 %..50 %", "out of range"),

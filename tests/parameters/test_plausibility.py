@@ -25,7 +25,6 @@ SLIPS = {
     "spring in kN/mm": {"spring_types.suspension.stiffness": "6.5 kN/mm"},
     "gasket in N/mm^-1": {"gasket.damping_x": "19 N s/mm"},
     "friction in kN": {"damper_types.friction.friction_force": "40 kN"},
-    "sponge in N/m": {"damper_types.friction.sponge_stiffness": "50 N/m"},
     "no gravity": {"gravity": "981 m/s^2"},
     "phase in rad": {"imperfections.phase_error": "180 deg"},
 }
@@ -37,6 +36,12 @@ def test_slip_is_found(reference, slip):
     (problem,) = unusual_numbers(with_values(reference, SLIPS[slip]))
     assert problem.key == key
     assert " is unusual; usual is " in problem.message
+
+
+def test_slip_of_a_sponge_is_found(earlier):
+    soft = with_values(earlier, {"damper_types.friction.sponge_stiffness": "50 N/m"})
+    (problem,) = unusual_numbers(soft)
+    assert problem.key == "damper_types.friction.sponge_stiffness"
 
 
 @pytest.mark.parametrize(

@@ -194,7 +194,7 @@ def test_option_figures_of_a_command(wm_drake, tmp_path):
     assert ended.code == 0, ended.err
     names = [path.name for path in (tmp_path / "b").iterdir()]
     assert "run.json" in names
-    assert sum(name.endswith(".pdf") for name in names) == 2  # one period, friction law
+    assert sum(name.endswith(".pdf") for name in names) == 1  # one period
     again = wm_drake(*rig, "--out", "c", "--figures", "b")
     assert again.code == 2
     assert "b: holds an earlier run" in again.err

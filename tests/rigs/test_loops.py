@@ -205,7 +205,7 @@ def test_a_sponge_of_a_milligram_is_massless_in_all_tests_of_c(motion):
 
 def test_all_tests_of_c_run_with_a_sponge_of_ten_grams():
     motions = MATRICES["damper"]["C"]
-    damper = load_machine("reference").damper_types["friction"]
+    damper = load_machine("reference_2026_11").damper_types["friction"]
     loops = {m: force_loops(damper_bench(damper, m), motions) for m in (0.0, 0.01)}
     assert len(loops[0.01]) == 18
     for heavy, massless in zip(loops[0.01], loops[0.0], strict=True):

@@ -250,7 +250,7 @@ def test_a_cabinet_that_tips_over_is_said_to():
     """Check that both engines and a batch name the time and the side."""
     feet = {n: {"x": 0.06 if "right" in n else -0.06, "y": f.y} for n, f in FEET_PLACES.items()}
     machine = build_machine(with_moving_cabinet(feet=feet, friction=2.0, mass=14.0))
-    load = Load(unbalances=(Unbalance(mass=3.0, radius=0.25, y=0.0),))
+    load = Load(unbalances=(Unbalance(mass=4.0, radius=0.25, y=0.0),))
     case = Case("heavy", load, SpinProfile(time=(0.0, 4.0), speed=(5.0, 17.0)))
     with pytest.warns(DivergenceWarning, match="the cabinet tips over to its"):
         told = simulate(machine, case).attrs["diverged"]

@@ -1,8 +1,8 @@
 """The reference machine against the published numbers of [B].
 
 The limits are those that the calibration of this machine reached (analyses/calibrate_reference.py).
-It used all 36 amplitudes and all 18 means, so these tests pin a fit; they do not test a prediction.
-See docs/theory/fits.md.
+It used half of the printed amplitudes and all of Table 5, so these tests pin a fit; they do not test
+a prediction. See docs/theory/fits.md.
 """
 
 import numpy as np
@@ -11,6 +11,7 @@ import pytest
 from wm_drake.batch import simulate_many
 from wm_drake.parameters import measured_amplitudes, published_results
 from wm_drake.parameters.measured import DESIGN, NamedValue
+from wm_drake.parameters.variation import number_at
 from wm_drake.simulation.cases import case_of
 from wm_drake.simulation.runs import simulate
 from wm_drake.studies.calibration.response_targets import ComputedResponses, response_targets_of
@@ -32,11 +33,21 @@ def table(machine, reference, targets):
     return simulate_many(machine, cases, measures=("amplitudes", "gap", "spring tensions"))
 
 
-def test_amplitudes_are_within_the_limits(table, targets):
-    errors = np.abs(table.amplitude.values / targets.amplitude - 1.0)
-    assert errors.size == 36
-    assert errors.mean() <= 0.078
-    assert errors.max() <= 0.20
+def test_amplitudes_are_within_the_limits(table, targets, reference):
+    measured = np.abs(table.amplitude.values / targets.amplitude - 1.0)
+    printed = measured_amplitudes(reference)
+    printed = printed[printed.source == "Adams model of [B]"].set_index("load")
+    of_adams = []
+    for (load, gasket), amplitude in zip(targets.loads, table.amplitude.values, strict=True):
+        if gasket:
+            theirs = printed.loc[load, list(reference.sensors)].to_numpy(float)
+            of_adams.append(np.abs(1e3 * amplitude / theirs - 1.0))
+    assert np.size(of_adams) == 24
+    assert np.mean(of_adams) <= 0.052
+    assert np.max(of_adams) <= 0.25  # Xf of the front load: docs/misprints.md, B8
+    without = measured[[not gasket for _, gasket in targets.loads]]
+    assert without.size == 12
+    assert without.mean() <= 0.15
 
 
 def test_means_of_the_gasket_study_are_within_the_limits(machine, reference):
@@ -53,9 +64,8 @@ def test_means_of_the_gasket_study_are_within_the_limits(machine, reference):
     computed = ComputedResponses(machine, targets)([reference])[0]
     errors = dict(zip(published, np.abs(computed / list(published.values()) - 1.0), strict=True))
     assert len(errors) == 18
-    assert np.mean(list(errors.values())) <= 0.15
-    assert max(errors.values()) <= 0.50
-    assert max(error for (_, name), error in errors.items() if name == "My") <= 0.25
+    assert np.mean(list(errors.values())) <= 0.085
+    assert max(errors.values()) <= 0.19
 
 
 def test_gasket_changes_amplitudes_in_the_measured_direction(table, targets):
@@ -67,16 +77,32 @@ def test_gasket_changes_amplitudes_in_the_measured_direction(table, targets):
         [np.sign(measured[load]) == np.sign(computed[load]) for load in ("middle", "counter")]
     )
     assert clear.sum() == 9
-    assert (same & clear).sum() >= 8  # not Xr of the middle load
+    assert (same & clear).sum() >= 7  # not Zr and Yf of the counter load
 
 
 def test_gasket_is_what_a_rubber_ring_can_be(reference):
+    """Check the relations of [B] section 3.1.1 and those of a ring."""
     gasket = reference.gasket
+    assert gasket.stiffness_x == gasket.stiffness_z
+    assert gasket.rotational_stiffness_x == gasket.rotational_stiffness_z
+    radial, axial, tilt, torsion = (
+        number_at(reference, f"gasket.{name}").nominal
+        for name in (
+            "stiffness_x",
+            "stiffness_y",
+            "rotational_stiffness_x",
+            "rotational_stiffness_y",
+        )
+    )
+    assert axial < radial
+    assert tilt < torsion
     # K_x + K_z is the integral of both stiffnesses per length; the tangential one makes K_Ty
-    bound = (gasket.stiffness_x + gasket.stiffness_z) * R_GASKET**2
-    assert 0.4 * bound < gasket.rotational_stiffness_y < 0.9 * bound
-    tilts = gasket.rotational_stiffness_x + gasket.rotational_stiffness_z
-    assert tilts < gasket.stiffness_y * R_GASKET**2
+    assert 0.4 * 2.0 * radial * R_GASKET**2 < torsion < 0.95 * 2.0 * radial * R_GASKET**2
+    assert 2.0 * tilt < axial * R_GASKET**2
+    for curve in (gasket.stiffness_y, gasket.rotational_stiffness_y):
+        values = np.array(curve.force if hasattr(curve, "force") else curve.torque)
+        assert values == pytest.approx(-values[::-1])  # alike in tension and compression
+        assert (np.diff(values, 2)[len(values) // 2 :] > 0.0).all()  # it stiffens
 
 
 def test_springs_stay_taut_and_the_tub_does_not_touch(table):

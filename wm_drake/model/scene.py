@@ -151,7 +151,7 @@ class Scene:
         >>> scene = wm.Scene(machine.parameters)
         >>> gap = wm.measure(wm.simulate(machine, "middle"), scene).smallest_gap
         >>> gap.moving, gap.fixed
-        ('front_counterweight_right_block', 'wall_front')
+        ('tub_shell', 'detergent_box')
     """
 
     def __init__(self, parameters: MachineParameters, meshcat: Meshcat | None = None) -> None:

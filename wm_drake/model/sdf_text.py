@@ -93,8 +93,13 @@ def _set_position(pose: Any, position: tuple[float, ...]) -> None:
 
 
 def _set_body(inertial: Any, body: BodyOverride) -> None:
-    """Write the mass properties of an override into an inertial element."""
+    """Write the mass properties of an override into an inertial element.
+
+    A mass without inertia scales the inertia of the element, as it does in the machine.
+    """
     if body.mass is not None:
+        if body.inertia is None:
+            _scale_inertia(inertial, body.mass)
         _set_text(_only(inertial, "mass"), _digits(body.mass))
     if body.centre_of_mass is not None:
         _set_position(_only(inertial, "pose"), body.centre_of_mass)
@@ -103,6 +108,13 @@ def _set_body(inertial: Any, body: BodyOverride) -> None:
             _set_text(
                 _only(_only(inertial, "inertia"), f"i{axis}"), _digits(getattr(body.inertia, axis))
             )
+
+
+def _scale_inertia(inertial: Any, mass: float) -> None:
+    """Scale the moments and products in an inertial element to a new mass."""
+    factor = mass / float(_only(inertial, "mass").firstChild.data)
+    for moment in _only(inertial, "inertia").getElementsByTagName("*"):
+        _set_text(moment, _digits(factor * float(moment.firstChild.data)))
 
 
 def _comment(document: Document, element: Any, text: str) -> None:

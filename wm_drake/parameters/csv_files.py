@@ -1,6 +1,7 @@
 """CSV files: a # starts a comment, and the first line names the columns."""
 
 import io
+import itertools
 import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -101,6 +102,13 @@ def read_header(path: Path, key: str = "") -> list[str]:
     except ValueError as error:
         reason = " ".join(str(error).split())
         raise input_error(f"cannot be read as CSV ({reason})", where=str(path), key=key) from None
+
+
+def read_note(path: Path, key: str = "") -> str:
+    """Return the comment that a CSV file begins with, in one line; "" if there is none."""
+    lines = read_text(path, key=key).splitlines()
+    comments = itertools.takewhile(lambda line: line.startswith("#"), lines)
+    return " ".join(line.lstrip("# ").rstrip() for line in comments)
 
 
 MOST_COLUMNS = 1000

@@ -13,7 +13,7 @@ from wm_drake.errors import InputError, Problem, input_error, nearest_names
 from wm_drake.parameters.elements import Table
 from wm_drake.parameters.machine import MachineParameters
 from wm_drake.parameters.problems import problems_of
-from wm_drake.parameters.units import Unit
+from wm_drake.parameters.units import PureNumber, Unit
 
 Tree = typing.TypeVar("Tree", bound=BaseModel)
 
@@ -28,6 +28,7 @@ def with_value(parameters: Tree, key: str, value: Any) -> Tree:
             the machine file.
         value: SI number or text with a unit (``"5 N/mm"``); a mapping for a group of values; None
             removes an element, or sets a number to its default, as null in a machine file.
+            Percents scale the ordinates of a table (``"80 %"``).
 
     Raises:
         InputError: the key is unknown (the message names similar ones), or the value is not
@@ -36,9 +37,12 @@ def with_value(parameters: Tree, key: str, value: Any) -> Tree:
     Example:
         >>> import wm_drake as wm
         >>> parameters = wm.load_machine("reference")
-        >>> softer = wm.with_value(parameters, "gasket.stiffness_x", "1.5 N/mm")
-        >>> softer.gasket.stiffness_x
-        1500.0
+        >>> worn = wm.with_value(parameters, "damper_types.friction.friction_force", "25 N")
+        >>> worn.damper_types["friction"].friction_force
+        25.0
+        >>> softer = wm.with_value(parameters, "gasket.stiffness_x", "80 %")
+        >>> round(softer.gasket.stiffness_x.force[-1], 3)
+        89.064
     """
     return with_values(parameters, {key: value})
 
@@ -66,7 +70,7 @@ def with_values(parameters: Tree, values: Mapping[str, Any]) -> Tree:
 
     Example:
         >>> import wm_drake as wm
-        >>> changes = {"gasket.stiffness_x": 1500.0, "bodies.motor.mass": "6 kg"}
+        >>> changes = {"gasket.stiffness_x": "80 %", "bodies.motor.mass": "6 kg"}
         >>> changed = wm.with_values(wm.load_machine("reference"), changes)
         >>> changed.bodies["motor"].mass
         6.0
@@ -83,6 +87,14 @@ def with_values(parameters: Tree, values: Mapping[str, Any]) -> Tree:
 def is_index(part: str) -> bool:
     """Return whether a part of a key path is the index of an entry of a list."""
     return part.isascii() and part.isdecimal() and len(part) < 9
+
+
+def _share(text: str, key: str) -> float:
+    """Return the number that percents are a text of, such as 0.8 for ``"80 %"``."""
+    try:
+        return 0.01 * PureNumber().number(text.strip().removesuffix("%"))
+    except ValueError as error:
+        raise input_error(str(error), key=key) from None
 
 
 class _Edit:
@@ -132,8 +144,11 @@ class _Edit:
             InputError: a key is unknown, or a value is not allowed.
         """
         if self.whole:
-            self.is_of_numbers = _is_number(self.whole[0]) and _is_number(node)
-            node = self.whole[0]
+            new = self.whole[0]
+            if isinstance(node, Table) and isinstance(new, str) and new.strip().endswith("%"):
+                new = node.scaled(_share(new, self.path))
+            self.is_of_numbers = _is_number(new) and _is_number(node)
+            node = new
             if not self.inside:
                 return node
         if isinstance(node, BaseModel):

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wm_drake.errors import input_error
-from wm_drake.parameters.csv_files import finite_numbers, read_csv, read_header
+from wm_drake.parameters.csv_files import finite_numbers, read_csv, read_header, read_note
 from wm_drake.parameters.machine import MachineParameters
 from wm_drake.parameters.published import COLUMNS, CONSTANT, OF_RESPONSE, published_results
 
@@ -77,6 +77,12 @@ def measured_amplitudes(parameters: MachineParameters) -> "pd.DataFrame":
     sensors = list(parameters.sensors)
     tables = [_read(path, sensors) for path in parameters.measured if not _has_responses(path)]
     return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=_KEYS + sensors)
+
+
+def measured_notes(parameters: MachineParameters) -> list[str]:
+    """Return what each file of measured amplitudes says of itself, in the comment at its top."""
+    files = [path for path in parameters.measured if not _has_responses(path)]
+    return [note for path in files if (note := read_note(Path(path), key="measured"))]
 
 
 def measured_responses(parameters: MachineParameters) -> list[NamedValue]:

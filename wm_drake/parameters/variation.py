@@ -78,6 +78,12 @@ class Number:
         assert original is not None
         return original * value if change is Change.PERCENT else original + value
 
+    def at(self, value: float) -> float | Table:
+        """Return the value in SI, or of a curve the one with this stiffness at rest."""
+        if isinstance(self.original, Table) and self.nominal:
+            return self.original.scaled(value / self.nominal)
+        return value
+
     def resolved(self, text: str) -> float:
         """Return the value that a text means here, in SI; of a table it is a stiffness.
 

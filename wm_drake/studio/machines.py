@@ -22,7 +22,8 @@ from wm_drake.parameters import (
     shipped_machines,
     with_values,
 )
-from wm_drake.parameters.variation import value_at
+from wm_drake.parameters.elements import Table
+from wm_drake.parameters.variation import number_at
 from wm_drake.simulation.cases import Case, case_of
 from wm_drake.simulation.mounts import mount_names
 from wm_drake.simulation.steps import checked_integrator, checked_step
@@ -207,7 +208,9 @@ class OpenMachine:
             InputError: the new value is not allowed.
         """
         with_sdf = with_sdf_values(self.machine.plant, parameters, [key])
-        return with_values(with_sdf, {key: value_at(with_sdf, key) + step})
+        number = number_at(with_sdf, key)
+        assert number.nominal is not None  # the values of the SDF are in these parameters
+        return with_values(with_sdf, {key: number.at(number.nominal + step)})
 
     def _with(self, parameters: MachineParameters, values: Mapping[str, str]) -> MachineParameters:
         for key in values:
@@ -216,13 +219,18 @@ class OpenMachine:
                     f"'{key}' is not a number of the machine{nearest_names(key, self.sliders)}",
                     key=key,
                 )
-        given: dict[str, str | float] = {
-            key: slider.number.resolved(text)
-            if (slider := self.sliders.get(key)) is not None and slider.is_entry
-            else text
-            for key, text in values.items()
-        }
+        given = {key: self._value(key, text) for key, text in values.items()}
         return with_values(with_sdf_values(self.machine.plant, parameters, given), given)
+
+    def _value(self, key: str, text: str) -> str | float | Table:
+        """Return what a text sets: itself, the number of an entry, or a scaled curve."""
+        slider = self.sliders.get(key)
+        if slider is None or not (slider.is_entry or slider.number.is_table):
+            return text
+        value = slider.number.resolved(text)
+        if value < 0.0 and slider.number.is_table:
+            raise input_error(f"{text} is out of range; allowed is >= 0", key=key)
+        return slider.number.at(value)
 
     def case(self, state: State) -> Case:
         """Return the case that a page has chosen.
@@ -244,7 +252,7 @@ class OpenMachine:
         """Return the moved numbers of a case in their display units, by key path."""
         assert case.parameters is not None  # a page's case has parameters of its own
         return {
-            key: self.sliders[key].unit.from_si(value_at(case.parameters, key))
+            key: self.sliders[key].unit.from_si(number_at(case.parameters, key).nominal or 0.0)
             for key in state.values
             if key in self.sliders
         }

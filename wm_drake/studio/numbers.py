@@ -7,10 +7,11 @@ from typing import Any
 
 from wm_drake.parameters import MachineParameters, quantities, source_of
 from wm_drake.parameters.allowed import AllowedRange, allowed_range
+from wm_drake.parameters.elements import Table
 from wm_drake.parameters.keys import is_index
 from wm_drake.parameters.plausibility import UsualRange, usual_range
 from wm_drake.parameters.units import Unit
-from wm_drake.parameters.variation import Number
+from wm_drake.parameters.variation import Number, number_at, value_at
 from wm_drake.studio.parts import part_and_group
 
 NOT_MOVED = ("gravity",)
@@ -31,11 +32,11 @@ class Slider:
     """A number of a machine with a range, in which a page moves it.
 
     Attributes:
-        number: The number; of a vector or a table, one of its entries.
+        number: The number; of a vector, one of its entries; of a curve, its stiffness at rest.
         low, high: Ends of the slider, in the display unit.
         allowed, usual: Ranges; None if there is no usual one.
         source: Where the value comes from.
-        is_entry: Whether it is an entry of a vector or a table.
+        is_entry: Whether it is an entry of a vector.
     """
 
     number: Number
@@ -113,7 +114,7 @@ def sliders_of(parameters: MachineParameters) -> dict[str, Slider]:
 
 
 def _sliders(parameters: MachineParameters) -> Iterator[Slider]:
-    for key, value, unit in quantities(parameters):
+    for key, value, unit in with_curves(parameters):
         if key in NOT_MOVED:
             continue
         allowed, usual = allowed_range(parameters, key), usual_range(key)
@@ -121,7 +122,25 @@ def _sliders(parameters: MachineParameters) -> Iterator[Slider]:
         entries = [(f"{key}.{i}", v) for i, v in enumerate(value)] if is_tuple else [(key, value)]
         for path, entry in entries:
             low, high = _ends(unit.from_si(entry), unit, allowed, usual)
-            yield Slider(Number(path, entry, unit), low, high, allowed, usual, source, is_tuple)
+            number = number_at(parameters, path) if not is_tuple else Number(path, entry, unit)
+            yield Slider(number, low, high, allowed, usual, source, is_tuple)
+
+
+def with_curves(parameters: MachineParameters) -> Iterator[tuple[str, Any, Unit]]:
+    """Yield key path, value [SI] and unit of each number; a curve is its stiffness at rest.
+
+    A curve that is flat at rest and beyond has no stiffness and is left out.
+    """
+    curves = set()
+    for key, value, unit in quantities(parameters):
+        curve = key.rpartition(".")[0]
+        if not isinstance(value, tuple) or not isinstance(value_at(parameters, curve), Table):
+            yield key, value, unit
+        elif curve not in curves:
+            curves.add(curve)
+            number = number_at(parameters, curve)
+            if number.nominal:
+                yield curve, number.nominal, number.unit
 
 
 def _ends(

@@ -292,11 +292,13 @@ def test_modes_of_the_reference_machine(machine):
     result = wm.modes(machine, "middle", amplitude=1e-4)
     sliding = result.to_dataframe().query("linearisation == 'sliding'")
     assert sliding["mode"].tolist() == [mode.name for mode in result.modes["sliding"]]
-    assert repr(result).startswith("<Modes of 'reference', sliding friction: sway 1.")
+    assert repr(result).startswith("<Modes of 'reference', sliding friction: fore-aft 1.")
     assert len(result.modes[STUCK]) == len(result.modes[SLIDING]) == 6
     stuck = {mode.name: mode for mode in result.modes[STUCK]}
-    for value in result.at_amplitude:  # a tenth of a millimetre: friction still sticks
-        assert value.frequency_hz == pytest.approx(stuck[value.name].frequency_hz, rel=0.03)
+    for value in result.at_amplitude:  # a tenth of a millimetre: nearly the slopes at rest
+        # a damped mode has another frequency where its damping is cancelled (bounce: 0.65)
+        within = 0.03 if value.damping_ratio < 0.3 else 0.15
+        assert value.frequency_hz == pytest.approx(stuck[value.name].frequency_hz, rel=within)
     assert np.all(np.diff(result.critical_speeds) > 0.0)
     assert ANGLE_ARM == 0.25
     # the short list of the spin page has the same values

@@ -272,7 +272,7 @@ def test_amplitude_table_has_only_measured_rows_that_match_a_case(
         ["back", "yes", "Adams model of [B]"],
         ["back", "yes", "wm_drake"],
     ]
-    assert table.loc[0, "Xr"] == 29.1  # [B] Table 1, middle load with gasket
+    assert table.loc[0, "Xr"] == 14.55  # half of [B] Table 1, middle load with gasket
     expected = 1e3 * result.results[0].measures.amplitude.values
     np.testing.assert_allclose(
         table.loc[2, list(machine.sensors)].to_numpy(float), expected, rtol=1e-12
@@ -284,9 +284,9 @@ def test_amplitude_table_tells_gasket_from_none(machine: MachineParameters) -> N
     table = amplitude_table(spin_result(machine, both))
     experiment = table[table["source"] == "experiment"]
     assert experiment[["gasket", "Xr"]].to_numpy().tolist() == [
-        ["no", 12.6],
-        ["yes", 9.6],
-    ]  # [B] Table 1
+        ["no", 6.3],
+        ["yes", 4.8],
+    ]  # half of [B] Table 1
 
 
 @pytest.mark.usefixtures("without_drawing")
@@ -305,11 +305,11 @@ def test_amplitude_table_without_measurements_has_our_rows_alone(
 def test_percent_difference_row_by_hand(machine: MachineParameters) -> None:
     case = case_result(machine, "middle")
     amplitude = case.measures.amplitude.copy(
-        data=1e-3 * np.array([34.92, 8.7, 9.45, 23.9, 4.0, 2.3])
+        data=1e-3 * np.array([17.46, 4.35, 4.725, 11.95, 2.0, 1.15])
     )
     table = case.measures.table.assign(amplitude=amplitude)
     result = spin_result(machine, [replace(case, measures=replace(case.measures, table=table))])
-    # experiment 29.1, 8.7, 18.9, 23.9, 8.0, 23.0 mm: 34.92 / 29.1 = 1.2, 9.45 / 18.9 = 0.5, 4 / 8 = 0.5, 2.3 / 23 = 0.1
+    # half of 29.1, 8.7, 18.9, 23.9, 8.0, 23.0 mm: 34.92 / 29.1 = 1.2, 9.45 / 18.9 = 0.5, 4 / 8 = 0.5, 2.3 / 23 = 0.1
     found = differences(amplitude_table(result), result.results[0])
     np.testing.assert_allclose(
         [change.percent for change in found], [20.0, 0.0, -50.0, 0.0, -50.0, -90.0], atol=1e-9

@@ -156,7 +156,7 @@ def test_numbers_that_are_one_unknown_change_together(reference):
     [
         (("gasket.stifness_x",), "unknown key 'stifness_x' .did you mean 'stiffness_x'"),
         (("gasket.stiffness_x", "gasket.damping_x"), "have different units"),
-        (("damper_types.friction.friction_damping",), "is not positive, so its range must be given"),
+        (("gasket.friction_torque_x",), "is not positive, so its range must be given"),
     ],
 )  # fmt: skip
 def test_bad_unknowns_are_refused(reference, keys, message):

@@ -307,13 +307,13 @@ def revolutions_of(balance, start, speed, count, steps=256):
     return np.array(ended)
 
 
-def test_a_machine_without_gasket_leaves_its_unstable_motions_and_keeps_its_stable_ones(machine):
-    """Check load middle: unstable from 172 to 195 rpm, with a pair of complex multipliers.
+def test_a_machine_without_gasket_leaves_its_unstable_motions_and_keeps_its_stable_ones(shipped):
+    """Check load middle of `reference_2026_11`: unstable from 172 to 195 rpm, with a pair of complex multipliers.
 
     A run that starts on the harmonic balance misses the motion by the cut harmonics, 0.01 mm. This
     distance stays on a stable motion and grows on an unstable one.
     """
-    setup = machine.set_up("middle", gasket=False)
+    setup = shipped("reference_2026_11").set_up("middle", gasket=False)
     balance = HarmonicBalance(setup, Series(HARMONICS, 128))
     with threadpool_limits(1, "blas"):
         points = branch_of(balance, setup, np.linspace(150.0, 205.0, 12) * RPM)

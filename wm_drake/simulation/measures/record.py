@@ -135,7 +135,7 @@ def measure(
         >>> record = wm.simulate(wm.build_machine(wm.load_machine("reference")), "middle")
         >>> amplitude = wm.measure(record).amplitude  # m
         >>> round(1e3 * float(amplitude.sel(sensor="Xr")))
-        23
+        13
     """
     run = RecordedRun(record, scene)
     if measures is None:

@@ -15,6 +15,7 @@ from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
 from wm_drake.model.scene import Scene
 from wm_drake.parameters import MachineParameters
+from wm_drake.parameters.measured import measured_notes
 from wm_drake.parameters.units import Unit
 from wm_drake.simulation.balance import balance_of, rings_of
 from wm_drake.simulation.cases import Case, is_as_measured
@@ -149,7 +150,12 @@ class SpinResult(Result):
 
         title = f"Displacement amplitudes of machine '{self.parameters.name}', in mm"
         lines = [line for case in self.results for line in case_lines(self.parameters, case)]
-        return [amplitude_lines(title, self.tables()["amplitudes"]), *lines]
+        return [amplitude_lines(title, self.tables()["amplitudes"]), *self.measured_notes(), *lines]
+
+    def measured_notes(self) -> list[str]:
+        """Return what the measured amplitudes in the comparison are, by their files."""
+        compared = any(map(self.is_compared, self.results))
+        return measured_notes(self.parameters) if compared else []
 
     def page(self, facts: Facts) -> str:
         """Return the page."""

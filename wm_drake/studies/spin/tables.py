@@ -141,6 +141,7 @@ def comparison(result: SpinResult, table: pd.DataFrame) -> Table:
         f"in the band {band_text(*result.results)}. The last rows of each load are differences: "
         "100 % × (value − experiment) / experiment, [B] Eq. (1)."
     )
+    caption = " ".join([caption, *result.measured_notes()])
     header = ("load", "source", *(f"{name}, mm" for name in sensors), "mean absolute difference, %")
     return Table(caption, header, tuple(groups), text_columns=2)
 

@@ -267,7 +267,8 @@ def change_text(findings: Findings, outcome: Outcome) -> str:
     for key, text in outcome.changes.items():
         less = next(i.less for i in findings.influences if i.key == key)
         change = -findings.change if less.changes[key] == text else findings.change
-        parts.append(f"{words_of(key)} {percent(change)} to {text.replace('*', ' ')}")
+        new = "" if text.endswith("%") else f" to {text.replace('*', ' ')}"
+        parts.append(f"{words_of(key)} {percent(change)}{new}")
     gap = f"{_mm(findings.base.gap)} becomes {_mm(outcome.gap)}"
     return f"{listed(parts)}: {gap}, verified by runs of all loads"
 
@@ -407,7 +408,7 @@ def influences_picture(findings: Findings) -> Picture:
     caption = (
         f"Smallest gap of all loads if one number of a part is {findings.change:g} % smaller or "
         "larger; line: the machine as it is. Springs, dampers, bushings, gasket and "
-        "counterweights are tried, but no tables of forces. influences.csv has all of them."
+        "counterweights are tried; a curve of forces is scaled. influences.csv has all of them."
     )
     named_first = "; ".join(map(influence_text, drawn[:MOST_NAMED]))
     return picture(figure, f"Influence of the parts. Strongest: {named_first}.", caption)

@@ -18,6 +18,7 @@ from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
 from wm_drake.model.sdf_names import sdf_names
 from wm_drake.parameters import MachineParameters, with_values
+from wm_drake.parameters.elements import Table
 from wm_drake.parameters.keys import quantities
 from wm_drake.parameters.units import Unit
 from wm_drake.parameters.variation import value_at
@@ -64,7 +65,7 @@ SHOWN_GROUPS = ("amplitude", "F", "mount_force_peak")
 MOST_COMBINED = 3
 """Largest number of changes in a combination: more are hard to make."""
 
-MOST_TRIED = 8
+MOST_TRIED = 10
 """Number of single changes, the best ones, that a combination may contain."""
 
 LEAST_GAIN = 1e-4
@@ -310,6 +311,8 @@ def _ends(change: float) -> tuple[float, float]:
 
 def _text(parameters: MachineParameters, key: str, factor: float) -> str:
     """Return a multiple of a number as the text that `--set` takes, so that it is what is run."""
+    if isinstance(value_at(parameters, key), Table):
+        return f"{100.0 * factor:.4g} %"
     unit = next(unit for name, _, unit in quantities(parameters) if name == key)
     return f"{unit.from_si(factor * value_at(parameters, key)):.4g} {unit.shown}"
 
@@ -317,7 +320,7 @@ def _text(parameters: MachineParameters, key: str, factor: float) -> str:
 def changeable(parameters: MachineParameters) -> Iterator[str]:
     """Yield the key paths of what a designer can change: numbers of parts, counterweights.
 
-    Numbers that are 0 and tables of forces are left out.
+    Numbers that are 0 are left out.
     """
     for key, value, unit in quantities(parameters):
         table = key.partition(".")[0]
@@ -325,6 +328,9 @@ def changeable(parameters: MachineParameters) -> Iterator[str]:
         is_weight = table == "bodies" and COUNTERWEIGHT in key and key.endswith(".mass")
         if (is_part or is_weight) and isinstance(value, float) and value != 0.0:
             yield key
+        curve = key.rpartition(".")[0]
+        if is_part and isinstance(value, tuple) and isinstance(value_at(parameters, curve), Table):
+            yield curve
 
 
 class VerdictTask(Task):
