@@ -76,6 +76,7 @@ class Entry:
 
 
 ENTRIES = (
+    Entry("verdict", "Does the tub touch?", "wm-drake verdict"),
     Entry("spin", "A run-up, beside measured amplitudes", "wm-drake spin --load middle"),
     Entry("detail", "Spectra and forces of every mount", "wm-drake spin --load middle --detail"),
     Entry(
@@ -133,6 +134,8 @@ ENTRIES = (
         "How often will it hit?",
         "wm-drake study tolerance laundry --samples 256 --sensitivity 64 --subset 0",
     ),
+    Entry("balancer", "Do rings of balls pay?", "wm-drake study balancer --quick"),
+    Entry("gasket-curves", "A gasket from its drawing", "wm-drake gasket curves folded"),
     Entry(
         "design", "What can be reached at once?", "wm-drake study design gasket --evaluations 400"
     ),
