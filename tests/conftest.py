@@ -4,12 +4,14 @@ Property tests run the same examples every time.
 """
 
 import functools
+import os
 import shlex
 import sys
 from dataclasses import dataclass
 
 import pytest
 from hypothesis import settings
+from threadpoolctl import threadpool_limits
 from upright_springs import with_upright_springs
 
 from wm_drake.cli import main
@@ -18,6 +20,16 @@ from wm_drake.parameters import load_machine
 
 settings.register_profile("same_every_time", derandomize=True, deadline=None, database=None)
 settings.load_profile("same_every_time")
+
+
+def pytest_configure():
+    """Let BLAS use one thread in each process.
+
+    Workers share the cores. Threads of one solution of 200 equations that wait for each other take
+    forty times the CPU time of one thread.
+    """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # of workers and processes of tests
+    threadpool_limits(1, "blas")  # of this process, which has numpy already
 
 
 @pytest.fixture(scope="session")
