@@ -113,6 +113,10 @@ def _campbell(result: MachineModes, name: str, scale: Scale, top: float) -> Pane
     return Panel(title=TITLES[name], marks=tuple(marks), x=x, y=y)
 
 
+NEAR_LABELS = 0.06
+"""Distance of two critical speeds, as a part of the axis, below which they share a label."""
+
+
 def _critical_marks(result: MachineModes, name: str) -> list[Mark]:
     critical = result.critical[name]
     if not critical:
@@ -121,10 +125,18 @@ def _critical_marks(result: MachineModes, name: str) -> list[Mark]:
     hertz = np.array([one.order for one in critical]) * rpm / 60.0
     key = "critical speed"
     marks: list[Mark] = [Points(rpm, hertz, color=MEASURED, is_open=True, size=10.0, key=key)]
-    for one, x, y in zip(critical, rpm, hertz, strict=True):
-        if one.order == 1.0:
-            text = Text(float(x), float(y), number(x, 0), color=MEASURED, size=11.0)
-            marks.append(replace(text, across="left", up="top", shift=(6.0, -4.0)))
+    of_drum = sorted(float(x) for one, x in zip(critical, rpm, strict=True) if one.order == 1.0)
+    near = NEAR_LABELS * RPM_PER_RAD_S * float(result.diagrams[name].speed[-1])
+    groups: list[list[float]] = []
+    for x in of_drum:
+        if groups and x - groups[-1][-1] < near:
+            groups[-1].append(x)
+        else:
+            groups.append([x])
+    for group in groups:
+        words = ", ".join(number(x, 0) for x in group)
+        text = Text(group[-1], group[-1] / 60.0, words, color=MEASURED, size=11.0)
+        marks.append(replace(text, across="left", up="top", shift=(6.0, -4.0)))
     return marks
 
 
