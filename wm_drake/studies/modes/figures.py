@@ -101,7 +101,7 @@ def _campbell(result: MachineModes, name: str, scale: Scale, top: float) -> Pane
         at = min(0.93 * last, 0.93 * top * 60.0 / order)
         text = Text(at, order * at / 60.0, f"{order:g}×", is_bold=True, across="right")
         marks.append(replace(text, up="bottom", shift=(-5.0, 6.0)))
-    marks += _critical_marks(result, name)
+    marks += _critical_marks(result, name, top)
     if result.run_up is not None:
         speeds = RPM_PER_RAD_S * result.run_up.critical_speed.values.ravel()
         speeds = np.unique(np.round(speeds[np.isfinite(speeds)]))
@@ -113,11 +113,12 @@ def _campbell(result: MachineModes, name: str, scale: Scale, top: float) -> Pane
     return Panel(title=TITLES[name], marks=tuple(marks), x=x, y=y)
 
 
-NEAR_LABELS = 0.06
-"""Distance of two critical speeds, as a part of the axis, below which they share a label."""
+NEAR_LABELS = 0.035
+"""Distance of two critical speeds, as a part of the axis of frequencies, below which they share a
+label."""
 
 
-def _critical_marks(result: MachineModes, name: str) -> list[Mark]:
+def _critical_marks(result: MachineModes, name: str, top: float) -> list[Mark]:
     critical = result.critical[name]
     if not critical:
         return []
@@ -126,10 +127,9 @@ def _critical_marks(result: MachineModes, name: str) -> list[Mark]:
     key = "critical speed"
     marks: list[Mark] = [Points(rpm, hertz, color=MEASURED, is_open=True, size=10.0, key=key)]
     of_drum = sorted(float(x) for one, x in zip(critical, rpm, strict=True) if one.order == 1.0)
-    near = NEAR_LABELS * RPM_PER_RAD_S * float(result.diagrams[name].speed[-1])
     groups: list[list[float]] = []
     for x in of_drum:
-        if groups and x - groups[-1][-1] < near:
+        if groups and x - groups[-1][-1] < 60.0 * NEAR_LABELS * top:
             groups[-1].append(x)
         else:
             groups.append([x])
