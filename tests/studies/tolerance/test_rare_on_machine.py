@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from wm_drake import build_machine, load_machine, simulate_many
+from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.tolerances import load_tolerances
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.tolerance.distributions import base_samples
@@ -11,14 +12,16 @@ from wm_drake.studies.tolerance.rare import subset_simulation
 from wm_drake.studies.tolerance.shares import share_of
 from wm_drake.studies.tolerance.variables import uncertain_machine
 
-GAP = 0.0146
+GAP = 0.0149
 """Gap that about one run in a hundred falls below with heavy laundry. [m]"""
+RUN_UP = SpinProfile(time=(0.0, 12.0), speed=(6.0, 30.0))
+"""A run-up through the resonances, six times as short as that of the machine file."""
 
 
 @pytest.mark.slow
 def test_subset_simulation_agrees_with_a_crude_count_on_the_reference_machine():
     parameters = load_machine("reference")
-    case = Case("laundry", next(iter(parameters.loads.values())), parameters.profile)
+    case = Case("laundry", next(iter(parameters.loads.values())), RUN_UP)
     uncertain = uncertain_machine(parameters, load_tolerances("heavy_laundry"), case)
     machine = build_machine(uncertain.parameters)
 
