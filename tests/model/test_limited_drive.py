@@ -107,7 +107,7 @@ def planar_rotor(torque):
         return [vx, vz, w, *np.linalg.solve(matrix, right)]
 
     span = 0.0, DURATION
-    return solve_ivp(rates, span, np.zeros(6), rtol=1e-8, atol=1e-10).y[5, -1]
+    return solve_ivp(rates, span, np.zeros(6), "DOP853", rtol=1e-7, atol=1e-10).y[5, -1]
 
 
 @pytest.mark.parametrize(("torque", "passes"), [(0.1, False), (0.2, True)])

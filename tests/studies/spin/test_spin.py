@@ -9,7 +9,7 @@ from wm_drake.simulation.cases import Case
 from wm_drake.studies.spin.page import spin_page
 from wm_drake.studies.spin.study import run_spin
 
-SHORT = SpinProfile(time=(0.0, 2.0), speed=(0.0, 15.0))
+SHORT = SpinProfile(time=(0.0, 0.5), speed=(8.0, 15.0))
 
 
 @pytest.mark.slow
