@@ -92,7 +92,7 @@ def test_70_s_trajectories_agree_to_a_micrometre_when_both_are_refined(
 
 @pytest.mark.parametrize(("load", "gasket"), [("middle", True), ("back", True), ("counter", False)])
 @pytest.mark.parametrize(
-    "rate", [pytest.param(4.0, marks=pytest.mark.slow), pytest.param(1.0, marks=pytest.mark.hours)]
+    "rate", [pytest.param(8.0, marks=pytest.mark.slow), pytest.param(1.0, marks=pytest.mark.hours)]
 )
 def test_peaks_at_default_steps_agree(machine, reference, load, gasket, rate):
     """Check the default step of 2.5 ms: 0.1 % in peaks with gasket, 0.3 % without."""
