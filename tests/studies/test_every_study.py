@@ -31,9 +31,10 @@ SLOWLY = [
 ]
 SHORTER["tolerance"] = [(*KINDS["tolerance"].commands[0], "--samples", "32", "--subset", "0")]
 SHORTER["gasket"] = [("study", "gasket", "--response", "D")]
-SHORTER["balancer"] = [
-    ("study", "balancer", "--place", "0 mm", "--damping", "100 %", "--rate", "80 rpm/s")
-]
+SHORTER["balancer"] = [(
+    "study", "balancer", "--place", "0 mm", "--damping", "100 %",
+    "--release", "80 rpm", "--to", "110 rpm", "--rate", "80 rpm/s",
+)]  # fmt: skip
 
 
 @pytest.fixture
