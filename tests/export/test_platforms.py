@@ -1,11 +1,13 @@
 """Libraries of an FMU for other platforms, linked on this computer by the compiler of ziglang."""
 
 import re
+import subprocess
 import zipfile
 
 import pytest
 
 import wm_drake as wm
+from wm_drake.export.fmu import WRAPPER
 from wm_drake.export.object_code import PLATFORMS
 from wm_drake.export.options import FmuOptions
 
@@ -22,6 +24,8 @@ FORMAT = {
 """How a library begins: ELF of 64 bit, PE, Mach-O of x86-64."""
 MACHINE = {"linux64": 62, "aarch64": 183}
 """Number of the processor in the header of an ELF file (`elf.h`: EM_X86_64, EM_AARCH64)."""
+AMD64 = 0x8664
+"""Number of the processor with which an object file of Windows begins."""
 NEEDED = {
     "linux64": r"lib(c|m)\.so\.6|ld-linux-x86-64\.so\.2",
     "win64": r"KERNEL32\.dll|api-ms-win-crt-(heap|runtime|string|stdio|math|private)-l1-1-0\.dll",
@@ -31,14 +35,45 @@ NEEDED = {
 """Libraries that a library may need: C library and mathematics, and the loader."""
 
 
-def test_library_of_each_platform(tmp_path):
-    """Write all in one test: the compiler takes a minute for them."""
+@pytest.mark.parametrize(
+    "names",
+    [
+        tuple(name for name in PLATFORMS if name != "win64"),
+        pytest.param(("win64",), marks=pytest.mark.hours),
+    ],
+    ids=["others", "win64"],
+)
+def test_library_of_each_platform(names, tmp_path):
+    """Link libraries; the compiler first builds the C library of Windows, for more than a minute."""
     path = tmp_path / "machine.fmu"
-    options = FmuOptions(platform=",".join(PLATFORMS))
+    options = FmuOptions(platform=",".join(names))
     wm.export_fmu(wm.load_machine("reference"), "middle", path, options)
     with zipfile.ZipFile(path) as archive:
-        for name, platform in PLATFORMS.items():
+        for name in names:
+            platform = PLATFORMS[name]
             check(name, archive.read(f"binaries/{platform.fmi3}/wm_drake_machine{platform.suffix}"))
+
+
+def test_code_for_windows_is_compiled(tmp_path, monkeypatch):
+    """Compile the wrapper and the laws for Windows, without linking."""
+
+    def compiled(contents, _platform, compiler):
+        for name, content in contents.items():
+            (tmp_path / name).write_bytes(content)
+        options = ["-c", "-O2", "-std=c11", f"-I{tmp_path}", WRAPPER, "-o", tmp_path / "fmu.o"]
+        subprocess.run([*compiler, *map(str, options)], check=True, cwd=tmp_path)
+        return b""
+
+    monkeypatch.setattr("wm_drake.export.fmu._library", compiled)
+    path = tmp_path / "machine.fmu"
+    wm.export_fmu(wm.load_machine("reference"), "middle", path, FmuOptions(platform="win64"))
+    objects = {file.name: file.read_bytes() for file in tmp_path.glob("*.o")}
+    assert len(objects) > 1
+    for name, content in objects.items():
+        assert int.from_bytes(content[:2], "little") == AMD64, name
+        assert not re.search(rb"Py_|PyObject|numba|NRT_", content)
+    for symbol in (b"fmi3InstantiateCoSimulation", b"fmi3InstantiateModelExchange", b"fmi3DoStep"):
+        assert symbol in objects["fmu.o"]
 
 
 def check(name, content):
