@@ -1,0 +1,131 @@
+"""How do time and memory of a batch grow with the number of its runs, here and on a cluster?
+
+Each size runs in a process of its own: gaskets of the reference machine with two loads each, with
+D, F and M, by `simulate_many`, and by `simulate_on_cluster` on a dask cluster of two processes with
+one thread each, with a ledger in a file. The memory is the largest of the process that asks for the
+runs, less what it has before.
+
+    python analyses/show_growth.py --picture docs/pictures/growth.png
+"""
+
+import argparse
+import json
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from compare_speed import gasket_cases, linear_machine
+
+import wm_drake as wm
+from wm_drake.batch.cluster import simulate_on_cluster
+from wm_drake.batch.ledger import open_ledger
+from wm_drake.model.machine import Machine
+from wm_drake.report.drawing import matplotlib_of
+from wm_drake.report.figure import OURS, QUIET, Axis, Figure, Line, Panel, in_grid
+
+SIZES = (1000, 10_000, 100_000)
+WARM = 200
+"""Runs before the time begins, which load and compile everything that runs need."""
+
+PLACES = ("here, two threads", "cluster of two processes")
+
+
+@contextmanager
+def here(machine: Machine) -> Iterator[Callable[[int], object]]:
+    """Give a function that runs a batch in this process."""
+    yield lambda count: wm.simulate_many(
+        machine, gasket_cases(count), measures=("extremes",), histories=False
+    )
+
+
+@contextmanager
+def on_cluster(machine: Machine) -> Iterator[Callable[[int], object]]:
+    """Give a function that runs a batch on a cluster of two processes of this computer."""
+    from dask.distributed import Client, LocalCluster
+
+    def run(count: int) -> object:
+        path = Path(folder) / f"{count}.sqlite"
+        with open_ledger(path, {"study": "growth"}) as ledger:
+            return simulate_on_cluster(machine, gasket_cases(count), ledger, client)
+
+    cluster = LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None)
+    with cluster, Client(cluster) as client, tempfile.TemporaryDirectory() as folder:
+        yield run
+
+
+RUNS = dict(zip(PLACES, (here, on_cluster), strict=True))
+
+
+def peak_mb() -> float:
+    """Return the largest memory that this process has had. [MB]"""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+
+
+def measured(place: str, count: int) -> dict[str, float]:
+    """Return time per run [ms] and growth of the memory [MB] of a batch, from a new process."""
+    command = [sys.executable, __file__, "--place", place, "--count", str(count)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    return dict(json.loads(done.stdout.splitlines()[-1]))
+
+
+def measure_here(place: str, count: int) -> None:
+    """Print time per run and growth of the memory of a batch in this process."""
+    with RUNS[place](wm.build_machine(linear_machine())) as run:
+        run(WARM)
+        before, begin = peak_mb(), time.perf_counter()
+        run(count)
+        spent = time.perf_counter() - begin
+    print(json.dumps({"ms": 1e3 * spent / count, "mb": peak_mb() - before}))
+
+
+def figure(sizes: tuple[int, ...], found: dict[str, list[dict[str, float]]]) -> Figure:
+    """Return time per run and growth of the memory over the number of runs."""
+    panels = []
+    for name, label in (("ms", "time per run, ms"), ("mb", "memory of the caller, MB more")):
+        marks = tuple(
+            Line(sizes, [row[name] for row in rows], color=color, key=place)
+            for (place, rows), color in zip(found.items(), (OURS, QUIET), strict=True)
+        )
+        x, y = Axis(label="runs", is_log=True), Axis(label=label, range=(0.0, None))
+        panels.append(Panel(title=label, marks=marks, x=x, y=y))
+    return Figure(panels=in_grid(panels, 2), height=280.0)
+
+
+def main() -> None:
+    """Measure all sizes, print the numbers, and draw them."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--quick", action="store_true", help="two small sizes")
+    parser.add_argument("--picture", type=Path, help="PNG to write")
+    parser.add_argument("--out", type=Path, help="also write the lines to this file")
+    parser.add_argument("--place", choices=PLACES, help=argparse.SUPPRESS)
+    parser.add_argument("--count", type=int, help=argparse.SUPPRESS)
+    arguments = parser.parse_args()
+    if arguments.place:
+        measure_here(arguments.place, arguments.count)
+        return
+    sizes = (64, 128) if arguments.quick else SIZES
+    found: dict[str, list[dict[str, float]]] = {place: [] for place in PLACES}
+    lines = []
+    for place, rows in found.items():
+        for count in sizes:
+            rows.append(measured(place, count))
+            spent, more = rows[-1]["ms"], rows[-1]["mb"]
+            lines.append(f"{place}, {count} runs: {spent:.2f} ms a run, {more:.0f} MB more")
+            print(lines[-1], file=sys.stderr)
+    text = "\n".join(lines)
+    print(text)
+    if arguments.out:
+        arguments.out.write_text(text + "\n", encoding="utf-8")
+    if arguments.picture:
+        matplotlib_of(figure(sizes, found)).savefig(arguments.picture, dpi=110)
+
+
+if __name__ == "__main__":
+    main()
