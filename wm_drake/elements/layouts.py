@@ -11,6 +11,7 @@ from wm_drake.compiler.packed import SCALAR, PackedLayout
 from wm_drake.laws.table import CURVE, pack_number, pack_table
 from wm_drake.parameters.drive import TorqueLimit, TorqueLimitTable
 from wm_drake.parameters.elements import ForceTable, TorqueTable
+from wm_drake.parameters.monotone import monotone_cubics
 from wm_drake.parameters.types import FloatArray
 
 
@@ -77,18 +78,14 @@ def packed_torque_limit(limit: TorqueLimit | TorqueLimitTable) -> FloatArray:
     """Return the table of a torque limit as a curve that is constant at its end; 0 without one."""
     if isinstance(limit, TorqueLimit):
         return pack_number(0.0)
-    from scipy.interpolate import PchipInterpolator  # slow to import: machines with tables
-
-    cubics = PchipInterpolator(limit.speed, limit.torque).c[::-1].T
-    return pack_table(limit.speed, cubics, 0.0)
+    cubics = monotone_cubics(np.array(limit.speed), np.array(limit.torque)[:, None])[:, :, 0]
+    return pack_table(limit.speed, cubics.T, 0.0)
 
 
 @functools.lru_cache(maxsize=256)  # a study packs the same curves for each run
 def _packed_curves(x: tuple[float, ...], ys: tuple[tuple[float, ...], ...]) -> FloatArray:
-    """Return packed tables, a row for each: scipy's monotone cubics (PCHIP) through the points."""
-    from scipy.interpolate import PchipInterpolator  # slow to import: machines with tables
-
-    cubics = PchipInterpolator(x, ys, axis=1).c[::-1]  # (4, pieces, curves)
+    """Return packed tables, a row for each: monotone cubics (PCHIP) through the points."""
+    cubics = monotone_cubics(np.array(x), np.array(ys).T)  # (4, pieces, curves)
     h, (_, a, b, c) = x[-1] - x[-2], cubics[:, -1]
     # rounding can make a flat end fall by 1e-11
     end_slopes = np.maximum(a + h * (2.0 * b + h * 3.0 * c), 0.0)

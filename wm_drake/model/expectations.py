@@ -19,10 +19,10 @@ from wm_drake.parameters.elements import ForceTable, TorqueTable
 LARGEST_RING_RADIUS = 0.2
 """Radius of the largest usual gasket: 150 to 200 mm. [m]"""
 
-BOUNCE_HZ = (2.0, 3.3)
+BOUNCE_HZ = (2.0, 3.5)
 """Usual frequencies of the tub on its springs, up and down. [Hz]
 
-The static stretch is then 23 to 62 mm. Judgement of this project; higher ones shake the housing.
+The static stretch is then 20 to 62 mm. Judgement of this project; higher ones shake the housing.
 """
 
 PUBLISHED_END_BUSHING = 0.75

@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 
 from wm_drake.parameters import units as u
+from wm_drake.parameters.monotone import monotone_cubics
 from wm_drake.parameters.rubber import RubberBranches
 from wm_drake.parameters.types import FloatArray
 
@@ -65,11 +66,13 @@ class Table(Frozen):
 
     def values(self, x: FloatArray) -> FloatArray:
         """Return the ordinates at abscissas (n,)."""
-        from scipy.interpolate import PchipInterpolator  # 0.5 s to import: machines with tables
-
-        cubic = PchipInterpolator(*self.curve)
-        inside = np.clip(x, self.curve[0][0], self.curve[0][-1])
-        return np.asarray(cubic(inside) + cubic.derivative()(inside) * (x - inside))
+        at, ordinates = map(np.array, self.curve)
+        cubics = monotone_cubics(at, ordinates[:, None])[:, :, 0]
+        inside = np.clip(x, at[0], at[-1])
+        piece = np.clip(np.searchsorted(at, inside, side="right") - 1, 0, len(at) - 2)
+        (y, a, b, c), d = cubics[:, piece], inside - at[piece]
+        value, slope = y + d * (a + d * (b + d * c)), a + d * (2.0 * b + d * 3.0 * c)
+        return np.asarray(value + slope * (x - inside))
 
     def scaled(self, factor: float) -> Self:
         """Return the table with its ordinates times a factor."""

@@ -117,7 +117,7 @@ def names_of(shares: FloatArray) -> list[str]:
         shares: Participation of the six coordinates in up to six modes. (modes, 6)
     """
     count = len(shares)
-    choices = np.array(list(permutations(range(len(COORDINATES)), count)))
+    choices = np.array(list(permutations(range(len(COORDINATES)), count)), dtype=int)
     best = np.argmax(shares[np.arange(count), choices].sum(axis=1))
     return [NAMES[COORDINATES[coordinate]] for coordinate in choices[best]]
 
