@@ -221,6 +221,7 @@ def test_more_damping_passes_and_less_damping_changes_the_run_up(result):
         ({"mass": "0 kg"}, "--mass: '0 kg' is not above 0"),
         ({"place": "1 kg"}, "--place"),
         ({"high": "50 rpm"}, "--to: is below 100 rpm"),
+        ({"high": "100 rpm", "release": "100 rpm"}, "--release: is not below the highest speed"),
         ({"release": "1300 rpm"}, "--release: is not below the highest speed, 1200 rpm"),
         ({"ball_mass": "0.001 %"}, "step"),
         ({"mass": ",".join(f"{0.1 + 0.01 * i:.2f}" for i in range(30)) + " kg"}, "has 30 values"),

@@ -418,7 +418,7 @@ class BalancerTask(Task):
         self.high = max(parameters.profile.speed)
         if options.high is not None:
             self.high = _values(options.high, RPM, "--to")[0]
-        if self.high < 4.0 * WINDOW:
+        if self.high < 4.0 * WINDOW * (1.0 - 1e-9):  # 100 rpm, in rad/s, is rounded
             raise input_error(f"is below {RPM.from_si(4.0 * WINDOW):g} rpm", where="--to")
         self.release = _values(options.release, RPM, "--release")
         if max(self.release) >= self.high:
