@@ -101,7 +101,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--quick", action="store_true", help="two small sizes")
+    parser.add_argument("--quick", action="store_true", help="one small size")
     parser.add_argument("--picture", type=Path, help="PNG to write")
     parser.add_argument("--out", type=Path, help="also write the lines to this file")
     parser.add_argument("--place", choices=PLACES, help=argparse.SUPPRESS)
@@ -110,7 +110,7 @@ def main() -> None:
     if arguments.place:
         measure_here(arguments.place, arguments.count)
         return
-    sizes = (64, 128) if arguments.quick else SIZES
+    sizes = (64,) if arguments.quick else SIZES
     found: dict[str, list[dict[str, float]]] = {place: [] for place in PLACES}
     lines = []
     for place, rows in found.items():

@@ -33,7 +33,7 @@ def _slopes(h: FloatArray, m: FloatArray) -> FloatArray:
     before, after = m[:-1], m[1:]
     w_before, w_after = 2.0 * h[1:] + h[:-1], h[1:] + 2.0 * h[:-1]
     is_extreme = (np.sign(before) != np.sign(after)) | (before == 0.0) | (after == 0.0)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         mean = (w_before / before + w_after / after) / (w_before + w_after)
         inner = np.where(is_extreme, 0.0, 1.0 / mean)
     first, last = _end_slope(h[0], h[1], m[0], m[1]), _end_slope(h[-1], h[-2], m[-1], m[-2])
