@@ -13,7 +13,7 @@ from wm_drake.errors import InputError, Problem, input_error, nearest_names
 from wm_drake.parameters.elements import Table
 from wm_drake.parameters.machine import MachineParameters
 from wm_drake.parameters.problems import problems_of
-from wm_drake.parameters.units import PureNumber, Unit
+from wm_drake.parameters.units import Share, Unit
 
 Tree = typing.TypeVar("Tree", bound=BaseModel)
 
@@ -89,14 +89,6 @@ def is_index(part: str) -> bool:
     return part.isascii() and part.isdecimal() and len(part) < 9
 
 
-def _share(text: str, key: str) -> float:
-    """Return the number that percents are a text of, such as 0.8 for ``"80 %"``."""
-    try:
-        return 0.01 * PureNumber().number(text.strip().removesuffix("%"))
-    except ValueError as error:
-        raise input_error(str(error), key=key) from None
-
-
 class _Edit:
     """Changes at one place of a tree: a new value of the whole, then changes inside it.
 
@@ -146,7 +138,10 @@ class _Edit:
         if self.whole:
             new = self.whole[0]
             if isinstance(node, Table) and isinstance(new, str) and new.strip().endswith("%"):
-                new = node.scaled(_share(new, self.path))
+                try:
+                    new = node.scaled(Share().number(new))
+                except ValueError as error:
+                    raise input_error(str(error), key=self.path) from None
             self.is_of_numbers = _is_number(new) and _is_number(node)
             node = new
             if not self.inside:

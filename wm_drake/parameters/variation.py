@@ -17,7 +17,7 @@ from wm_drake.errors import Problem, input_error
 from wm_drake.parameters.elements import Table
 from wm_drake.parameters.keys import field_at, unit_of, with_values
 from wm_drake.parameters.machine import MachineParameters
-from wm_drake.parameters.units import PureNumber, Share, Unit
+from wm_drake.parameters.units import Share, Unit
 
 Value: TypeAlias = float | Table
 
@@ -225,7 +225,7 @@ def change_of(text: str, unit: Unit, key: str) -> tuple[Change, float]:
             distance = unit.number(relative[2]) if relative[2] else 0.0
             return Change.DISTANCE, -distance if relative[1] == "-" else distance
         if text.endswith("%") and not isinstance(unit, Share):
-            return Change.PERCENT, 0.01 * PureNumber().number(text.removesuffix("%"))
+            return Change.PERCENT, Share().number(text)
         return Change.VALUE, unit.number(text)
     except ValueError as error:
         raise input_error(str(error), key=key) from None
