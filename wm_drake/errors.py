@@ -70,13 +70,7 @@ class InputError(WmDrakeError):
 
 
 def input_error(message: str, *, where: str = "", key: str = "") -> InputError:
-    """Return an `InputError` with a single problem.
-
-    Args:
-        message: What is wrong and what is allowed.
-        where: Location, such as ``file:line`` or the name of an option.
-        key: Key path of the value.
-    """
+    """Return an `InputError` with a single problem."""
     return InputError([Problem(where, key, message)])
 
 
@@ -85,10 +79,6 @@ def shortened(text: str, longest: int) -> str:
 
     Characters that are not printable are escaped. In a text that is too long, long words lose their
     middle first, then the text loses its middle.
-
-    Args:
-        text: Any text.
-        longest: Largest number of characters.
     """
     line = text if text.isprintable() else "".join(map(_printable, text))
     if len(line) > longest:
@@ -117,10 +107,6 @@ def nearest_names(name: str, known: Iterable[str]) -> str:
 
     The hint contains the most similar other name if there is one, and at most `MOST_NAMES` known
     names, the most similar ones first; a longer list ends with the number of names left out.
-
-    Args:
-        name: The unknown name.
-        known: All known names.
     """
     names = sorted(set(known) - {name})
     if not names:

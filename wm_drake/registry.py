@@ -68,7 +68,6 @@ class Registry(Mapping[str, Declaration], Generic[Declaration]):
         """Return the declaration with a name.
 
         Args:
-            name: Name.
             where, key: Place of the name in the input, for the message.
 
         Raises:

@@ -31,7 +31,6 @@ class ChosenLaw:
         """Choose a law.
 
         Args:
-            law: The compiled law.
             name: Name of what it computes, equal for laws of equal sources.
         """
         self.law = law

@@ -19,7 +19,6 @@ def kept(key: str, compute: Callable[[], bytes]) -> bytes:
 
     Args:
         key: What the result depends on, beside the sources: kind and inputs.
-        compute: Function that computes it.
     """
     if not CACHE_FOLDER:
         return compute()

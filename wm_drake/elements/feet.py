@@ -23,7 +23,6 @@ def packed_feet(cabinet: Cabinet, gravity: float) -> FloatArray:
     """Return the numbers of `FEET`.
 
     Args:
-        cabinet: The cabinet.
         gravity: [m/s^2]
     """
     feet = [cabinet.feet[name] for name in cabinet.corners]

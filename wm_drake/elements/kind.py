@@ -238,8 +238,6 @@ class PlacedElement:
     """An element of another package in its place.
 
     Attributes:
-        kind: Its kind.
-        ends: Its frames.
         packed_numbers: Numbers of `ElementKind.layout`.
         start: States at the start of a run with a drum at rest, and what a unit of the rate of the
             drum adds to them; those of the kind if None.
@@ -303,7 +301,6 @@ def registered_laws(
     """Return the laws of the elements of other packages; None without any.
 
     Args:
-        kinds: Kind of each element.
         at, states: Index of each element in the packed numbers, and of its first state.
     """
     if not kinds:

@@ -19,7 +19,6 @@ def layout_of(name: str, kind: type[BaseModel], fields: Sequence[str]) -> Packed
     """Return the layout of fields of a type: its numbers in the order of the type, then its curves.
 
     Args:
-        name: Name of the layout.
         kind: Type of a machine file.
         fields: Names of its fields; what is not a plain number is a curve.
     """

@@ -56,8 +56,6 @@ class ExportedFmu:
     """An FMU that was written.
 
     Attributes:
-        path: The file.
-        model: What it contains.
         platforms: Names of the platforms that it has code for.
         size: Size of the file. [byte]
     """
@@ -126,11 +124,7 @@ class _Contents:
         self.header = _machine_header(model, self.token, fmi).encode()
 
     def about(self, sources: Iterable[str]) -> dict[str, bytes]:
-        """Return the description, the documentation and the reference results.
-
-        Args:
-            sources: Names of the files in `sources`.
-        """
+        """Return the description, the documentation and the reference results."""
         compiled = tuple(name for name in sources if name.endswith(".c"))
         identity = Identity(self.token, self.fmi, _program(), compiled)
         files = {
@@ -236,8 +230,6 @@ def _library(contents: Mapping[str, bytes], platform: Platform, compiler: list[s
 
     Args:
         contents: Object files and the header of the machine, by file name.
-        platform: The platform.
-        compiler: Command that compiles and links, with its options for this FMU.
 
     Raises:
         InputError: the compiler fails.

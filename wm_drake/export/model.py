@@ -48,11 +48,8 @@ class Variable:
     """A variable of an FMU.
 
     Attributes:
-        name: Its name.
         index: Its index in the array of an instance, which is its value reference.
         causality, variability: As the standard has them.
-        unit: SI unit.
-        words: What it is.
         start: Value before a run; None for one that is computed.
         minimum, maximum: Bounds; None without one.
         nominal: Usual size.
@@ -77,14 +74,10 @@ class ExportedModel:
     """A machine, ready to be compiled.
 
     Attributes:
-        setup: The machine with its load.
         plan: What its functions are compiled for.
         numbers: Array of an instance before a run.
-        constants: Array of constants.
-        variables: All variables.
         states: Indices of the continuous states in the array.
         step: Largest step of the integrator. [s]
-        load: Name of the load.
     """
 
     setup: Setup
@@ -108,8 +101,6 @@ def exported_model(
     """Return a machine with a load, ready to be compiled.
 
     Args:
-        parameters: The machine.
-        load: Name of one of its loads.
         input_kind: "speed" for a prescribed speed of the drum, "torque" for a drum that turns as a
             torque makes it.
         step: Largest step of the integrator; that of the machine if None. [s]

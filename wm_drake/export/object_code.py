@@ -94,7 +94,6 @@ def symbols(code: Mapping[str, str], platform: Platform) -> list[tuple[str, str,
 
     Args:
         code: LLVM's text of each function as numba gives it, by the name that its symbol gets.
-        platform: The platform.
     """
     usual = [(name, name, "") for name in code]
     fast = [(name, f"{name}_fast", platform.fast) for name in code if platform.fast]
@@ -106,7 +105,6 @@ def object_files(code: Mapping[str, str], platform: Platform) -> dict[str, bytes
 
     Args:
         code: As for `symbols`.
-        platform: The platform.
     """
     return {
         f"{symbol}.o": _emitted(name, symbol, code[name], _Target(platform, features, "object"))
@@ -119,7 +117,6 @@ def assembly(code: Mapping[str, str], platform: Platform) -> dict[str, str]:
 
     Args:
         code: As for `symbols`.
-        platform: The platform.
     """
     return {
         symbol: _emitted(name, symbol, code[name], _Target(platform, features, "text")).decode()

@@ -46,9 +46,7 @@ class Tunable:
     """A number of the machine file that may change between two steps.
 
     Attributes:
-        key: Its key path.
         value: Its value in SI units.
-        unit: Its unit.
         minimum, maximum: Bounds; None without one.
         rows, slopes: Indices of the packed numbers (from the first element on) that depend on it,
             and how much each of them grows with it. (k,)
@@ -67,7 +65,6 @@ def tunables(machine: Machine, gasket: bool = True) -> list[Tunable]:
     """Return the numbers of a machine that may be tuned.
 
     Args:
-        machine: A built machine.
         gasket: False for a machine whose gasket is taken out.
     """
     context = machine.diagram.CreateDefaultContext()

@@ -92,7 +92,6 @@ def add_bodies(plant: MultibodyPlant, parameters: MachineParameters) -> None:
 
     Args:
         plant: Empty plant.
-        parameters: The machine.
 
     Raises:
         InputError: there is no such file, it is not valid SDF, it lacks a body or a joint, or a new
@@ -414,8 +413,6 @@ def with_sdf_values(
     `with_value` can then change a part of such a value, for example one coordinate of a frame.
 
     Args:
-        plant: The plant.
-        parameters: The machine.
         keys: Key paths; each path below `frames` or `bodies` adds an override.
 
     Raises:

@@ -35,8 +35,6 @@ def cabinet_at_rest(
 
     Args:
         plant, context: The plant and its Context, at rest and without load.
-        state_layout: State layout of the plant.
-        parameters: The machine.
 
     Raises:
         InputError: the cabinet tips over at rest.

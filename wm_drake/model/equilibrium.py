@@ -69,7 +69,6 @@ def force_as_drawn(
     Args:
         plant, context: The plant and its Context, at the drawn pose; attached bodies (damper tubes,
             drum in a compliant bearing) are moved, so that their weight is on the tub.
-        state_layout: State layout of the plant.
         elements: All elements, springs without the preloads to find.
 
     Returns:
@@ -289,7 +288,6 @@ def weight_on_cabinet(
 
     Args:
         plant, context: The plant and its Context, at rest.
-        state_layout: State layout of the plant.
 
     Returns:
         Moment about the origin of W and force, in W. (6,) [N m, N]
@@ -368,7 +366,6 @@ def _balance(statics: Statics, chosen: Indices) -> float:
 
     Args:
         statics: Forces of the machine; its Context is moved.
-        chosen: Indices of positions.
 
     Returns:
         Largest force or moment that rounding may leave. [N, N m]

@@ -77,10 +77,8 @@ class FramePoses:
         Cases of a design share what their parameters do not change.
 
         Args:
-            key: Key path of the element.
             parts: Frozen parameters that the element is made of, always as many, or numbers as
                 bytes.
-            place: Places the element.
         """
         known = self._placed.get(key)
         if known is None or not all(map(_are_same, known[0], parts)):

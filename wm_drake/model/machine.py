@@ -39,7 +39,6 @@ class Setup:
     """A machine set up in a Context: numbers chosen, preloads solved, at rest at its rest pose.
 
     Attributes:
-        machine: The built machine.
         parameters: The numbers in force.
         context: Root Context of the diagram.
         elements: The elements at their frames.
@@ -414,11 +413,7 @@ class MachineSystems:
 
 @dataclass(frozen=True, repr=False)
 class Machine(MachineSystems):
-    """A machine as a diagram of its own. The named ports are exported: inputs and outputs.
-
-    Attributes:
-        diagram: The diagram.
-    """
+    """A machine as a diagram of its own. The named ports are exported: inputs and outputs."""
 
     diagram: Diagram
 

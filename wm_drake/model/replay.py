@@ -81,7 +81,6 @@ def replay_page(
     """Return a self-contained HTML page that replays a motion in 3D.
 
     Args:
-        parameters: The machine.
         motion: The motion, with at least one sample.
         title: Title of the page; that of the machine if empty.
         load: Point masses in the drum; they turn with it.

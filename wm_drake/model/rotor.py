@@ -37,10 +37,8 @@ def set_rotor(plant: MultibodyPlant, context: Any, drive: MotorDrive) -> None:
     """Add the inertia of a rotor to drum, tub and actuator in a plant Context.
 
     Args:
-        plant: The plant.
         context: Its Context, whose drum and tub have the inertia of the machine without the rotor's
             rotation against the tub.
-        drive: The drive.
 
     Raises:
         InputError: the joint is not revolute, or the tub's inertia is too small.

@@ -161,7 +161,6 @@ class Scene:
         millimetre only. A cabinet that moves is fixed: poses are those seen from it.
 
         Args:
-            parameters: The machine.
             meshcat: Shows the shapes if given.
         """
         perfect = parameters.imperfections.model_copy(update={"bearing": None})
@@ -418,9 +417,7 @@ class Scene:
         """Return the smaller of a known gap and the smallest gap of one pair of shapes.
 
         Args:
-            pair: The pair.
             direction: Direction of the first bound, see `_nearest`. (3,)
-            best: The smallest gap known.
             time: (n,) [s]
             poses: Poses of the tub. (n, 6) [rad, m]
         """

@@ -23,7 +23,6 @@ def check_shapes(path: Path, root: Element) -> None:
 
     Args:
         path: The SDF file; names of meshes are relative to it.
-        root: Its root element.
 
     Raises:
         InputError: a shape is unbounded, or a mesh is missing, empty, of another type, has a corner

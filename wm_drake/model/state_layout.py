@@ -73,7 +73,6 @@ def state_layout_of(plant: MultibodyPlant, parameters: MachineParameters) -> Sta
 
     Args:
         plant: Plant with the joints that `wm_drake.model.bodies.add_bodies` adds.
-        parameters: The machine.
     """
 
     def floating(body: str) -> Indices:

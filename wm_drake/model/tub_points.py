@@ -55,7 +55,6 @@ def measured_points(points: TubPoints, rest: FloatArray) -> FloatArray:
     """Return the measured points: the sensors, then the detergent point along x, y, z.
 
     Args:
-        points: Points of the tub.
         rest: Rest pose: roll, pitch, yaw, x, y, z. (6,) [rad, m]
 
     Returns:

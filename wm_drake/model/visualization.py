@@ -89,12 +89,8 @@ def add_visualizer(
     shown where it is, on a floor.
 
     Args:
-        builder: The diagram that the machine is in.
-        parameters: The machine.
-        state_layout: State layout of the machine's plant.
         state: Output port of the plant's state; for a cabinet that moves, port of the state of tub
             and drum seen from it.
-        meshcat: Where to show it.
         plant_state: Output port of the plant's state.
     """
     scene_graph = builder.AddNamedSystem("shapes", SceneGraph())

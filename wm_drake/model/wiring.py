@@ -86,7 +86,6 @@ class Wiring:
         Args:
             cabinet: System of the cabinet, which is in the diagram as a link.
             mounts: Elements by label, as for `connect_elements`.
-            feet: System of the feet.
 
         Returns:
             The port of the state of tub and drum seen from the cabinet.

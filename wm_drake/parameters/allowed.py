@@ -45,10 +45,6 @@ def allowed_range(parameters: MachineParameters, key: str) -> AllowedRange:
     """Return the range that the field of a key path allows; unbounded if it declares none.
 
     Other rules, such as an order of several numbers, are checked when a value is set.
-
-    Args:
-        parameters: The machine.
-        key: Key path of a number in it.
     """
     _, field = field_at(parameters, key)
     return AllowedRange() if field is None else declared_range(field)

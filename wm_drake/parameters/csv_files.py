@@ -25,7 +25,6 @@ def read_csv(
     """Read a CSV file with given columns.
 
     Args:
-        path: The file.
         columns: Names of the columns that the file must have, in this order.
         key: Key path for messages.
         optional: Name of a column that may follow; empty for none.
@@ -89,10 +88,6 @@ def finite_numbers(table: "pd.DataFrame", path: str | Path, key: str = "") -> Fl
 
 def read_header(path: Path, key: str = "") -> list[str]:
     """Return the names of the columns of a CSV file.
-
-    Args:
-        path: The file.
-        key: Key path for messages.
 
     Raises:
         InputError: the file cannot be read as CSV.

@@ -55,8 +55,6 @@ class FactorLevels:
     """The levels of a factor for one machine.
 
     Attributes:
-        name: Name of the factor.
-        about: Description of the factor.
         settings: For each of the levels -1, 0 and 1: values by key path, in SI units.
         nominal: By key path: the machine's number, or the nominal stiffness of its table, as text
             in the display unit.
@@ -98,7 +96,6 @@ def factor_of_text(text: str, known: Mapping[str, Factor]) -> tuple[str, Factor]
 
     Args:
         text: NAME of a known factor or KEY path of a number, either one with or without =LOW..HIGH.
-        known: Known factors by name.
 
     Raises:
         InputError: the text does not have this form.
@@ -122,8 +119,6 @@ def levels_of(
     """Return the levels of factors for a machine.
 
     Args:
-        parameters: The machine.
-        factors: Factors by name.
         tables: How a level changes a table, one of `TABLES`.
 
     Raises:
@@ -150,8 +145,6 @@ def at_levels(
     """Return the machine with each factor set to its level.
 
     Args:
-        parameters: The machine.
-        factors: Factors with their levels for this machine.
         levels: One level (-1, 0 or 1) for each factor.
     """
     changes: dict[str, Value] = {}
@@ -167,11 +160,6 @@ def at_places(
 
     Numbers are interpolated linearly between two levels. The forces of a table follow its
     stiffness.
-
-    Args:
-        parameters: The machine.
-        factors: Factors with their levels for this machine.
-        places: One place for each factor.
     """
     changes: dict[str, Value] = {}
     for factor, place in zip(factors, places, strict=True):
@@ -193,7 +181,6 @@ def place_of(parameters: MachineParameters, factor: FactorLevels, text: str) -> 
 
     Args:
         parameters: The machine whose levels the factor has.
-        factor: The factor.
         text: Value of its first key with a unit, or in percent of the machine's number.
 
     Raises:

@@ -98,7 +98,6 @@ def combined(masses: list[Mass], about: str) -> Mass:
 
     Args:
         masses: Parts, at least one.
-        about: Description of the body.
     """
     mass = sum(part.mass for part in masses)
     centre = sum(part.mass * part.centre for part in masses) / mass
@@ -154,7 +153,6 @@ class FirstMachine:
     """A machine from a few numbers.
 
     Attributes:
-        name: Name of the machine.
         numbers: What is known of it.
         parts: Tub and drum of a table of parts; empty for shells of the masses of `numbers`.
     """

@@ -300,7 +300,6 @@ def models_in(annotation: Any, suffix: str = "") -> Iterator[tuple[str, type[Bas
     """Yield the groups of values in an annotation, each with what its key path adds.
 
     Args:
-        annotation: Annotation of a field.
         suffix: Start of what the key path adds; NAME stands for a name, N for an index.
     """
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):

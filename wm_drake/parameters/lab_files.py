@@ -28,7 +28,6 @@ class Channel:
     """A recorded channel.
 
     Attributes:
-        name: As in the file.
         unit: Text of its unit; "" if the file has none.
         values: Samples (n,).
         time: Time of each sample (n,), or None if the file has none for it. [s]

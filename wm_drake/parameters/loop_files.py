@@ -107,7 +107,6 @@ def _checked_loop(
     """Return a loop from a table of time, displacement and force; check time and signals.
 
     Args:
-        path: The file.
         table: In the units of the file (n, 3).
         lines: Line, or number of the sample, of each row.
         head: Cells of the header.
@@ -216,7 +215,6 @@ def read_loops(
     """Read several loops, either all of displacement and force or all of angle and moment.
 
     Args:
-        paths: The files.
         units: Units of time, displacement and force if a header has none.
         channels: As for `read_loop`.
 

@@ -82,7 +82,6 @@ def unusual_numbers(
     """Return one problem for each number of a machine outside its usual range.
 
     Args:
-        parameters: The machine.
         keys: Key paths of the numbers to check, or of entries of them; all if None.
     """
     remarks = []

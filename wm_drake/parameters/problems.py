@@ -27,8 +27,6 @@ def problems_of(error: ValidationError, root: type[BaseModel], key: str = "") ->
     """Return the problems that pydantic found, one for each error.
 
     Args:
-        error: Error that pydantic raised.
-        root: Model that was validated.
         key: Key path of the model, to which that of each problem is appended.
     """
     problems = []

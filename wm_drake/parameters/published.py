@@ -59,10 +59,6 @@ def published_results(paths: Sequence[str], key: str = "published") -> Published
     They are given at the levels -1, 0 and 1, or at -1 and 0 only, as in [B] Table 5; effects sum
     to zero, so the others follow.
 
-    Args:
-        paths: The CSV files.
-        key: Key path for messages.
-
     Raises:
         InputError: a file is missing or has other columns, a value is not a number, the number of
             effects does not fit the term, or a term is given twice.
@@ -86,7 +82,6 @@ class _Row:
     Attributes:
         cells: Values by column.
         number: Number of the row, from 1 on.
-        path: The file.
         key: Key path for messages.
     """
 

@@ -67,7 +67,6 @@ def check_regular(path: Path, *, key: str = "", largest: int = LARGEST_TABLE) ->
     Devices and pipes are refused: they may never end, or wait for input.
 
     Args:
-        path: The file.
         key: Key path for messages.
         largest: Largest size. [byte]
 
@@ -92,7 +91,6 @@ def read_text(path: Path, *, key: str = "", largest: int = LARGEST_TABLE) -> str
     """Return the text of a regular file in UTF-8, without a byte order mark.
 
     Args:
-        path: The file.
         key: Key path for messages.
         largest: Largest size. [byte]
 

@@ -259,13 +259,7 @@ def tolerances_path(name_or_path: str | Path) -> Path:
 
 
 def check_load(tolerances: Tolerances, machine: MachineParameters, path: Path) -> None:
-    """Raise an InputError if the machine lacks the load that a tolerance file names.
-
-    Args:
-        tolerances: Content of the file.
-        machine: The machine.
-        path: The file, for the message.
-    """
+    """Raise an InputError if the machine lacks the load that a tolerance file names."""
     name = tolerances.load
     if name and name not in machine.loads:
         hint = nearest_names(name, machine.loads)

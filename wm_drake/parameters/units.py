@@ -254,7 +254,6 @@ def convert(magnitude: float, unit_text: str | None, unit: Unit) -> float:
     """Return a number with a unit as a number in SI units.
 
     Args:
-        magnitude: The number.
         unit_text: Its unit; None if it has none.
         unit: Unit of the field that the number is for.
 
@@ -287,7 +286,6 @@ def bounded(value: float, shown: str) -> float:
     """Return a number in SI units, after checking that a computation can use it.
 
     Args:
-        value: The number.
         shown: The number as it was given, for the message.
 
     Raises:

@@ -107,11 +107,9 @@ class Variation:
     """Numbers of a machine that change together.
 
     Attributes:
-        name: Name.
         numbers: The numbers; none for a quantity that is not in the machine file.
         change: How a value changes them.
         unit: Unit for reading of a value.
-        about: Description.
     """
 
     name: str
@@ -143,8 +141,6 @@ def apply(
     """Return the machine with a value of each variation.
 
     Args:
-        parameters: The machine.
-        variations: Variations of this machine.
         values: One value for each. [1 for PERCENT, else SI]
 
     Raises:
@@ -166,11 +162,8 @@ def variation_of(
     """Return a variation and its values, given as texts of one form.
 
     Args:
-        parameters: The machine.
-        name: Name of the variation.
         keys: Key paths of its numbers.
         texts: Values such as low and high: "95 %", "9 N/mm", or "nominal + 2 mm".
-        about: Description.
 
     Raises:
         InputError: the machine does not have a key, or a text is not a value of it.
@@ -211,7 +204,6 @@ def change_of(text: str, unit: Unit, key: str) -> tuple[Change, float]:
     """Return form and value of a text such as "95 %", "9 N/mm", "nominal" or "nominal + 2 mm".
 
     Args:
-        text: The text.
         unit: Unit of the number. Of a share, a percent is a value.
         key: Key path for the message.
 

@@ -60,8 +60,6 @@ class Texts:
     """What stands around the axes of a panel.
 
     Attributes:
-        titles: Lines of its title.
-        subtitles: Lines of its subtitle.
         above: Room between the axes and the title. [px]
         x_ticks, y_ticks: Texts of the named ticks, broken into lines.
         is_upright: Whether the texts of the horizontal axis are turned.

@@ -294,7 +294,6 @@ class Figure:
     """Figure.
 
     Attributes:
-        panels: Panels.
         height: Height of the panels of one row. [px]
         widths: Relative widths of the columns; () for equal ones.
         x_label: Label of all horizontal axes.

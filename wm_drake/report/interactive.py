@@ -110,10 +110,7 @@ def _note(text: str, size: float, color: str, *, is_bold: bool = False, **place:
     """Return a text in a picture.
 
     Args:
-        text: The text.
         size: Its size. [px]
-        color: Its colour.
-        is_bold: Whether it is bold.
         place: Where it is, in the words of Plotly.
     """
     font = {"size": size, "color": color, "weight": 700 if is_bold else 400}

@@ -38,8 +38,6 @@ def picture(figure: Figure, alternative: str, caption: str) -> Picture:
 
     Args:
         figure: The figure. With `--figures` it is also written to files.
-        alternative: Text for readers who cannot see the image.
-        caption: Text below the image.
     """
     collect(figure, alternative)
     return Picture(alternative, caption, as_json(plotly_of(figure)))

@@ -84,9 +84,6 @@ def progress_bar(total: int, what: str = "runs") -> Iterator[Callable[..., None]
 def progress_bars(names: Sequence[str]) -> Iterator[Callable[[int, float], None]]:
     """Show progress of several computations on standard error, one bar for each.
 
-    Args:
-        names: Name of each computation.
-
     Yields:
         Function to call with the number of a computation and the fraction of it that is done.
     """

@@ -15,9 +15,6 @@ class Section:
 
     Attributes:
         anchor: Name of the section in an address.
-        heading: Heading.
-        pictures: Pictures.
-        tables: Tables.
         text: Sentences.
         facts: Pairs of word and text.
         links: Names of files beside the page, and the words that link to them.
@@ -52,7 +49,6 @@ class SectionedPage:
     """A page: title, answer in words, sections, how it was made, and numbers of the machine.
 
     Attributes:
-        title: Title.
         summary: Answer in a few sentences.
         sections: Sections; pictures should come before tables. None stands for one left out.
         facts: How the result was computed, as pairs of word and text.

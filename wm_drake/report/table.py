@@ -181,7 +181,6 @@ def table_of(
 
     Args:
         frame: Rows. Columns from the first one with numbers on are columns of numbers.
-        caption: Caption.
         columns: Declaration of columns by their names in the frame.
         kinds: Style of each row, as of `Row`.
         grouped: Whether neighbours with the same first cell have it once.

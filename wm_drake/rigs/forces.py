@@ -66,8 +66,6 @@ def harmonic_loads(
     """Return force or moment at the driven end of a bushing under steady harmonic motion (n,).
 
     Args:
-        bench: The bushing.
-        motion: The motion.
         phase: Phases, from 0 to 2 pi (n,). [rad]
         position, rate: Motion at these phases. [m, m/s; rad, rad/s if it rotates]
     """
@@ -113,7 +111,6 @@ def bushing_loads(bench: BushingBench, position: FloatArray, rate: FloatArray) -
     differs by less than 0.1 % up to d = 4 mm at R = 100 mm.
 
     Args:
-        bench: The bushing.
         position, rate: Motion of the driven end. [m, m/s; rad, rad/s if it rotates]
     """
     axis = AXES.index(bench.axis)

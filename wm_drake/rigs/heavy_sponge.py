@@ -29,7 +29,6 @@ def steady_tensions(bench: DamperBench, motion: Harmonic) -> FloatArray:
 
     Args:
         bench: The damper; the mass of its sponge is > 0.
-        motion: The motion.
 
     Returns:
         (POINTS,) at the phases `PHASE` without the last.

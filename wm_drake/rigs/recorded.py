@@ -34,7 +34,6 @@ def recorded_forces(bench: Bench, motion: RecordedMotion) -> FloatArray:
 
     Args:
         bench: Component on the bench, without a sponge that has mass.
-        motion: The motion.
     """
     if isinstance(bench, BushingBench):
         return recorded_loads(bench, motion)

@@ -20,7 +20,6 @@ def axis_branches(bushing: BushingType, axis: str) -> FloatArray | None:
     """Return the numbers of the branches of an axis; None if it uses none.
 
     Args:
-        bushing: The bushing.
         axis: One of `wm_drake.rigs.AXES`.
 
     Returns:

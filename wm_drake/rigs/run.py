@@ -112,7 +112,6 @@ def slider_friction_curves(
     """Return the friction on a slider at held deformation rates, the form of [C] Fig. 12. [N]
 
     Args:
-        bench: The component.
         deformation_rates: Rates at which the sponge is deformed (k,). [m/s]
         rates: Velocities of the slider (n,). [m/s]
 

@@ -113,9 +113,7 @@ def balance_of(case: Case, parameters: MachineParameters, record: Record) -> Bal
     """Return the unbalance of load and balls over a run; None for a machine without balls.
 
     Args:
-        case: Case of the run.
         parameters: The machine, unless the case has parameters of its own.
-        record: Its record.
     """
     parameters = case.parameters or parameters
     rings = rings_of(parameters)

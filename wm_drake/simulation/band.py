@@ -58,7 +58,6 @@ def pass_band(profile: SpinProfile, period: float) -> tuple[float, float]:
     highest drum frequency, since 20 Hz would cut the motion at 1200 rpm in half.
 
     Args:
-        profile: Spin profile of the run.
         period: Time between samples. [s]
     """
     low, high = profile.band or (

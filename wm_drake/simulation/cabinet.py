@@ -43,7 +43,6 @@ def walk(cabinet: Cabinet, slips: FloatArray) -> Walk:
     They are those of the rigid motion that is nearest to the four slips (least squares).
 
     Args:
-        cabinet: The cabinet.
         slips: (4, 2) how far the end of each pad has slid. [m]
     """
     feet = np.array([(cabinet.feet[name].x, cabinet.feet[name].y) for name in cabinet.corners])

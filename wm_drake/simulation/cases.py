@@ -50,10 +50,6 @@ def is_as_measured(parameters: MachineParameters, case: Case) -> bool:
     """Return whether a case has numbers, load and spin profile of a machine file.
 
     Only such a case may be compared with what the machine file says was measured or published.
-
-    Args:
-        parameters: The machine of the file.
-        case: The case.
     """
     return (
         case.parameters in (None, parameters)

@@ -76,7 +76,6 @@ def foot_loads(
     """Return loads and margins of the feet over time.
 
     Args:
-        cabinet: The cabinet.
         gravity: [m/s^2]
         wrenches: (n, 6) moment about the origin of W and force of all mounts on the cabinet, in W.
             [N m, N]
@@ -115,11 +114,9 @@ def foot_measures(
     """Return the measures of the feet of a run.
 
     Args:
-        cabinet: The cabinet.
         gravity: [m/s^2]
         wrenches: (n, 6) moment about the origin of W and force of all mounts on the cabinet, in W.
             [N m, N]
-        profile: Spin profile of the run.
         period: Time between samples. [s]
         floor_forces: As for `foot_loads`.
         ranges: Which samples (n,) belong to each part of the run, in place of the regions of a

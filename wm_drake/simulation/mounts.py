@@ -39,10 +39,6 @@ def mount_names(parameters: MachineParameters) -> tuple[str, ...]:
 def mount_wrenches(setup: Setup, trajectory: Trajectory) -> FloatArray:
     """Return the wrench of each mount on the cabinet over time.
 
-    Args:
-        setup: Machine as it was set up for the run.
-        trajectory: Motion of the machine.
-
     Returns:
         (n, mounts, 6) moment about the origin of W and force, in W. [N m, N]
     """
@@ -56,10 +52,6 @@ def mount_wrenches(setup: Setup, trajectory: Trajectory) -> FloatArray:
 
 def mounts_along(setup: Setup, trajectory: Trajectory) -> tuple[FloatArray, FloatArray, Mounts]:
     """Return what compiled functions of the mounts need along a motion.
-
-    Args:
-        setup: Machine as it was set up for the run.
-        trajectory: Motion of the machine.
 
     Returns:
         States of the mounts (n, size), their packed numbers, and the indices in both.

@@ -59,7 +59,6 @@ def order_map(
         angle: (n,) drum angle. [rad]
         time: (n,) rising. [s]
         revolutions: Length of the window.
-        highest: Highest order.
         step: Step between the orders; the first order is one step.
         period: Time between the centres of the windows. [s]
 

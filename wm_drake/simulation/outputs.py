@@ -38,8 +38,6 @@ def _motion(setup: Setup, trajectory: Trajectory, displacements: FloatArray) -> 
     """Return the variables of the motion of tub, drum, sensor points and damper sponges.
 
     Args:
-        setup: Machine as it was set up for the run.
-        trajectory: Motion of the machine.
         displacements: (n, k) displacements at the `measured_points`. [m]
     """
     state, acceleration = trajectory.state, trajectory.acceleration
@@ -208,7 +206,6 @@ def _forces(
     """Return the variables of the motor torque and of the forces of the elements.
 
     Args:
-        trajectory: Motion of the machine.
         springs: (n, springs) tensions. [N]
         dampers: (n, dampers) tensions. [N]
         bushings: (n, bushings, 6) force and moment on the housing. [N, N m]
@@ -250,7 +247,6 @@ def _outputs_of_others(setup: Setup, outputs: FloatArray) -> Variables:
     """Return the outputs of elements of other packages, a variable for each output of a kind.
 
     Args:
-        setup: Machine as it was set up for the run.
         outputs: Of all elements, one after the other. (n, k)
     """
     others, columns = setup.elements.others, dict[str, int]()
@@ -335,8 +331,6 @@ def _with_telescopes(
     at the housing.
 
     Args:
-        setup: Machine as it was set up for the run.
-        trajectory: Motion of the machine.
         springs: (n, springs) tensions. [N]
         dampers: (n, dampers) tensions of the strut dampers. [N]
         bushings: (n, bushings, 6) force and moment on the housing. [N, N m]

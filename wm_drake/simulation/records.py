@@ -36,11 +36,6 @@ def as_record(setup: Setup, case: Case, trajectory: Trajectory) -> Record:
 
     All displacements are in W and count from the rest pose of the empty machine. If the cabinet
     moves, all but `cabinet_angle` to `foot_slip` are seen from it, in its frame in place of W.
-
-    Args:
-        setup: Machine as it was set up for the run.
-        case: The case that was run.
-        trajectory: Motion that an engine computed.
     """
     variables: dict[str, Any] = {
         name: (dims, values, {"units": unit, "long_name": text})

@@ -26,7 +26,6 @@ def tensions_at(
     The tension never falls with the length, so that the smallest length gives the smallest tension.
 
     Args:
-        springs: The springs.
         lengths: Length of each; not finite for a run without samples. [m]
 
     Returns:

@@ -48,7 +48,6 @@ def region_displacements(
         points: (k, 3) positions in T. [m]
         rest_pose: (6,) roll, pitch, yaw, x, y, z from which displacements count. [rad, m]
         period: Time between samples. [s]
-        profile: Spin profile with regions.
 
     Returns:
         Two arrays (regions, k, 3) in W: from the displacement itself, and from the acceleration
@@ -87,10 +86,6 @@ def sensor_accelerations(record: Record, sensors: Mapping[str, Sensor]) -> xr.Da
     """Return the accelerations at the points of displacement sensors, along their axes in W.
 
     Gravity is not included: an accelerometer that measures down to 0 Hz shows it in addition.
-
-    Args:
-        record: Record of a run.
-        sensors: The sensors of the machine by name.
 
     Returns:
         (time, sensor) with the sensors of the record. [m/s^2]
@@ -195,7 +190,6 @@ def region_rms(signal: FloatArray, period: float, profile: SpinProfile) -> Float
     Args:
         signal: (n, k) one column per signal; the first sample is at time 0.
         period: Time between samples. [s]
-        profile: Spin profile with regions.
 
     Returns:
         (regions, k) in the unit of the signals. NaN where the signals end before the region does.
@@ -215,7 +209,6 @@ def region_limits(profile: SpinProfile, period: float) -> list[tuple[int, int]]:
     """Return the first sample of each region of a profile, and the one after its last.
 
     Args:
-        profile: Spin profile.
         period: Time between samples; the first is at time 0. [s]
     """
 

@@ -25,7 +25,6 @@ class Motion:
     """A motion of the rim.
 
     Attributes:
-        name: Name.
         component: Number of its displacement among x, y, z, about_x, about_y, about_z.
         is_mirrored: Whether the curve backwards is the curve forwards with the other sign.
     """
@@ -76,7 +75,6 @@ class Curve:
     """Force over displacement, or moment over angle.
 
     Attributes:
-        motion: The motion.
         ring: Mesh.
         points: Points in the order of their values; the middle one is at rest.
         stopped: Why the curve ends before the values asked for; "" if it does not.
@@ -148,7 +146,6 @@ def curve(
 
     Args:
         solver: Solver of a ring that has the symmetry of the motion.
-        motion: Motion of the rim.
         values: Rising values above 0. [m or rad]
         progress: Called with the finished fraction.
     """

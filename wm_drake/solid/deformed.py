@@ -33,8 +33,6 @@ def deformed(ring: Ring, rubber: Rubber, u: FloatArray) -> Deformed:
     sqrt(3/2) of the deviator of 2 W'(I) b / J.
 
     Args:
-        ring: The ring.
-        rubber: Its rubber.
         u: Displacements of the nodes. (nodes, 3) [m]
     """
     moved = np.einsum("eaik,eak->eai", ring.frames, u[ring.nodes])
@@ -59,7 +57,6 @@ def wrinkles(ring: Ring, u: FloatArray) -> float:
     the axial displacement of the middle of the wall, θ the angle about the axis.
 
     Args:
-        ring: The ring.
         u: Displacements of the nodes. (nodes, 3) [m]
     """
     if ring.grid.shape[1] == 1:

@@ -188,8 +188,6 @@ class Solver:
         one after the other, which has a wider band.
 
         Args:
-            ring: The ring.
-            rubber: Its rubber.
             has_contact: Whether folds are held off each other.
         """
         self.ring, self.iterations = ring, 0

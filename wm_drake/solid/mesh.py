@@ -64,7 +64,6 @@ def half_ring(drawing: GasketDrawing, meridian: int, around: int) -> Ring:
     """Return the half of a ring with z >= 0, for motions that are symmetric about the plane z = 0.
 
     Args:
-        drawing: The gasket.
         meridian: Number of elements along the meridian.
         around: Number of elements around the half ring.
     """
@@ -87,7 +86,6 @@ def wedge(drawing: GasketDrawing, meridian: int) -> Ring:
     """Return a thin wedge of a ring, for motions along the axis and about it.
 
     Args:
-        drawing: The gasket.
         meridian: Number of elements along the meridian.
     """
     section, angles = _section(drawing, meridian), (-HALF_WEDGE, 0.0, HALF_WEDGE)

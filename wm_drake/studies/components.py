@@ -41,7 +41,6 @@ def target_of(kind: str, options: ComponentOptions) -> Target:
 
     Args:
         kind: damper, bushing or gasket.
-        options: Options that name the component.
 
     Raises:
         InputError: There is no such component, or it is of another kind.

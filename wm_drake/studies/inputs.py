@@ -146,7 +146,6 @@ def machine_warnings(parameters: "MachineParameters", profile: Path | None = Non
     """Return warnings of what a machine has and runs do not use, and of a band that cuts them.
 
     Args:
-        parameters: The machine.
         profile: File of the option `--profile`.
     """
     from wm_drake.simulation.band import band_warnings
@@ -322,7 +321,6 @@ def channels_of(text: str | None, words: tuple[str, ...] = ()) -> dict[str, str]
     """Return the names of the channels of the option `--channels`, by word.
 
     Args:
-        text: The option.
         words: Allowed words; any word if empty.
 
     Raises:

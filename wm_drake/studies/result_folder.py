@@ -73,12 +73,7 @@ class Run:
 
 
 def check_folder(out: Path, run: Run) -> None:
-    """Raise an InputError if a run must not write to a folder: the one rule for all commands.
-
-    Args:
-        out: The folder, which need not exist.
-        run: The run that wants to write.
-    """
+    """Raise an InputError if a run must not write to a folder: the one rule for all commands."""
     check_is_folder(out)
     earlier = _earlier_run(out)
     if earlier is None:
@@ -182,8 +177,6 @@ def one_folder(out: Path, run: Run, kept: str = "") -> Iterator[Path]:
     were killed are removed first.
 
     Args:
-        out: The result folder.
-        run: The run that writes.
         kept: What is kept if the results cannot be written, for the message.
 
     Raises:

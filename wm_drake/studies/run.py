@@ -141,7 +141,6 @@ class Executor:
 
         Args:
             function: Function at the level of a module, for work that is no run of a machine.
-            items: Its arguments.
         """
         if self.client is None:
             yield from ((number, function(item)) for number, item in enumerate(items))
@@ -277,9 +276,6 @@ class Order:
     """A study with all its options.
 
     Attributes:
-        study: The study.
-        options: Options of the study.
-        run: Options of the driver.
         command: Command line or Python call.
         parameters: Machines in place of files, by their names in `options.machine`.
     """
@@ -336,7 +332,6 @@ def order_of(study: Study, given: Mapping[str, Any], command: str = "") -> Order
     """Return a study with options by their Python names, checked.
 
     Args:
-        study: The study.
         given: Options of the study and of the driver that the user has set.
         command: Command line or Python call.
 

@@ -265,7 +265,6 @@ class Study:
     Attributes:
         name: Name of the command and of the Python call.
         about: One line of help.
-        options: Model of the options.
         begin: Called with the options and the built machine, which the driver has checked; returns
             the task. If the option `machine` is repeatable, it gets all machines. Whatever is wrong
             with the input raises an `InputError` here, before any work.

@@ -47,9 +47,7 @@ class TableResult(Result):
 
     Attributes:
         title: Title of the page.
-        machine: The machine.
         summary: Answer in a few sentences.
-        shown: Tables.
         figures: Figures with the text for readers who cannot see them, and a caption.
         diverged: A line for each run that diverged.
     """

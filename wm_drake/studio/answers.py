@@ -83,9 +83,7 @@ def picture(machine: OpenMachine, runner: Runner, state: State) -> dict[str, Any
     """Run what a page has chosen and return the motion, and the gap with each load.
 
     Args:
-        machine: The open machine.
         runner: From `picture_runner_of`.
-        state: What the page has chosen.
 
     Raises:
         InputError: a number or the load is wrong.
@@ -137,9 +135,7 @@ def numbers(
     """Run what a page has chosen and return measures, forces and arrows.
 
     Args:
-        machine: The open machine.
         runner: From `runner_of`.
-        state: What the page has chosen.
         keys: Key paths of up to `LANES` numbers to turn slightly.
 
     Raises:
@@ -166,10 +162,7 @@ def arrows(
     """Return the arrow of each of up to `LANES` numbers, without the answer itself.
 
     Args:
-        machine: The open machine.
         runner: From `runner_of`.
-        state: What the page has chosen.
-        keys: Key paths of the numbers.
 
     Raises:
         InputError: a number or the load is wrong.

@@ -31,7 +31,6 @@ def arguments(name: str, given: dict[str, str]) -> list[str]:
     """Return what a user has filled in as arguments of the command of a study.
 
     Args:
-        name: Name of the study.
         given: Texts by name of the field.
 
     Raises:

@@ -30,8 +30,6 @@ def save_machine(
 
     Args:
         machines: Where the base of the file and the folder come from.
-        machine: The open machine.
-        state: What the page has chosen.
         name: Name of the new machine, without a suffix.
         overwrite: Whether a file of this name is replaced.
 

@@ -32,8 +32,6 @@ class Response:
     """One response: a number of the table of runs.
 
     Attributes:
-        measure: Name of its measure.
-        variable: Its variable.
         place: Index of the number in the variable, without the dimension `run`.
         labels: Labels of this place.
     """
@@ -120,8 +118,6 @@ def chosen_responses(
     """Return the responses that a user names.
 
     Args:
-        parameters: The machine.
-        profile: Its spin profile.
         names: Symbols (Dx), groups (D) or measures of `simulate_many` (extremes). If empty, the
             responses are those of `DEFAULT`, without the gap if the SDF has no shapes.
 

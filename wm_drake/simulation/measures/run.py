@@ -50,7 +50,6 @@ class Run(ABC):
     """One run up to its end or to where it diverged, with n samples. All in SI units.
 
     Attributes:
-        profile: Spin profile.
         period: Time between samples. [s]
     """
 

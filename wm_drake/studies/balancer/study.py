@@ -137,7 +137,6 @@ class Findings:
     """Findings of the study.
 
     Attributes:
-        machine: The machine.
         rate, high: Rate of the run-up, and its end. [rad/s^2, rad/s]
         loads: Over unbalance mass and place.
         base: The load of the other runs: the largest mass of `loads` that the balls can balance, in
@@ -147,7 +146,6 @@ class Findings:
         plain: Curve of the load of `base` in the machine without rings.
         capacities: Largest first moment of the balls in each plane, by its place. [kg m, m]
         radius: Radius at which the unbalance lies. [m]
-        runs: Number of all runs.
     """
 
     machine: MachineParameters
@@ -290,7 +288,6 @@ def curve_of(table: xr.Dataset, run: int, speeds: FloatArray) -> Curve:
 
     Args:
         table: Runs with the regions of `run_up`.
-        run: Index of the run.
         speeds: Begin of each range. [rad/s]
     """
     sizes = table.region_amplitude.values[run].max(axis=-1)
@@ -304,8 +301,6 @@ class Trials:
     """Runs of loads with free and with locked balls.
 
     Attributes:
-        machine: The built machine.
-        executor: Runs cases.
         high, rate: Of the run-up. [rad/s, rad/s^2]
         radius: Radius at which the unbalance lies. [m]
     """

@@ -49,7 +49,6 @@ def machine_page(machine: Machine, warnings: Sequence[str]) -> str:
     """Return the page of a machine as text of one self-contained file.
 
     Args:
-        machine: The built machine.
         warnings: What is allowed but unusual.
     """
     shown = describe(machine)

@@ -80,7 +80,6 @@ def make_design(
 
     Args:
         kind: One of `DESIGNS`.
-        factors: Names of the factors.
         trials: Number of trials; the default is 1000 (d-optimal), 729 (orthogonal) or all (full).
         model: Model to estimate, key of `MODELS`.
         seed: Seed of a D-optimal design.
@@ -142,8 +141,6 @@ def write_design(design: Design, path: Path, values: pd.DataFrame | None = None)
     """Write a design as CSV: number of the trial, then one column of levels per factor.
 
     Args:
-        design: The design.
-        path: The file.
         values: More columns, with the physical values of each trial. Their names end with a unit in
             brackets, so that `read_design` ignores them.
     """
@@ -158,8 +155,6 @@ def read_design(path: Path, factors: tuple[str, ...], model: str = "main+2fi") -
     the reader and are ignored.
 
     Args:
-        path: The file.
-        factors: Names of the factors.
         model: Model to estimate, key of `MODELS`.
 
     Raises:

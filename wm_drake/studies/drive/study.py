@@ -133,12 +133,10 @@ class DriveResult(Result):
     """Result of the study.
 
     Attributes:
-        parameters: The machine.
         profile: Spin profile of thresholds and map.
         thresholds: Smallest torque limit of each load.
         map: Map over torque and unbalance.
         estimation: Estimation of the unbalance; None without random loads.
-        runs: Number of runs.
     """
 
     parameters: MachineParameters
@@ -209,13 +207,7 @@ def passes(table: xr.Dataset, profile: SpinProfile) -> np.ndarray:
 def find_thresholds(
     parameters: MachineParameters, loads: Sequence[Case], run: Runs
 ) -> tuple[Threshold, ...]:
-    """Return the smallest torque limit of each load by bisection; all loads run side by side.
-
-    Args:
-        parameters: Machine with a motor.
-        loads: A case for each load.
-        run: Runs cases.
-    """
+    """Return the smallest torque limit of each load by bisection; all loads run side by side."""
     largest = motor_with_limit(parameters)[1].torque
     count, profile = len(loads), loads[0].profile
     low, high = np.full(count, largest / RANGE), np.full(count, largest)
@@ -302,8 +294,6 @@ def estimate_unbalance(
     Args:
         parameters: Machine with a motor.
         speed: Speed of the hold, reached by a ramp. [rad/s]
-        loads: Loads with planted unbalance.
-        run: Runs cases.
         inertia: Inertia of drum and rotor about the axis, without load. [kg m^2]
     """
     profile = SpinProfile(time=(0.0, RAMP, RAMP + HOLD), speed=(0.0, speed, speed))
@@ -333,8 +323,6 @@ def random_loads(count: int, seed: int, places: Load) -> list[Load]:
     """Return loads of two masses at random: 0 to 0.5 kg each, any phase, within the drum's depth.
 
     Args:
-        count: Number of loads.
-        seed: Seed.
         places: Load whose first radius is used.
     """
     rng = np.random.default_rng(seed)

@@ -31,7 +31,6 @@ class _Wish:
     """A level of a factor that is best for a response.
 
     Attributes:
-        level: The level.
         load, response: Names of load and response.
         gain: Difference of the mean response between worst and best level. [unit of the response]
     """

@@ -32,8 +32,6 @@ class Check:
     """Settings with their predictions and runs.
 
     Attributes:
-        settings: The settings.
-        surfaces: Fitted models.
         responses: Responses of the runs, one row per setting.
     """
 
@@ -76,14 +74,7 @@ def run_check(
     surfaces: Surfaces,
     run: Callable[[Iterable[Case]], xr.Dataset],
 ) -> Check:
-    """Run settings and return them with their predictions.
-
-    Args:
-        trials: Trials of the study.
-        settings: At least one.
-        surfaces: Fitted models of the study.
-        run: Function that runs cases, as `simulate_many` does.
-    """
+    """Run settings and return them with their predictions."""
     cases: list[Case] = []
     for number, setting in enumerate(settings, start=1):
         changed = at_places(trials.parameters, trials.factors, setting.places)

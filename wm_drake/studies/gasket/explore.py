@@ -16,14 +16,7 @@ from wm_drake.studies.gasket.words import Words
 def explorer_data(
     screening: Screening, surfaces: Surfaces, trials: GasketTrials, words: Words
 ) -> Markup:
-    """Return the fitted models with the words for factors and responses, as JSON.
-
-    Args:
-        screening: Result of the study.
-        surfaces: Its fitted models.
-        trials: Trials that were run.
-        words: Names for reading.
-    """
+    """Return the fitted models with the words for factors and responses, as JSON."""
     values = screening.responses.values
     data: dict[str, Any] = {
         "factors": [

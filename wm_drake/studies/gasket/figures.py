@@ -79,8 +79,6 @@ def heat_map_figure(screening: Screening, words: Words, loads: Sequence[str] = (
     """Return the contributions in percent: one row per term, one column per load and response.
 
     Args:
-        screening: Result of the study.
-        words: Names for reading.
         loads: Loads to show; all if empty. The rows are those of all loads.
     """
     loads = list(loads) or screening.loads
@@ -319,9 +317,6 @@ def _of_pair(
     """Return a panel of two factors: the first on the axis, the second, by colour, above it.
 
     Args:
-        marks: What the panel shows.
-        factors: Names of both factors.
-        words: Words for factors.
         y: Axis of the response.
         more: Text after the values of the second factor.
     """
@@ -339,9 +334,6 @@ def _panels(
     """Return one panel per response of a load, three in a row.
 
     Args:
-        screening: Result of the study.
-        load: Name of the load.
-        panel_of: Function that returns the panel of a response.
         height: Height of a panel. [px]
     """
     panels = [replace(panel_of((load, name)), name=name) for name in screening.names]

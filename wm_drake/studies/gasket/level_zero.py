@@ -86,11 +86,8 @@ def run_level_zero(
     """Run the machine and level 0 of all factors with each treatment of tables.
 
     Args:
-        machine: The machine itself.
         levels: Levels of the factors by treatment of tables, all of `TABLES`.
         tables: Treatment in the study.
-        trials: Trials of the study, for its loads and responses.
-        run: Function that runs cases of a machine.
 
     Returns:
         The responses; None if no factor has a table, so that both treatments are the same.

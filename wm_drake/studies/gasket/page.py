@@ -45,13 +45,7 @@ EFFECTS = (
 
 @dataclass(frozen=True)
 class GasketResult(Result):
-    """Result of the study.
-
-    Attributes:
-        screening: Effects of the factors.
-        trials: Trials that were run.
-        compared: What the effects are compared with.
-    """
+    """Result of the study."""
 
     screening: Screening
     trials: GasketTrials

@@ -46,12 +46,7 @@ CLIMBERS = 4
 
 @dataclass(frozen=True)
 class Aim:
-    """What a proposed setting shall reach.
-
-    Attributes:
-        screening: Result of the study.
-        surfaces: Its fitted models.
-    """
+    """What a proposed setting shall reach."""
 
     screening: Screening
     surfaces: Surfaces
@@ -100,11 +95,7 @@ class Aim:
 
 
 def best_places(aim: Aim) -> tuple[float, ...] | None:
-    """Return the best setting, with factors that hardly matter at level 0; None if none is better.
-
-    Args:
-        aim: What the setting shall reach.
-    """
+    """Return the best setting, factors that hardly matter at level 0; None if none is better."""
     count = len(aim.surfaces.factors)
     if not aim.names:
         return None
@@ -162,7 +153,6 @@ class Change:
     """Change of one factor.
 
     Attributes:
-        factor: The factor.
         text: Its new value, as `--set` and `--check` take it.
         place: The same as a place from -1 to 1.
     """
@@ -186,8 +176,6 @@ def change_of(machine: MachineParameters, factor: FactorLevels, place: float) ->
     """Return the change of a factor to a place, rounded to what a person would write.
 
     Args:
-        machine: The machine whose levels the factor has.
-        factor: The factor.
         place: Place from -1 to 1.
     """
     key, numbers = next(iter(factor.numbers.items()))
@@ -259,11 +247,7 @@ class Proposal:
         }
 
     def worst(self, screening: Screening) -> pd.DataFrame:
-        """Return one row per response that has a goal: the loads of its worst values, and these.
-
-        Args:
-            screening: Result of the study, for the goals of its responses.
-        """
+        """Return one row per response that has a goal: the loads of its worst values, and these."""
         rows, frame = [], self.frame()
         for name in screening.names:
             of = frame[frame["response"] == name].set_index("load")

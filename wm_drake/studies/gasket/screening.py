@@ -85,8 +85,6 @@ class Screening:
     """A design with its responses and their analysis of variance.
 
     Attributes:
-        design: The design.
-        responses: Responses of its trials.
         tables: Analysis of variance by label, without the trials whose run with this load failed.
     """
 
@@ -195,11 +193,6 @@ def mean_at(
     """Return the mean response at each level combination of one or two factors.
 
     The mean is that of the fitted model over all levels of the other factors.
-
-    Args:
-        screening: A design with its responses and their analysis.
-        label: Load and response.
-        factors: Names of one or two factors.
 
     Returns:
         Mean response by level combination, in the order of `factors`. [unit of the response]

@@ -73,7 +73,6 @@ class Surfaces:
     """Fitted models of all responses of a screening.
 
     Attributes:
-        factors: Names of the factors.
         interactions: Whether the model has two-factor interactions.
         coefficients: By label: of the row of the model (p,). [unit of the response]
         deviations: By label: residual standard deviation s; NaN without degrees of freedom.
@@ -97,8 +96,6 @@ class Surfaces:
         """Return the half width of the interval of a new run, or of the mean.
 
         Args:
-            label: Load and response.
-            places: Places of the factors.
             of_run: Whether the interval is that of a single run.
         """
         row = model_row(places, interactions=self.interactions)

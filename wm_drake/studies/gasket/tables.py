@@ -109,13 +109,7 @@ def all_tables(
     factors: Sequence[FactorLevels] = (),
     compared: Compared = NOT_COMPARED,
 ) -> dict[str, pd.DataFrame]:
-    """Return all tables but the design by name of the file, without suffix.
-
-    Args:
-        screening: Result of the study.
-        factors: Levels of the factors, for their physical values.
-        compared: What the results are compared with.
-    """
+    """Return all tables but the design by name of the file, without suffix."""
     tables = {
         "runs": runs_frame(screening, physical_values(screening.design, factors)),
         "variance": variance_frame(screening),
@@ -156,7 +150,6 @@ def runs_frame(screening: Screening, physical: pd.DataFrame | None = None) -> pd
     housing, the springs that go slack, and the reason if the run failed.
 
     Args:
-        screening: Result of the study.
         physical: Physical values of each trial, from `physical_values`.
     """
     design, responses = screening.design, screening.responses
@@ -408,9 +401,6 @@ def variance(
     The published mean is beside ours if there is one.
 
     Args:
-        screening: Result of the study.
-        words: Words for factors and responses.
-        published: Published results.
         short: Whether the table is for a terminal.
         has_terms: Whether the leading terms are in the table.
     """

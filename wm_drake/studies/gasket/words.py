@@ -13,12 +13,7 @@ class Words:
     """Names, physical values and units for reading."""
 
     def __init__(self, factors: Sequence[FactorLevels], meanings: Mapping[str, Meaning]) -> None:
-        """Store the words.
-
-        Args:
-            factors: Levels of the factors.
-            meanings: Meaning of each response, by its name.
-        """
+        """Store the words."""
         self._factors = {factor.name: factor for factor in factors}
         self._meanings = meanings
 

@@ -48,7 +48,6 @@ class Checked:
     """A curve with what its deformed states show.
 
     Attributes:
-        curve: The curve.
         begin, end: Stretch and stress at its ends.
         touches_at: First value on each side where folds touch, and NaN without. (2,) [m or rad]
         depth: Largest depth by which they overlap, in thicknesses of the wall.
@@ -69,8 +68,6 @@ class CurvesResult(Result):
 
     Attributes:
         name: Name or file of the drawing.
-        drawing: The gasket.
-        mesh: Sizes of the meshes.
         curves: Its curves by the names of the motions.
         frequency: Frequency of the loss factor. [Hz]
         machine: The machine with this gasket.

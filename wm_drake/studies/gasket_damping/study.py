@@ -262,7 +262,6 @@ def identify_damping(
     """Identify C_L and C_T from measured displacements.
 
     Args:
-        machine: The built machine.
         measured: Displacements of its sensors, by load.
         truth: True values if `measured` is from `virtual_experiment`. [N s/m, N m s/rad]
         mesh: Spacing at which the grid search ends, as a part of the region.
@@ -302,9 +301,7 @@ def virtual_experiment(
     The Drake engine runs the machine with the true damping, and noise is added.
 
     Args:
-        parameters: The machine.
         truth: True values of C_L and C_T. [N s/m, N m s/rad]
-        seed: Seed of the noise.
     """
     rng = np.random.default_rng(seed)
     true_parameters = with_damping(parameters, truth)
@@ -339,10 +336,6 @@ class EnvelopeModel:
 
     def __init__(self, machine: Machine, measured: Measured) -> None:
         """Compute the measured envelopes.
-
-        Args:
-            machine: The built machine.
-            measured: Displacements of its sensors, by load.
 
         Raises:
             InputError: the machine has no gasket, or its profile ends before the window.

@@ -50,7 +50,6 @@ def factors_of(drawing: GasketDrawing, folds: Sequence[int] = (1,)) -> tuple[Fac
     """Return the factors of a drawing.
 
     Args:
-        drawing: The drawing.
         folds: Numbers of repetitions of its folds; a factor if there are several.
 
     Raises:
@@ -88,10 +87,6 @@ def with_folds(drawing: GasketDrawing, times: int) -> GasketDrawing:
     where the first and the last of these corners are farther apart. Each has the depth of the
     drawing; width and fillets are divided by the number.
 
-    Args:
-        drawing: The drawing.
-        times: Number of repetitions.
-
     Raises:
         InputError: the drawing has fewer than two corners between its rims, or cannot be built.
     """
@@ -126,8 +121,6 @@ def changed(
     The depth of folds is the distance of the inner corners from the straight line between the rims.
 
     Args:
-        drawing: The drawing.
-        factors: Factors from `factors_of`.
         coded: Levels from -1 to 1. (factors,)
 
     Raises:

@@ -84,14 +84,11 @@ class GeometryResult(Result):
 
     Attributes:
         name: Name or file of the drawing.
-        factors: Factors.
         levels: Levels of all drawings: those of the design, fresh ones, that with the largest gap
             on the surface. (n, factors)
         responses: Their responses by name. (n,) each
         design: Number of drawings of the design.
-        surfaces: Response surfaces by name.
         best: The drawing whose runs have the largest gap.
-        loads: Names of the loads.
         limits: Largest values of responses that the best drawing may have.
         sample: Levels that are distributed as those of the design. (m, factors)
     """

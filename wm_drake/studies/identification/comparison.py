@@ -47,8 +47,6 @@ class LawResult:
     """One of the rival laws.
 
     Attributes:
-        law: Its name.
-        model: Its model.
         fit: Its fit to the tests.
         judgement: Judgement of the fit.
         left_out: RMSE of each test, predicted from the others (m,); NaN with less than
@@ -285,8 +283,6 @@ def compare_laws(
     """Fit rival laws to the same tests and predict others.
 
     Args:
-        models: Model of each law.
-        tests: Tests to fit and to predict.
         method, seed: Of the search.
         progress: Called with a law and the fraction done of its search.
     """

@@ -44,8 +44,6 @@ def loops_figure(fit: Fit, motions: Sequence[MeasuredMotion], *, over: str) -> F
     """Draw measured samples and the fitted loop without offset and drift, one panel per file.
 
     Args:
-        fit: Fit to these motions.
-        motions: Measured motions, at least one.
         over: Abscissa: displacement or velocity.
     """
     panels = []
@@ -79,7 +77,6 @@ def _panel(
     """Return the samples of a test and computed lines.
 
     Args:
-        measured: The test.
         offset: Offset and drift that are taken from its force.
         lines: By entry of the legend: colour and force (n,).
         over: Abscissa: displacement or velocity.
@@ -116,7 +113,6 @@ def rival_loops_figure(tests: Sequence[TestedLoop], *, best: str, over: str) -> 
 
     Args:
         tests: Tests that are drawn, with the fit or the evaluation of each law.
-        best: The best law.
         over: Abscissa: displacement or velocity.
     """
     panels = []

@@ -56,9 +56,6 @@ def fragment(
     """Return the text of a YAML file with identified numbers; comments name the undetermined ones.
 
     Args:
-        fit: Fit of the model.
-        model: Model of the component.
-        destination: Where the numbers go.
         copies: Fields that get the value of another, such as z of an axisymmetric bushing from x.
         remarks: Sentences on the fit for the head of the file.
     """
@@ -83,7 +80,6 @@ def written_fragment(entries: dict[str, Any], head: Sequence[str], destination: 
     Args:
         entries: Values with sources by field.
         head: Lines of the comment at the beginning.
-        destination: Where the numbers go.
     """
     target = destination.target
     written, left_out = _of_fragment(destination.changes)

@@ -37,8 +37,6 @@ def motions_of(
     """Return the loops of files with the motion of each, sorted by motion.
 
     Args:
-        files: The files.
-        options: Options of the command.
         rotates: Whether the loops must be of moments over angles.
         driven_mass: Mass at the driven end, whose inertia is taken out of the forces. [kg]
 

@@ -29,11 +29,9 @@ class LoopJudgement:
     """Judgement of one measured loop; moments in place of forces in a rotation.
 
     Attributes:
-        name: Name of the loop.
         force: Root mean square of the measured force without offset and drift. [N; N m]
         residual: Root mean square of measured less fitted force. [N; N m]
         noise: Standard deviation of the noise of the measured force. [N; N m]
-        samples: Number of samples.
         work: Work that the measured motion does on the component in a period; NaN for a motion
             that is no sine. [J]
         in_phase, out_of_phase: Amplitudes of the measured force in phase with the displacement and

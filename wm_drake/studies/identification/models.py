@@ -195,7 +195,6 @@ def bushing_model(
     Args:
         law: One of `BUSHING_LAWS`.
         motions, given: As for `damper_model`.
-        tested: The axis.
 
     Raises:
         InputError: There is no such law (or not along an axis), or no such field.

@@ -101,14 +101,7 @@ class SampledResult(Result):
 
 @dataclass(frozen=True)
 class FitResult(SampledResult):
-    """Fit of one law.
-
-    Attributes:
-        component: The component.
-        model: Its model.
-        fit: The fit.
-        motions: The measured motions.
-    """
+    """Fit of one law."""
 
     component: FittedComponent
     model: ComponentModel
@@ -171,12 +164,7 @@ class FitResult(SampledResult):
 
 @dataclass(frozen=True)
 class ComparisonResult(SampledResult):
-    """Several laws that were fitted to the same tests.
-
-    Attributes:
-        component: The component.
-        comparison: The laws.
-    """
+    """Several laws that were fitted to the same tests."""
 
     component: FittedComponent
     comparison: Comparison

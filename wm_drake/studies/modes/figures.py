@@ -81,8 +81,6 @@ def _campbell(result: MachineModes, name: str, scale: Scale, top: float) -> Pane
     """Return the diagram of one linearisation.
 
     Args:
-        result: The modes.
-        name: Linearisation.
         scale: Colours of the damping ratios.
         top: Highest frequency. [Hz]
     """
@@ -273,8 +271,6 @@ def sensitivity_figure(result: MachineModes, name: str, quantity: str) -> Figure
     """Return the numbers that move each mode most, as sorted bars.
 
     Args:
-        result: The modes.
-        name: Linearisation.
         quantity: frequency or damping.
     """
     modes = result.modes[name]

@@ -42,9 +42,7 @@ def nearness(
     """Return how near the modes bring the tub to the housing; None without shapes to measure.
 
     Args:
-        scene: Shapes of the machine.
         rest_pose: Equilibrium: roll, pitch, yaw, x, y, z. (6,) [rad, m]
-        modes: Natural modes.
         amplitude: Amplitude at which they are compared. [m]
     """
     phase = np.linspace(0.0, 2.0 * np.pi, PHASES, endpoint=False)

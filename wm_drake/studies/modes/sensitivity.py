@@ -40,7 +40,6 @@ class Sensitivity:
     Attributes:
         key: Key path.
         value: The number; NaN for a table. SI
-        unit: Its unit.
         frequency: Relative change of each frequency over the relative change of the number; per
             display unit if the number is zero. (m,)
         damping: Change of each damping ratio, likewise. (m,)
@@ -65,11 +64,9 @@ def sensitivities(
     """Return the sensitivity of modes to every number, without those that cannot be changed.
 
     Args:
-        parameters: The machine.
         spectrum: Modes of its matrix.
         matrix_of: Returns the matrix of a machine with a number changed.
         loads: Whether the matrix depends on a load.
-        progress: Called after each number.
     """
     sensitive = []
     for number in numbers_of(parameters, loads):

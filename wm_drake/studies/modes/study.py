@@ -60,7 +60,6 @@ class NaturalModes:
     """Natural modes of a machine with a drum that stands still.
 
     Attributes:
-        parameters: The machine.
         load: Name of the load; "" for the empty drum.
         modes: Modes by linearisation, stuck and sliding.
         amplitude: Amplitude of the third linearisation. [m]
@@ -222,7 +221,6 @@ def three_linearisations(
     """Return the natural modes of a machine with a load, without anything that takes seconds.
 
     Args:
-        machine: A built machine.
         load: Point masses in the drum, or the name of one of the machine's loads.
         parameters: Numbers to use; those it was built from if None.
         gasket: False removes the gasket.

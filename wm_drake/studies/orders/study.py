@@ -43,7 +43,6 @@ class Signals:
 
     Attributes:
         source: Name of the file.
-        names: Names of the signals.
         unit: Their unit, for reading.
         time: (n,) [s]
         angle: (n,) Angle of the drum. [rad]
@@ -219,10 +218,6 @@ def _checked(signals: Signals, path: Path) -> Signals:
 
 def orders_of(signals: Signals, highest: float) -> Orders:
     """Return order map and frequency map of signals.
-
-    Args:
-        signals: The signals.
-        highest: Highest order of the map.
 
     Raises:
         InputError: the record has fewer revolutions than a window.

@@ -26,7 +26,6 @@ class Envelopes:
 
     Attributes:
         time: Middle of each interval. (n,) [s]
-        sensors: Names of the sensors.
         designs: (designs, sensors, n) [m] NaN behind the end of a run that failed.
         nominal: Those of the machine itself. (sensors, n) [m]
         of: What was run for each design, in words.
@@ -40,12 +39,7 @@ class Envelopes:
 
 
 def front_envelopes(front: ParetoFront, histories: Histories) -> Envelopes:
-    """Return the envelopes of all designs of a front and of the machine itself.
-
-    Args:
-        front: The front.
-        histories: Function that runs cases.
-    """
+    """Return the envelopes of all designs of a front and of the machine itself."""
     designs = front.designs
     points = [*front.search.designs, designs.nominal()]
     runs = [designs.shown_runs(designs.machine_at(p), f"{i}") for i, p in enumerate(points, 1)]
@@ -67,7 +61,6 @@ def envelope_of(record: Record, duration: float) -> FloatArray:
     """Return the largest value of the envelopes in each interval of time. (sensors, n) [m]
 
     Args:
-        record: Record of a run.
         duration: Duration that is divided into `INTERVALS`. [s]
     """
     sensors = envelopes(record)

@@ -87,7 +87,6 @@ def envelopes_figure(shown: Envelopes, picked: int) -> Figure:
     """Return the envelopes of a design and of the machine itself, one panel for each sensor.
 
     Args:
-        shown: Envelopes of all designs.
         picked: Number of the design.
     """
     columns = min(COLUMNS, len(shown.sensors))

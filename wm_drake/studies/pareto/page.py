@@ -44,7 +44,6 @@ class DesignResult(Result):
     """Result of the study.
 
     Attributes:
-        front: Pareto front.
         promises: Check of a robust front on fresh samples; empty for a nominal one.
         envelopes: Envelopes of the designs of the front; None without a front.
         about: Description in the design file.

@@ -65,7 +65,6 @@ class Options:
     """A choice among options.
 
     Attributes:
-        name: Name in the design file.
         options: Values by key path, by name of the option.
     """
 
@@ -138,9 +137,7 @@ class MachineDesigns:
     """The designs of a machine.
 
     Attributes:
-        parameters: The machine.
         dimensions: What the search may change.
-        objectives, constraints: Goals.
         cases: One case for each load, without parameters; empty for a robust design.
         scattered: Returns the uncertain machine of some parameters; None for a nominal design.
         scores: Samples of a robust design, the same for every design.
@@ -219,7 +216,6 @@ class MachineDesigns:
 
         Args:
             designs: (n, dimensions) in [0, 1]
-            run: Function that runs cases.
 
         Returns:
             (n, objectives) and (n, constraints); NaN for a design of which a run failed.
@@ -235,7 +231,6 @@ class MachineDesigns:
 
         Args:
             designs: (n, dimensions) in [0, 1]
-            run: Function that runs cases.
 
         Returns:
             For each of `goals` (n, scenarios); NaN for a run that failed.
@@ -279,7 +274,6 @@ def machine_designs(
     Args:
         parameters: The machine, with the numbers of the SDF that the file names
             (`wm_drake.model.bodies.with_sdf_values`).
-        task: The file.
         cases: One case for each load; one for the profile of a robust design.
         scattered: As in `MachineDesigns`.
         scores: As in `MachineDesigns`.

@@ -25,7 +25,6 @@ class Promise:
 
     Attributes:
         design: Name of the chosen design.
-        goal: The objective or constraint.
         promised: Its value over the samples of the search, with the 95 % interval. [unit for
             reading]
         fresh: The same over fresh samples.
@@ -41,13 +40,7 @@ class Promise:
 
 
 def promises(front: ParetoFront, run: Run, seed: int) -> list[Promise]:
-    """Return the promises of the chosen designs of a robust front; none of a nominal one.
-
-    Args:
-        front: The front.
-        run: Function that runs cases.
-        seed: Seed of the search.
-    """
+    """Return the promises of the chosen designs of a robust front; none of a nominal one."""
     designs, scores = front.designs, front.designs.scores
     if scores is None or not front.chosen:
         return []
@@ -81,7 +74,6 @@ def summary_of(goal: Goal, values: FloatArray) -> Percentile:
     A run that failed has NaN, and so has then the value.
 
     Args:
-        goal: The goal.
         values: By sample. (n,) [unit for reading]
     """
     how = goal.given.over

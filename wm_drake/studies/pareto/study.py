@@ -22,8 +22,6 @@ class ParetoFront:
     """Result of a design study.
 
     Attributes:
-        designs: The designs that were searched.
-        search: Result of the search.
         objectives, constraints: Values of the front, in units for reading. (n, m) and (n, k)
         nominal_objectives, nominal_constraints: Those of the machine itself, moved into the
             bounds. (m,) and (k,)
@@ -49,9 +47,6 @@ def run_designs(
     """Search the Pareto front of the designs of a machine.
 
     Args:
-        designs: The designs.
-        run: Function that runs cases.
-        settings: Size of the search.
         search: Name in `SEARCHES`.
     """
     problem = Problem(

@@ -52,7 +52,6 @@ def overlaid_figure(
     """Draw loops in panels, several per panel, as [C] Figs. 6, 7, 14 and [A] Figs. 5, 8, 12 (B).
 
     Args:
-        loops: At least one loop.
         panel: Function that returns the title of the panel in which a loop is drawn.
         line: Function that returns the legend text of a loop. It also selects the colour.
         over: Abscissa: displacement or velocity.
@@ -86,7 +85,6 @@ def time_figure(loop: ForceLoop, points: Mapping[str, int]) -> Figure:
     """Draw motion and force over one period and the loop, as [A] Figs. 5, 8, 12, [C] Figs. 4, 5.
 
     Args:
-        loop: The loop.
         points: Samples that get a letter on the force, from `stroke_points`.
     """
     units = units_of(loop.rotates)

@@ -42,7 +42,6 @@ def printed_errors(kind: str, bench: Bench, motions: Sequence[Harmonic]) -> list
 
     Args:
         kind: damper, bushing or gasket.
-        bench: The component on the bench.
         motions: Motions of the test matrix of [A].
     """
     table = printed_table()

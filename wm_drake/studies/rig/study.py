@@ -46,7 +46,6 @@ class RigResult(Result):
     """Result of a bench test.
 
     Attributes:
-        run: Loops of the component.
         massless: Its loops without masses; None if it has none.
         beyond: Sentences on tables that the motions leave.
         printed: Errors that [A] prints of these tests, and a sentence on them; None without.

@@ -215,7 +215,6 @@ def check_comparable(machines: Sequence[MachineParameters], where: str) -> None:
     Their names must differ and they need at least one sensor of the same name.
 
     Args:
-        machines: The machines.
         where: Option that named the machines, for the message.
     """
     names = [machine.name for machine in machines]

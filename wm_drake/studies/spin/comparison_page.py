@@ -86,7 +86,6 @@ def differences(table: pd.DataFrame, load: str) -> Table:
 
     Args:
         table: Result of `difference_table`.
-        load: The load.
     """
     rows = table[table["load"] == load]
     reference = rows["reference"].iloc[0]
@@ -123,7 +122,6 @@ def amplitudes(variants: Sequence[Variant], table: pd.DataFrame) -> Table:
     """Return the amplitudes of all variants, load by load, with the differences in percent.
 
     Args:
-        variants: The variants.
         table: Result of `difference_table` for them.
     """
     sensors = common_sensors([variant.result.parameters for variant in variants])
@@ -222,12 +220,7 @@ def _measured_mm(variants: Sequence[Variant], index: int) -> dict[str, dict[str,
 
 
 def comparison_page(comparison: ComparisonResult, facts: Facts | None = None) -> str:
-    """Return the comparison as text of one self-contained HTML file.
-
-    Args:
-        comparison: At least two variants with the same loads.
-        facts: How the result was computed.
-    """
+    """Return the comparison as text of one self-contained HTML file."""
     variants, table, made = comparison.variants, comparison.differences, facts or Facts()
     machines = [variant.result.parameters for variant in variants]
     of_each = [

@@ -148,7 +148,6 @@ def _pair_table(effect: pd.DataFrame, lines: list[tuple[str, str]], caption: str
     Args:
         effect: Result of `effects`.
         lines: Prefix of the columns and name of the source, for each source.
-        caption: Caption.
     """
     groups = []
     for load, rows in _by_load(effect):
@@ -173,8 +172,6 @@ def records_picture(
 
     Args:
         effect: Rows of `effect_table` of one machine.
-        without: The case without gasket.
-        with_gasket: The case with gasket.
 
     Returns:
         The picture; None if a run diverged or is too short.

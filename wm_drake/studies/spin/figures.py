@@ -141,9 +141,6 @@ def gaps_figure(results: Sequence[CaseResult]) -> Figure:
     """Return the smallest gap between tub and housing, one line per case.
 
     The text at each line gives the two parts and the drum speed at which the gap occurs.
-
-    Args:
-        results: Cases, each with a smallest gap.
     """
     gaps = [gap for gap in (result.measures.smallest_gap for result in results) if gap is not None]
     distances = [MM_PER_M * gap.distance for gap in gaps]

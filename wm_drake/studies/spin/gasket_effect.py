@@ -61,7 +61,6 @@ def effect_table(without: SpinResult, with_gasket: SpinResult) -> pd.DataFrame:
     """Return the amplitudes of each load and sensor without and with gasket.
 
     Args:
-        without: Result without gasket.
         with_gasket: Result with gasket, with the same loads in the same order.
 
     Returns:

@@ -58,10 +58,6 @@ VERDICT = (
 def spin_page(result: SpinResult, facts: Facts | None = None) -> str:
     """Return the page of spin runs as text of one self-contained HTML file.
 
-    Args:
-        result: Result with at least one case.
-        facts: How the result was computed.
-
     Raises:
         InputError: A file of measured amplitudes cannot be used.
     """

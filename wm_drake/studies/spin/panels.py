@@ -91,9 +91,7 @@ def time_panel(
     """Return a panel over time, with the drum speed along the top.
 
     Args:
-        record: Record that gives the time range and the drum speed.
         name: Name, which is written at the top left.
-        marks: What the panel shows.
         label: Quantity and unit.
         limits: Ends of the vertical axis.
     """
@@ -146,8 +144,6 @@ def time_band(
     Args:
         sides: Times (n,), lower and upper values (n,).
         limit: Upper end of the vertical axis, which says how fine the lines are seen.
-        key: Entry of the legend.
-        color: Colour.
     """
     time, *lines = sides
     kept = [simplified_indices(time, line, 1e-3 * limit) for line in lines]
@@ -181,10 +177,7 @@ def largest_marks(
     """Return a dot at the largest absolute value, and that value with its drum speed at the top.
 
     Args:
-        record: Record that gives time and drum speed.
         values: (n,) the signal.
-        unit: Unit of the signal.
-        color: Colour of the dot and of the text.
         line: Number of the line of text, counted from the top of the panel.
     """
     index = int(np.argmax(np.abs(values)))

@@ -179,8 +179,6 @@ def variable_table(result: SpinResult, variable: Variable, decimals: int | None 
     """Return one variable of a measure for each case.
 
     Args:
-        result: The result.
-        variable: The variable.
         decimals: Number of decimals; None for significant digits.
     """
     groups, columns = [], list[Column]()

@@ -46,7 +46,6 @@ def vibration_pictures(result: SpinResult, case: CaseResult) -> list[Picture | N
     """Return mount forces, accelerations and spectra of a case; None where there is nothing.
 
     Args:
-        result: Result that the case belongs to.
         case: A case with at least two samples.
     """
     accelerations = sensor_accelerations(case.record, sensors_of(result, case))
@@ -120,7 +119,6 @@ def spectra_figure(record: Record, signals: Sequence[tuple[str, str, FloatArray]
     The spectrum is the largest amplitude at each frequency over all windows of the map.
 
     Args:
-        record: Record that gives time, drum angle and drum speed.
         signals: Name, unit and values (n,) of each.
 
     Returns:
@@ -176,9 +174,7 @@ def _map(
     """Return amplitudes over time and frequency or order as cells, one column per window.
 
     Args:
-        record: Record of the signal.
         values: Amplitudes (time, dimension).
-        dimension: frequency or order.
         scale: Colours of the amplitudes.
         highest: Upper end of the frequencies; 0 for the largest order. [Hz]
     """

@@ -15,7 +15,6 @@ def strut_machine(parameters: MachineParameters, folder: Path) -> MachineParamet
     bushings and the friction about the axis of the damper.
 
     Args:
-        parameters: A machine with telescopic dampers.
         folder: Folder to which its SDF without the tubes is written.
     """
     tree = parameters.model_dump(exclude_unset=True)

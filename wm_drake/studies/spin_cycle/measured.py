@@ -38,7 +38,6 @@ def read_rms(path: Path, labels: Mapping[str, Sequence[str]]) -> xr.DataArray:
     """Read measured RMS displacements from a CSV file with the columns `RMS_COLUMNS`.
 
     Args:
-        path: The file.
         labels: Names of the study along each dimension, from `labels_of`.
 
     Returns:
@@ -90,7 +89,6 @@ def read_accelerations(
     Args:
         folder: Folder with the files.
         labels: Names of the study along each dimension, from `labels_of`.
-        profile: Spin profile with regions.
         channels: Name in the files of ``time`` or of an accelerometer's axis, such as ``S1_x``. A
             CSV may have the unit in its header then: ``Acc 1 [g]``.
 

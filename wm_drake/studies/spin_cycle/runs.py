@@ -28,7 +28,6 @@ def drake_runs(
     """Return a function that runs cases with the Drake engine in processes; a case takes minutes.
 
     Args:
-        parameters: The machine.
         progress: Called with the number of finished cases.
     """
 

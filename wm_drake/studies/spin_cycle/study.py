@@ -40,7 +40,6 @@ class SpinCycleResult:
     """Results of a spin-cycle study.
 
     Attributes:
-        parameters: The machine.
         profile: Spin profile with regions.
         cases: The cases, in the order of the runs.
         displacement: (case, region, accelerometer, axis) RMS displacement from the displacement
@@ -86,7 +85,6 @@ def forces_of(
     """Return the forces of a table of runs, with cases and regions by name.
 
     Args:
-        parameters: The machine.
         table: Table of runs with the measures of `measures_of`.
         labels: From `labels_of`.
     """
@@ -126,12 +124,6 @@ def run_spin_cycle(
     evaluate: Evaluate,
 ) -> SpinCycleResult:
     """Run unbalance cases and label their measures.
-
-    Args:
-        parameters: The machine with its imperfections.
-        cases: Unbalance cases, at least one.
-        profile: Spin profile with regions.
-        evaluate: Function that runs cases.
 
     Raises:
         InputError: the profile has no regions, or the machine does not define the planes of the

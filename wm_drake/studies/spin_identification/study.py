@@ -112,9 +112,6 @@ class SpinIdentification(Result):
     Attributes:
         parameters: The machine before the identification.
         profile: Spin profile with regions.
-        cases: The unbalance cases.
-        sought: The unknowns.
-        fit: The fit.
         measured: (case, region, accelerometer, axis) measured RMS displacements. [m]
         before, after: RMS displacements of the machine before the identification and with the
             identified numbers. [m]
@@ -389,15 +386,7 @@ def identified_machine(result: SpinIdentification) -> MachineParameters:
 
 @dataclass(frozen=True)
 class SpinModel:
-    """RMS displacements of unbalance cases as a function of the unknowns.
-
-    Attributes:
-        parameters: The machine.
-        profile: Spin profile with regions.
-        cases: The unbalance cases.
-        sought: The unknowns.
-        regions: Function that runs cases.
-    """
+    """RMS displacements of unbalance cases as a function of the unknowns."""
 
     parameters: MachineParameters
     profile: SpinProfile
@@ -433,10 +422,8 @@ def virtual_experiment(
     """Simulate an experiment: RMS displacements with the true numbers and random errors.
 
     Args:
-        model: Model of the machine.
         planted: True numbers of the unknowns, in SI units.
         noise: Relative standard deviation of the error of each value.
-        seed: Seed of the errors.
 
     Returns:
         (case, region, accelerometer, axis). [m]
@@ -464,7 +451,6 @@ def identify_from_spin(
     cases.
 
     Args:
-        model: Model of the machine.
         measured: (case, region, accelerometer, axis) RMS displacements; NaN where nothing was
             measured. [m]
         planted: True numbers of a virtual experiment, in SI units.

@@ -60,11 +60,8 @@ class SteadyStudy:
     """Results of the study.
 
     Attributes:
-        parameters: The machine.
-        cases: Each load with and without gasket.
         sweeps: Largest `amplitude` and its `speed` over load, gasket, rate, direction (up, down)
             and sensor, coordinate `rate` in rad/s^2. None if not computed.
-        wall_s: Time of all.
     """
 
     parameters: MachineParameters
@@ -110,12 +107,6 @@ def run_steady_study(
     progress: Callable[[float], None] = lambda fraction: None,
 ) -> SteadyStudy:
     """Compute the steady response to loads, runs over the spin profile, and sweeps.
-
-    Args:
-        machine: A built machine.
-        loads: Loads by name.
-        settings: What is computed.
-        progress: Called with the fraction done.
 
     Raises:
         InputError: an argument is wrong, or no periodic motion is found for a load.

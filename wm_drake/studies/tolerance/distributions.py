@@ -130,7 +130,6 @@ def base_samples(size: int, count: int, seed: int) -> tuple[FloatArray, FloatArr
     Args:
         size: Number of quantities.
         count: Number of samples, a power of two.
-        seed: Of the scrambling.
     """
     sequence = stats.qmc.Sobol(2 * size, scramble=True, seed=np.random.default_rng(seed))
     both = scores_of(sequence.random(count))

@@ -40,7 +40,6 @@ def distributions_figure(result: ToleranceResult, names: dict[str, str]) -> Figu
     """Return the distribution function of each measure with its 95 % band and its limits.
 
     Args:
-        result: Result of the study.
         names: Titles of the measures by their keys.
     """
     panels = [
@@ -69,7 +68,6 @@ def gap_figure(result: ToleranceResult, name: str, loads: Mapping[str, float]) -
     """Return the distribution of the smallest gap beside the gaps of the loads of the machine.
 
     Args:
-        result: Result of the study.
         name: Key of the smallest gap among the measures.
         loads: Smallest gap by load. [m]
     """

@@ -158,7 +158,6 @@ def facts_of(result: ToleranceResult, gaps: Mapping[str, float]) -> list[tuple[s
     """Return the facts below the answer.
 
     Args:
-        result: Result of the study.
         gaps: Smallest gap of each load of the machine. [m]
     """
     facts = [*in_short(result), ("Loads of the machine", about_loads(gaps))]

@@ -120,7 +120,6 @@ class Verdict:
     """Judgement of a limit.
 
     Attributes:
-        limit: The limit.
         key: Name of the measure with its unit.
         number: The limit. [unit of the measure]
         allowed: Allowed share. [0 to 1]
@@ -141,8 +140,6 @@ class ToleranceResult:
     """Result of a tolerance study.
 
     Attributes:
-        machine: The uncertain machine.
-        settings: Numbers of samples.
         chosen: What is measured of each run.
         scores: Scores of the samples. (samples, variables)
         values: Measures of the samples by the names of `measure_key`; NaN where a run failed.
@@ -215,10 +212,6 @@ def run_tolerances(
     """Run a tolerance study.
 
     Args:
-        machine: The uncertain machine.
-        chosen: What is measured of each run.
-        run: Function that runs cases.
-        settings: Numbers of samples.
         limits: From `limits_of`.
     """
     trials = _Trials(machine, chosen, run, settings)
@@ -248,8 +241,6 @@ def judged(values: pd.DataFrame, limit: Limit, response: Response, number: float
 
     Args:
         values: Measures of the samples.
-        limit: The limit.
-        response: Its response.
         number: The limit. [unit of the response]
     """
     values_of_limit = values[measure_key(response)].to_numpy()

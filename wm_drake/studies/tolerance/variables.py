@@ -215,7 +215,6 @@ def uncertain_machine(
     Args:
         parameters: The machine, with the numbers of the SDF that the file names
             (`wm_drake.model.bodies.with_sdf_values`).
-        tolerances: The file.
         case: Case of the machine without changes.
 
     Raises:
@@ -271,7 +270,6 @@ def with_types_apart(
     """Return a machine in which each part has a separate type, and the types by part.
 
     Args:
-        parameters: The machine.
         table: spring_types, damper_types or bushing_types.
         kind: Name of the type that is replaced.
     """
@@ -325,8 +323,6 @@ def _with_spread(
     """Return a variation with a distribution.
 
     Args:
-        variation: The variation.
-        spread: The distribution in the file.
         values: Values of `_places`. [1 for percent, else SI]
         key: Key path for messages.
 

@@ -70,7 +70,6 @@ class Pair:
 
     Attributes:
         published, ours: The numbers.
-        unit: Their unit.
         limit: Largest difference that counts as met. [%]
     """
 

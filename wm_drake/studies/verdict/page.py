@@ -235,11 +235,7 @@ def laundry_text(laundry: Laundry, about: str = "") -> str:
 
 
 def words_of(key: str) -> str:
-    """Return a number of a part in words: `gasket.stiffness_x` becomes `stiffness along x of ...`.
-
-    Args:
-        key: Key path.
-    """
+    """Return a number in words: `gasket.stiffness_x` becomes `stiffness along x of the gasket`."""
     table, *middle, last = key.split(".")
     field, _, axis = last.rpartition("_")
     is_along = field and axis in ("x", "y", "z")

@@ -155,8 +155,6 @@ class Findings:
     """Findings of a verdict.
 
     Attributes:
-        machine: The machine.
-        loads: Names of its loads.
         clearance: Gap that must remain. [m]
         change: Change of a part that was tried. [%]
         base: Runs of the machine as it is.
@@ -168,7 +166,6 @@ class Findings:
         about: Description of the laundry.
         responses: Responses of the tables, with words and unit.
         command: Command that gives a verdict on the machine again.
-        runs: Number of all runs.
     """
 
     machine: MachineParameters
@@ -211,14 +208,7 @@ class Findings:
 
 @dataclass(frozen=True)
 class Trials:
-    """Runs of all loads with changed machines.
-
-    Attributes:
-        machine: The built machine.
-        cases: Its loads.
-        measures: Names of measures.
-        executor: Runs cases.
-    """
+    """Runs of all loads with changed machines."""
 
     machine: Machine
     cases: Sequence[Case]
