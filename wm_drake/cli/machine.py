@@ -70,9 +70,6 @@ def _check(file: str, strict: bool, draw: Callable[[str], None] | None) -> None:
         file: Name or path.
         strict: Whether unusual values are errors.
         draw: Called with the page of the machine.
-
-    Raises:
-        InputError: the machine cannot be used.
     """
     parameters = load_parameters(file, None)
     machine, unusual = built_with_problems(file, parameters)
@@ -118,11 +115,7 @@ def machine_page_of(machine: "Machine", unusual: "Sequence[Problem]") -> str:
 
 
 def _write_page(path: Path, text: str) -> None:
-    """Write a page.
-
-    Raises:
-        InputError: the file cannot be written.
-    """
+    """Write a page."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")

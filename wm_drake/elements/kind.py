@@ -223,11 +223,7 @@ def register_element(kind: ElementKind) -> ElementKind:
 
 
 def element_kind(name: str) -> ElementKind:
-    """Return the registered kind of a name.
-
-    Raises:
-        InputError: there is no such kind.
-    """
+    """Return the registered kind of a name."""
     kind = ELEMENT_KINDS.find(name, key="elements")
     assert isinstance(kind, ElementKind)
     return kind

@@ -158,11 +158,7 @@ class _Contents:
 
 
 def _platforms(options: FmuOptions) -> list[Platform]:
-    """Return the platforms, after checking the options.
-
-    Raises:
-        InputError: an option is not allowed.
-    """
+    """Return the platforms, after checking the options."""
     if options.fmi not in VERSIONS:
         raise input_error(f"there is no version {options.fmi}; allowed are 2 and 3", where="fmi")
     if options.input not in ("speed", "torque"):

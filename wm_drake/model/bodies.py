@@ -52,9 +52,6 @@ def sdf_path(model: str) -> Path:
 
     Args:
         model: Name of a shipped SDF file, or an absolute path.
-
-    Raises:
-        InputError: there is no such file.
     """
     path = Path(model) if Path(model).is_absolute() else SDF_FOLDER / model
     if not is_file(path):
@@ -414,9 +411,6 @@ def with_sdf_values(
 
     Args:
         keys: Key paths; each path below `frames` or `bodies` adds an override.
-
-    Raises:
-        InputError: the SDF does not have a body or frame of that name.
     """
     changed = parameters
     for table, name, part in dict.fromkeys(tuple([*key.split("."), "", ""][:3]) for key in keys):
@@ -439,9 +433,6 @@ def _mass_properties(plant: MultibodyPlant, name: str, override: BodyOverride) -
     """Return mass, centre of mass and central inertia of a body, by the keys of an override.
 
     Parts that `override` has replace those of the SDF.
-
-    Raises:
-        InputError: the SDF does not have a body of that name.
     """
     if not plant.HasBodyNamed(name):
         links = [

@@ -163,11 +163,7 @@ def build_machine(
 
 
 def machine_of(machine: AnyMachine) -> Machine:
-    """Return a machine that may be given by its parameters, name or file, built.
-
-    Raises:
-        InputError: there is no such machine, or it has an error.
-    """
+    """Return a machine that may be given by its parameters, name or file, built."""
     return machine if isinstance(machine, Machine) else build_machine(machine)
 
 

@@ -55,9 +55,6 @@ def load_component(name_or_path: str) -> Component:
 
     Args:
         name_or_path: Name of a shipped component or path of a file.
-
-    Raises:
-        InputError: the file is missing or wrong, with one problem for each error.
     """
     path = _FILES.path(name_or_path)
     plain, sources = read_mapping(path)

@@ -87,11 +87,7 @@ def finite_numbers(table: "pd.DataFrame", path: str | Path, key: str = "") -> Fl
 
 
 def read_header(path: Path, key: str = "") -> list[str]:
-    """Return the names of the columns of a CSV file.
-
-    Raises:
-        InputError: the file cannot be read as CSV.
-    """
+    """Return the names of the columns of a CSV file."""
     try:
         return list(map(str, _table(read_text(path, key=key), nrows=0).columns))
     except ValueError as error:

@@ -162,18 +162,10 @@ def shipped_designs() -> dict[str, Path]:
 
 
 def design_path(name_or_path: str | Path) -> Path:
-    """Return the path of a design file, given the name of a shipped one or a path.
-
-    Raises:
-        InputError: there is no such file.
-    """
+    """Return the path of a design file, given the name of a shipped one or a path."""
     return _FILES.path(name_or_path)
 
 
 def load_design(name_or_path: str | Path = "gasket") -> DesignTask:
-    """Read a design file.
-
-    Raises:
-        InputError: the file is missing or wrong, with one problem for each error.
-    """
+    """Read a design file."""
     return read_model(DesignTask, design_path(name_or_path))

@@ -75,11 +75,7 @@ class FactorLevels:
 
 
 def load_factors(path: Path) -> dict[str, Factor]:
-    """Read a factor file with entries ``NAME: {keys: [KEY, ...], low: BOUND, high: BOUND}``.
-
-    Raises:
-        InputError: the file is missing or wrong, with one problem for each error.
-    """
+    """Read a factor file with entries ``NAME: {keys: [KEY, ...], low: BOUND, high: BOUND}``."""
     factors, problems = {}, []
     for name, entry in read_yaml(path).items():
         try:
@@ -96,9 +92,6 @@ def factor_of_text(text: str, known: Mapping[str, Factor]) -> tuple[str, Factor]
 
     Args:
         text: NAME of a known factor or KEY path of a number, either one with or without =LOW..HIGH.
-
-    Raises:
-        InputError: the text does not have this form.
     """
     name, equals, bounds = (part.strip() for part in text.partition("="))
     factor = known.get(name) or Factor(keys=(name,))

@@ -84,11 +84,7 @@ def load_machine(name_or_path: str | Path = "reference") -> MachineParameters:
 
 
 def machine_path(name_or_path: str | Path) -> Path:
-    """Return the path of a machine file, given the name of a shipped machine or a path.
-
-    Raises:
-        InputError: there is no such machine and no such file.
-    """
+    """Return the path of a machine file, given the name of a shipped machine or a path."""
     return _MACHINES.path(name_or_path)
 
 
@@ -113,20 +109,12 @@ def load_load(path: Path) -> Load:
 
 
 def read_mapping(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
-    """Return the values of a YAML file as text, and the sources of its numbers by key path.
-
-    Raises:
-        InputError: the file is missing, is not YAML, or is not a mapping.
-    """
+    """Return the values of a YAML file as text, and the sources of its numbers by key path."""
     return _without_sources(read_yaml(path))
 
 
 def read_model(model: type[Model], path: Path) -> Model:
-    """Read a YAML file whose content a pydantic model describes.
-
-    Raises:
-        InputError: the file is missing or wrong, with line and key path of each error.
-    """
+    """Read a YAML file whose content a pydantic model describes."""
     return _validated(model, read_yaml(path), path)
 
 
@@ -236,11 +224,7 @@ def _changes(base: Mapping[str, Any], changed: Mapping[str, Any]) -> dict[str, A
 
 
 def extended_files(path: Path) -> list[Path]:
-    """Return a machine file and all files that it extends, one after the other.
-
-    Raises:
-        InputError: one of them cannot be read.
-    """
+    """Return a machine file and all files that it extends, one after the other."""
     chain = [path]
     while len(chain) <= LONGEST_CHAIN and "extends" in (tree := read_yaml(chain[-1])):
         chain.append(_base_path(tree, chain[-1]))
@@ -360,11 +344,7 @@ def _tree_of(text: str) -> Any:
 
 
 def read_yaml(path: Path) -> CommentedMap:
-    """Return the mapping in a YAML file, with every plain scalar except null as text.
-
-    Raises:
-        InputError: the file is missing, is not YAML, or is not a mapping.
-    """
+    """Return the mapping in a YAML file, with every plain scalar except null as text."""
     text = read_text(path, largest=LARGEST_YAML)
     try:
         tree = deepcopy(_tree_of(text))

@@ -257,9 +257,5 @@ class FreeFile(Frozen):
 
 
 def load_free(path: Path) -> FreeFile:
-    """Read a free file.
-
-    Raises:
-        InputError: the file is missing or wrong, with line and key path of each error.
-    """
+    """Read a free file."""
     return read_model(FreeFile, path)

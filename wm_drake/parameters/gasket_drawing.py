@@ -352,9 +352,6 @@ def load_gasket_drawing(name_or_path: str | Path) -> GasketDrawing:
 
     Args:
         name_or_path: Name of a shipped drawing, or path of a YAML file.
-
-    Raises:
-        InputError: the file is missing or wrong, with one problem for each error.
     """
     path = _FILES.path(name_or_path)
     if "dxf" not in read_yaml(path):

@@ -130,11 +130,7 @@ class _Edit:
         return ".".join(self.key.split(".")[: self.depth])
 
     def applied(self, node: Any) -> Any:
-        """Return what the changes make of a value.
-
-        Raises:
-            InputError: a key is unknown, or a value is not allowed.
-        """
+        """Return what the changes make of a value."""
         if self.whole:
             new = self.whole[0]
             if isinstance(node, Table) and isinstance(new, str) and new.strip().endswith("%"):
@@ -254,9 +250,6 @@ def field_at(parameters: MachineParameters, key: str) -> tuple[Any, FieldInfo | 
     """Return the value at a key path, None if only the SDF has it, and its field.
 
     The field of an entry of a list is that of the list; a name of a mapping has none.
-
-    Raises:
-        InputError: the machine has no such key.
     """
     node: Any = parameters
     field: FieldInfo | None = None

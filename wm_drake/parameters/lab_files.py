@@ -86,9 +86,6 @@ def csv_channels(path: Path) -> list[Channel]:
     """Return the columns of a CSV file as channels; a header `Acc 1 [g]` has name and unit.
 
     A column without a number is left out; a value that is none is NaN.
-
-    Raises:
-        InputError: The file cannot be read.
     """
     import pandas as pd  # slow to import: CSV files
 

@@ -43,11 +43,7 @@ class ShippedFiles:
         return {path.stem.removeprefix(self.prefix): path for path in files}
 
     def path(self, name_or_path: str | Path) -> Path:
-        """Return the path of a file, given the name of a shipped one or a path.
-
-        Raises:
-            InputError: there is no such file.
-        """
+        """Return the path of a file, given the name of a shipped one or a path."""
         shipped = self.listed()
         path = shipped.get(str(name_or_path), Path(name_or_path))
         if not is_file(path):
@@ -93,10 +89,6 @@ def read_text(path: Path, *, key: str = "", largest: int = LARGEST_TABLE) -> str
     Args:
         key: Key path for messages.
         largest: Largest size. [byte]
-
-    Raises:
-        InputError: the file is missing, is not a regular file, is too large, cannot be read, or is
-            not text in UTF-8.
     """
     check_regular(path, key=key, largest=largest)
     try:

@@ -242,19 +242,12 @@ def load_tolerances(name_or_path: str | Path = "laundry") -> Tolerances:
 
     Args:
         name_or_path: Name of a shipped file or path of a YAML file.
-
-    Raises:
-        InputError: the file is missing or wrong, with one problem for each error.
     """
     return read_model(Tolerances, tolerances_path(name_or_path))
 
 
 def tolerances_path(name_or_path: str | Path) -> Path:
-    """Return the path of a tolerance file, given the name of a shipped one or a path.
-
-    Raises:
-        InputError: there is no such file.
-    """
+    """Return the path of a tolerance file, given the name of a shipped one or a path."""
     return _FILES.path(name_or_path)
 
 
@@ -268,11 +261,7 @@ def check_load(tolerances: Tolerances, machine: MachineParameters, path: Path) -
 
 
 def load_limits(path: Path) -> tuple[Limit, ...]:
-    """Read a file of limits: ``limits: [{quantity, at_least or at_most, allowed_share}, ...]``.
-
-    Raises:
-        InputError: the file is missing or wrong, with one problem for each error.
-    """
+    """Read a file of limits: ``limits: [{quantity, at_least or at_most, allowed_share}, ...]``."""
     return read_model(_Limits, path).limits
 
 

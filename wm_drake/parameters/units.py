@@ -366,11 +366,7 @@ def split(text: str) -> tuple[list[float], str, bool]:
 
 
 def dimension(unit: str) -> Any:
-    """Return the dimension of a unit; it is equal for units that convert into each other.
-
-    Raises:
-        ValueError: the unit is unknown.
-    """
+    """Return the dimension of a unit; it is equal for units that convert into each other."""
     try:
         return quantity(1.0, unit).dimensionality
     except Exception as error:  # pint raises several types of errors on text that is not a unit
@@ -396,9 +392,6 @@ def to_si(value: Any, info: ValidationInfo, unit: Unit) -> float:
         value: Text with a unit, or an SI float.
         info: Context of the validation. In a file every number needs a unit.
         unit: Unit of the field.
-
-    Raises:
-        ValueError: the value is not a finite number with a fitting unit.
     """
     return unit.number(value) if isinstance(value, str) else _plain_number(value, info, unit)
 
@@ -410,9 +403,6 @@ def to_si_vector(value: Any, info: ValidationInfo, unit: Unit) -> tuple[float, .
         value: Text with a unit, or a sequence of SI floats.
         info: Context of the validation. In a file every list of numbers needs a unit.
         unit: Unit of the field.
-
-    Raises:
-        ValueError: the value is not a list of finite numbers with a fitting unit.
     """
     example = unit.example(is_list=True)
     if isinstance(value, str):
@@ -476,11 +466,7 @@ class PureNumber(Unit):
         return repr(value)
 
     def number(self, text: str) -> float:
-        """Return a text such as ``'0.4'`` as a number.
-
-        Raises:
-            ValueError: the text is not a finite number, or it has a unit.
-        """
+        """Return a text such as ``'0.4'`` as a number."""
         if _matched(_BARE, text, LONGEST_NUMBER) is None:
             hint = comma_hint(text) or "; write for example '1'"
             raise ValueError(f"'{shortened(text, 60)}' is not a number without unit{hint}")
@@ -494,11 +480,7 @@ class Share(PureNumber):
     shown: str = "%"
 
     def number(self, text: str) -> float:
-        """Return a text such as ``'30 %'`` or ``'0.3'`` as a number.
-
-        Raises:
-            ValueError: the text is not a finite number, or it has a unit.
-        """
+        """Return a text such as ``'30 %'`` or ``'0.3'`` as a number."""
         body = text.strip()
         return 0.01 * super().number(body[:-1]) if body.endswith("%") else super().number(body)
 

@@ -85,11 +85,7 @@ class Number:
         return value
 
     def resolved(self, text: str) -> float:
-        """Return the value that a text means here, in SI; of a table it is a stiffness.
-
-        Raises:
-            InputError: the text is not a value of this number.
-        """
+        """Return the value that a text means here, in SI; of a table it is a stiffness."""
         change, value = change_of(text, self.unit, self.key)
         if change is Change.VALUE:
             return value
@@ -142,9 +138,6 @@ def apply(
 
     Args:
         values: One value for each. [1 for PERCENT, else SI]
-
-    Raises:
-        InputError: the result is not a machine.
     """
     changes: dict[str, Any] = {}
     for variation, value in zip(variations, values, strict=True):
@@ -254,11 +247,7 @@ def owned_twice(groups: Mapping[str, Sequence[str]], kind: str) -> list[Problem]
 
 
 def number_at(parameters: MachineParameters, key: str) -> Number:
-    """Return a number of a machine by key path; a table is a number, its nominal stiffness.
-
-    Raises:
-        InputError: the machine has no such key, or it is not that of a number.
-    """
+    """Return a number of a machine by key path; a table is a number, its nominal stiffness."""
     value, field = field_at(parameters, key)
     unit = None if field is None else unit_of(field.annotation, field.metadata)
     if isinstance(value, Table):
@@ -272,9 +261,5 @@ def number_at(parameters: MachineParameters, key: str) -> Number:
 
 
 def value_at(parameters: MachineParameters, key: str) -> Any:
-    """Return the value at a key path; None if only the SDF has a value.
-
-    Raises:
-        InputError: the machine has no such key.
-    """
+    """Return the value at a key path; None if only the SDF has a value."""
     return field_at(parameters, key)[0]

@@ -35,11 +35,7 @@ REGION_VARIABLES = tuple(f"region_{name}" for name in MARGINS)
 
 
 def cabinet_of(parameters: MachineParameters) -> Cabinet:
-    """Return the cabinet of a machine.
-
-    Raises:
-        InputError: the machine has none.
-    """
+    """Return the cabinet of a machine."""
     if parameters.cabinet is None:
         raise input_error(
             f"machine '{parameters.name}' has no cabinet, so the loads of its feet are unknown; "

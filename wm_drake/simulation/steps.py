@@ -13,9 +13,6 @@ def checked_integrator(parameters: MachineParameters, integrator: str | None) ->
     Args:
         parameters: Machine that supplies the default.
         integrator: Name of the integrator; None for the default.
-
-    Raises:
-        InputError: there is no such integrator.
     """
     name = parameters.integrator if integrator is None else integrator
     for known in get_args(Integrator):

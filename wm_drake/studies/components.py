@@ -41,9 +41,6 @@ def target_of(kind: str, options: ComponentOptions) -> Target:
 
     Args:
         kind: damper, bushing or gasket.
-
-    Raises:
-        InputError: There is no such component, or it is of another kind.
     """
     if options.component is not None:
         return Target(_of_file(kind, options.component, options.sets), "", "")
@@ -108,11 +105,7 @@ def axes_of(word: str) -> tuple[str, ...]:
 
 
 def existing_files(paths: Sequence[Path]) -> list[Path]:
-    """Return the paths.
-
-    Raises:
-        InputError: A path is no file.
-    """
+    """Return the paths."""
     problems = [Problem(str(path), "", "no such file") for path in paths if not is_file(path)]
     if problems:
         raise InputError(problems)
@@ -120,11 +113,7 @@ def existing_files(paths: Sequence[Path]) -> list[Path]:
 
 
 def mass_of(text: str | None, option: str) -> float:
-    """Return the mass of an option, 0 without it. [kg]
-
-    Raises:
-        InputError: It is no mass, or below 0.
-    """
+    """Return the mass of an option, 0 without it. [kg]"""
     if text is None:
         return 0.0
     mass = quantities_of(text, Unit("kg", "kg"), option)[0]

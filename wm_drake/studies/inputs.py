@@ -258,11 +258,7 @@ def built_with_problems(
 
 
 def with_drive(parameters: "MachineParameters", drive: str | None) -> "MachineParameters":
-    """Return a machine with the drive of the option `--drive`, with the sources of its numbers.
-
-    Raises:
-        InputError: there is no such drive.
-    """
+    """Return a machine with the drive of the option `--drive`, with the sources of its numbers."""
     from wm_drake.parameters import Drive, load_machine, with_value
     from wm_drake.parameters.drive import motor_of
 

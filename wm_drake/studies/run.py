@@ -334,9 +334,6 @@ def order_of(study: Study, given: Mapping[str, Any], command: str = "") -> Order
     Args:
         given: Options of the study and of the driver that the user has set.
         command: Command line or Python call.
-
-    Raises:
-        InputError: an option is unknown or has a wrong value.
     """
     model = options_of_driver(study)
     running = {name: value for name, value in given.items() if name in model.model_fields}

@@ -180,9 +180,6 @@ class Result(ABC):
         Args:
             name: Name of the table, as in `tables()`; the first one if empty.
 
-        Raises:
-            InputError: there is no such table.
-
         Example:
             >>> import wm_drake as wm
             >>> result = wm.run_study("drive", load=["middle"], quick=True, quiet=True)

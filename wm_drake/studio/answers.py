@@ -84,9 +84,6 @@ def picture(machine: OpenMachine, runner: Runner, state: State) -> dict[str, Any
 
     Args:
         runner: From `picture_runner_of`.
-
-    Raises:
-        InputError: a number or the load is wrong.
     """
     with machine.lock:
         case = machine.case(state)
@@ -137,9 +134,6 @@ def numbers(
     Args:
         runner: From `runner_of`.
         keys: Key paths of up to `LANES` numbers to turn slightly.
-
-    Raises:
-        InputError: a number, the load or a key is wrong.
     """
     turned, results = _run_turned(machine, runner, state, keys)
     record = results[0].record
@@ -163,9 +157,6 @@ def arrows(
 
     Args:
         runner: From `runner_of`.
-
-    Raises:
-        InputError: a number or the load is wrong.
     """
     return _arrows(machine, *_run_turned(machine, runner, state, keys))
 

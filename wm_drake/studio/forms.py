@@ -32,9 +32,6 @@ def arguments(name: str, given: dict[str, str]) -> list[str]:
 
     Args:
         given: Texts by name of the field.
-
-    Raises:
-        InputError: there is no such study or field, or a value is not allowed.
     """
     offered = forms()
     if name not in offered:

@@ -95,11 +95,7 @@ class Jobs:
         self._enqueue(identifier, [*about["command"], *again])
 
     def cancel(self, identifier: str) -> None:
-        """Interrupt a study as Ctrl-C does; what it has finished is kept.
-
-        Raises:
-            InputError: there is no such study.
-        """
+        """Interrupt a study as Ctrl-C does; what it has finished is kept."""
         self._about(identifier)
         with self._lock:
             self._waiting.pop(identifier, None)
@@ -115,11 +111,7 @@ class Jobs:
         return sorted(shown, key=lambda job: (job["started"], job["number"]), reverse=True)
 
     def shown(self, identifier: str) -> dict[str, Any]:
-        """Return what a page shows of a study: its state, progress, and the end of its output.
-
-        Raises:
-            InputError: there is no such study.
-        """
+        """Return what a page shows of a study: its state, progress, and the end of its output."""
         about = self._about(identifier)
         folder = self.folder / identifier
         output = _end_of(folder / "output.txt")

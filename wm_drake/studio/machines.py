@@ -82,11 +82,7 @@ class Machines:
         return self.given if self.given in shipped_machines() else GIVEN
 
     def name_or_path(self, identifier: str) -> str | Path:
-        """Return what `load_machine` reads for an identifier.
-
-        Raises:
-            InputError: no such machine can be opened.
-        """
+        """Return what `load_machine` reads for an identifier."""
         listed = self.listed()
         if identifier not in listed:
             raise input_error(
@@ -97,11 +93,7 @@ class Machines:
         return identifier if listed[identifier] == "shipped" else self.folder / identifier
 
     def open(self, identifier: str) -> "OpenMachine":
-        """Return an open machine; a file that has changed is read again.
-
-        Raises:
-            InputError: there is no such machine, or its file has an error.
-        """
+        """Return an open machine; a file that has changed is read again."""
         name = self.name_or_path(identifier)
         path = shipped_machines().get(str(name), Path(name))
         try:
@@ -202,11 +194,7 @@ class OpenMachine:
             raise
 
     def moved_by(self, parameters: MachineParameters, key: str, step: float) -> MachineParameters:
-        """Return parameters with one number changed by a step in SI units.
-
-        Raises:
-            InputError: the new value is not allowed.
-        """
+        """Return parameters with one number changed by a step in SI units."""
         with_sdf = with_sdf_values(self.machine.plant, parameters, [key])
         number = number_at(with_sdf, key)
         assert number.nominal is not None  # the values of the SDF are in these parameters

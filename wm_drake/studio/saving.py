@@ -58,11 +58,7 @@ def save_machine(
 
 
 def chosen(machine: OpenMachine, state: State) -> MachineParameters:
-    """Return the machine that a page has chosen: numbers, described load, gasket in or out.
-
-    Raises:
-        InputError: a number is wrong.
-    """
+    """Return the machine that a page has chosen: numbers, described load, gasket in or out."""
     parameters = machine.moved(state.values)
     sources = dict(parameters.sources)
     for key in state.values:
@@ -89,9 +85,6 @@ def write_machine(
         base: Name of a shipped machine, or path of the file to extend.
         parameters: The new machine.
         machine: The open machine of `base`.
-
-    Raises:
-        InputError: the file cannot be written.
     """
     extends = base if isinstance(base, str) else os.path.relpath(base.resolve(), path.parent)
     about = f"{machine.parameters.name}, changed in wm-drake studio"[:LONGEST_ABOUT]

@@ -387,11 +387,7 @@ class BalancerTask(Task):
     """The study with checked options."""
 
     def __init__(self, options: BalancerOptions, machine: Machine) -> None:
-        """Check the rings, the values and the speeds.
-
-        Raises:
-            InputError: the machine has no rings of balls or no point mass, or an option is wrong.
-        """
+        """Check the rings, the values and the speeds."""
         self.options, self.machine = options, machine
         parameters = machine.parameters
         self.rings = rings_of(parameters)

@@ -83,10 +83,6 @@ def make_design(
         trials: Number of trials; the default is 1000 (d-optimal), 729 (orthogonal) or all (full).
         model: Model to estimate, key of `MODELS`.
         seed: Seed of a D-optimal design.
-
-    Raises:
-        InputError: the kind or the model is unknown, or the kind does not have this number of
-            trials.
     """
     if kind not in DESIGNS:
         raise input_error(f"no design '{kind}'{nearest_names(kind, DESIGNS)}", key="design")

@@ -35,9 +35,6 @@ def d_optimal_levels(factors: int, trials: int, model: str, seed: int) -> Levels
             has.
         model: Key of `MODELS`.
         seed: Seed of the random start; the design depends on it.
-
-    Returns:
-        The trials, sorted.
     """
     rng = np.random.default_rng(seed)
     grid = _grid(factors, rng)

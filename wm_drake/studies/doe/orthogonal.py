@@ -42,9 +42,6 @@ def orthogonal_levels(factors: int, trials: int) -> Levels:
     Args:
         factors: Number of factors, at most eight.
         trials: Number of trials, 27, 243 or 729.
-
-    Raises:
-        InputError: there is no such array.
     """
     if trials not in _ROWS:
         raise input_error(

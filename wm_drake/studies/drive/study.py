@@ -347,12 +347,7 @@ class DriveTask(Task):
     """The study with checked options."""
 
     def __init__(self, options: DriveOptions, machine: Machine) -> None:
-        """Check the drive, the loads and the profile.
-
-        Raises:
-            InputError: the drive has no motor with a constant torque limit, a load or the profile
-                is wrong, or the profile ends at standstill.
-        """
+        """Check the drive, the loads and the profile."""
         self.options, self.machine = options, machine
         motor_with_limit(machine.parameters)
         self.cases = selected_cases(machine.parameters, options.load, True, options.profile)

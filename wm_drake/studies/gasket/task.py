@@ -52,11 +52,7 @@ class GasketTask(Task):
     """The study with checked options."""
 
     def __init__(self, options: GasketOptions, machine: Machine) -> None:
-        """Read factors, settings, design, loads, responses and published results.
-
-        Raises:
-            InputError: one of them is wrong.
-        """
+        """Read factors, settings, design, loads, responses and published results."""
         self.options, self.parameters = options, machine.parameters
         parameters, levels = self.parameters, _factors(machine.parameters, options)
         self.settings = [_setting(parameters, levels, text) for text in options.check]

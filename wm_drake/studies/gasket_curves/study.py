@@ -158,11 +158,7 @@ class CurvesTask(Task):
     """The curves with checked options."""
 
     def __init__(self, options: CurvesOptions, machine: Machine) -> None:
-        """Read the drawing and the ranges, and mesh the gasket.
-
-        Raises:
-            InputError: an option or the drawing is wrong, or the machine has no gasket.
-        """
+        """Read the drawing and the ranges, and mesh the gasket."""
         self.options, self.machine = options, machine.parameters
         if self.machine.gasket is None:
             raise input_error(

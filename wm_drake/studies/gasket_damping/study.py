@@ -176,12 +176,7 @@ class GasketDampingTask(Task):
     """The study with checked options."""
 
     def __init__(self, options: GasketDampingOptions, machine: Machine) -> None:
-        """Check the machine, and read the records or the true values of the virtual experiment.
-
-        Raises:
-            InputError: the machine has no gasket, its profile ends before the window, it does not
-                have the loads of the virtual experiment, or a record or true value is wrong.
-        """
+        """Check the machine, and read the records or the true values of the virtual experiment."""
         self.options, self.machine = options, machine
         run_up_of(machine.parameters)
         self.records, self.truth = read_records(machine.parameters, options.record), None

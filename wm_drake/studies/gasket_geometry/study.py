@@ -246,11 +246,7 @@ class GeometryTask(Task):
     """The study with checked options."""
 
     def __init__(self, options: GeometryOptions, machine: Machine) -> None:
-        """Read the drawing, make the design, and check that each of its drawings can be built.
-
-        Raises:
-            InputError: an option, the drawing or a drawing of the design is wrong.
-        """
+        """Read the drawing, make the design, and check that each of its drawings can be built."""
         from scipy.stats.qmc import LatinHypercube
 
         self.options, self.machine = options, machine.parameters
@@ -290,11 +286,7 @@ class GeometryTask(Task):
         return replace(self.mesh, meridian=times * self.mesh.meridian)
 
     def _gasket(self, levels: FloatArray) -> Gasket:
-        """Return the gasket of a drawing.
-
-        Raises:
-            InputError: the drawing cannot be built.
-        """
+        """Return the gasket of a drawing."""
         return Gasket(changed(self.drawing, self.factors, levels), self._mesh(levels))
 
     @property

@@ -39,9 +39,6 @@ def motions_of(
     Args:
         rotates: Whether the loops must be of moments over angles.
         driven_mass: Mass at the driven end, whose inertia is taken out of the forces. [kg]
-
-    Raises:
-        InputError: A file or an option is wrong.
     """
     if options.method not in METHODS:
         raise input_error(

@@ -309,9 +309,6 @@ def fields_of_law(law: str, axis: str = "") -> tuple[str, ...]:
     Args:
         law: A damper law, or a law of a bushing.
         axis: Axis of a bushing; "" for a damper.
-
-    Raises:
-        InputError: There is no such law.
     """
     laws: Mapping[str, Any] = BUSHING_LAWS if axis else DAMPER_LAWS
     if law not in laws:

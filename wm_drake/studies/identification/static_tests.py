@@ -81,11 +81,7 @@ class StaticTask(Task):
     """Quasi-static tests with checked options."""
 
     def __init__(self, kind: str, options: AxisFitOptions | DamperFitOptions) -> None:
-        """Find the component and read the tests of each axis, or of the sponge of a damper.
-
-        Raises:
-            InputError: an option or a file is wrong.
-        """
+        """Find the component and read the tests of each axis, or of the sponge of a damper."""
         self.options, self.target = options, target_of(kind, options)
         component = self.target.component
         self.title = kind if component.name == kind else f"{kind} {component.name}"

@@ -263,11 +263,7 @@ class DamperFitTask(FitTask):
     """Fit of a friction damper."""
 
     def __init__(self, options: DamperFitOptions) -> None:
-        """Find the damper and read its loops.
-
-        Raises:
-            InputError: an option or a file is wrong.
-        """
+        """Find the damper and read its loops."""
         self.options = options
         target = target_of("damper", options)
         law = str(getattr(target.component.parameters, "law"))  # noqa: B009
@@ -292,11 +288,7 @@ class AxisFitTask(FitTask):
     """Fit of one axis of a bushing or of the gasket."""
 
     def __init__(self, kind: str, options: AxisFitOptions) -> None:
-        """Find the component and read its loops.
-
-        Raises:
-            InputError: an option or a file is wrong.
-        """
+        """Find the component and read its loops."""
         self.options = options
         target = target_of(kind, options)
         if options.axis is None:

@@ -76,11 +76,7 @@ class Table2Task(Task):
     """The fits with checked options."""
 
     def __init__(self, options: Table2Options) -> None:
-        """Read the tests.
-
-        Raises:
-            InputError: an option or a file is wrong.
-        """
+        """Read the tests."""
         self.damper = _damper(options.friction_force)
         if units_of(options.units) and not options.files:
             raise input_error("is about measured files; give at least one", where="--units")

@@ -17,11 +17,7 @@ class ModesTask(Task):
     """The study with checked options."""
 
     def __init__(self, options: ModesOptions, machine: Machine) -> None:
-        """Read the amplitude.
-
-        Raises:
-            InputError: the amplitude is not a length.
-        """
+        """Read the amplitude."""
         self.options, self.machine = options, machine
         self.amplitude = quantities_of(options.amplitude, Unit("m", "mm"), "--amplitude")[0]
 

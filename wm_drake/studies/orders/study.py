@@ -117,11 +117,7 @@ class OrdersTask(Task):
     """Orders of the signals of a file."""
 
     def __init__(self, options: OrdersOptions) -> None:
-        """Read the file.
-
-        Raises:
-            InputError: the file cannot be read, or is too short.
-        """
+        """Read the file."""
         file = existing_file(options.file, "FILE")
         self.signals = read_signals(file, options.unit, channels_of(options.channels))
         self.highest = options.highest
@@ -141,9 +137,6 @@ def read_signals(path: Path, unit: str, channels: Mapping[str, str] | None = Non
         unit: Unit of signals whose file has none, for reading.
         channels: Name in the file of ``time``, ``speed`` or a signal, whose word is free; without a
             named signal all others are signals. Not of a netCDF record.
-
-    Raises:
-        InputError: the file cannot be read or has too few columns or rows.
     """
     if is_lab_file(path) or (channels and path.suffix.lower() == ".csv"):
         return _read_lab(path, unit, channels or {})

@@ -172,11 +172,7 @@ class MachineDesigns:
         return len(self.cases) if self.scores is None else len(self.scores)
 
     def machine_at(self, design: FloatArray) -> MachineParameters:
-        """Return the machine of a design.
-
-        Raises:
-            InputError: the design is not a machine.
-        """
+        """Return the machine of a design."""
         changes: dict[str, Any] = {}
         for dimension, place in zip(self.dimensions, map(float, design), strict=True):
             changes |= dimension.changes(place)

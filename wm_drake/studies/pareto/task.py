@@ -29,11 +29,7 @@ class DesignTask(Task):
     """The study with checked options."""
 
     def __init__(self, options: DesignOptions, machine: Machine) -> None:
-        """Read the design file and the tolerances that it names.
-
-        Raises:
-            InputError: an option or a file is wrong.
-        """
+        """Read the design file and the tolerances that it names."""
         if options.search not in SEARCHES:
             hint = nearest_names(options.search, SEARCHES)
             raise input_error(f"no search '{options.search}'{hint}", where="--search")

@@ -95,11 +95,7 @@ class RigTask(Task):
     """A bench test with checked options."""
 
     def __init__(self, kind: str, options: RigOptions) -> None:
-        """Find the component, put it on the bench, and read its motions.
-
-        Raises:
-            InputError: an option is wrong.
-        """
+        """Find the component, put it on the bench, and read its motions."""
         self.component = target_of(kind, options).component
         self.massless: Bench | None = None
         if isinstance(options, DamperRigOptions):

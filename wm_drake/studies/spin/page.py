@@ -56,11 +56,7 @@ VERDICT = (
 
 
 def spin_page(result: SpinResult, facts: Facts | None = None) -> str:
-    """Return the page of spin runs as text of one self-contained HTML file.
-
-    Raises:
-        InputError: A file of measured amplitudes cannot be used.
-    """
+    """Return the page of spin runs as text of one self-contained HTML file."""
     table, made = amplitude_table(result), facts or Facts()
     gaps = _gaps_pictures(result)
     drive, floor, modes = drive_section(result), floor_section(result), result.modes

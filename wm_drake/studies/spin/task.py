@@ -43,11 +43,7 @@ class SpinTask(Task):
     """Spin runs of one machine, or of variants that are compared."""
 
     def __init__(self, options: SpinOptions, machines: Sequence[Machine]) -> None:
-        """Check the options.
-
-        Raises:
-            InputError: an option is wrong, or the machines cannot be compared.
-        """
+        """Check the options."""
         self.options = options
         self.engine = options.engine or DEFAULT_ENGINE
         if self.engine not in ENGINES:

@@ -22,11 +22,7 @@ class SpinCycleTask(Task):
     """The study with checked options."""
 
     def __init__(self, options: SpinCycleOptions, machine: Machine) -> None:
-        """Read profile, cases and measurements.
-
-        Raises:
-            InputError: one of them is wrong.
-        """
+        """Read profile, cases and measurements."""
         if options.engine not in ENGINES:
             hint = nearest_names(options.engine, ENGINES)
             raise input_error(f"unknown engine '{options.engine}'{hint}", where="--engine")

@@ -213,11 +213,7 @@ class SpinIdentifyTask(Task):
     """The study with checked options."""
 
     def __init__(self, options: SpinIdentifyOptions, machine: Machine) -> None:
-        """Check the unknowns, the cases and the profile, and read the measurements.
-
-        Raises:
-            InputError: one of them is wrong.
-        """
+        """Check the unknowns, the cases and the profile, and read the measurements."""
         self.options, self.machine = options, machine
         self.profile = runnable_profile(options.profile, machine.parameters)
         names = options.case or (() if options.cases else DEFAULT_CASES)

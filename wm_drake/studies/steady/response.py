@@ -111,11 +111,7 @@ def branch_of(
 
 
 def _checked(speeds: Sequence[float] | FloatArray, harmonics: int, samples: int) -> FloatArray:
-    """Return the speeds as an array.
-
-    Raises:
-        InputError: an argument of `steady_response` is wrong.
-    """
+    """Return the speeds as an array."""
     grid = np.atleast_1d(np.asarray(speeds, dtype=float))
     steps = np.diff(grid)
     ordered = grid.ndim == 1 and len(grid) > 1 and (np.all(steps > 0.0) or np.all(steps < 0.0))

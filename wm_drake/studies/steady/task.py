@@ -19,11 +19,7 @@ class ResponseTask(Task):
     """The study with checked options."""
 
     def __init__(self, options: ResponseOptions, machine: Machine) -> None:
-        """Check speeds, sweep rates and loads.
-
-        Raises:
-            InputError: one of them is wrong.
-        """
+        """Check speeds, sweep rates and loads."""
         self.options, self.machine = options, machine
         parameters = machine.parameters
         self.speeds = self._speeds()

@@ -61,11 +61,7 @@ class Settings:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            InputError: a number is not allowed.
-        """
+        """Check the numbers."""
         for name in ("samples", "sensitivity"):
             value = getattr(self, name)
             if value & (value - 1) or (name == "samples" and value < 16):

@@ -46,11 +46,7 @@ class ToleranceTask(Task):
     """The study with checked options."""
 
     def __init__(self, options: ToleranceOptions, machine: Machine) -> None:
-        """Read tolerances and limits, and check the uncertain quantities at their ends.
-
-        Raises:
-            InputError: an option or a file is wrong.
-        """
+        """Read tolerances and limits, and check the uncertain quantities at their ends."""
         sensitivity = options.sensitivity
         if sensitivity is None:
             sensitivity = min(512, options.samples)

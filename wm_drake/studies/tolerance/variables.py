@@ -183,9 +183,6 @@ def laundry_load(values: dict[str, float]) -> Load:
 
     Args:
         values: SI values by the names of the fields of `Laundry`.
-
-    Raises:
-        InputError: a value is not allowed.
     """
     share = values.get("second_share", 0.0)
     if not 0.0 <= share <= 1.0:

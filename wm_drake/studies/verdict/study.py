@@ -327,11 +327,7 @@ class VerdictTask(Task):
     """The verdict with checked options."""
 
     def __init__(self, options: VerdictOptions, machine: Machine) -> None:
-        """Check the options and the laundry.
-
-        Raises:
-            InputError: an option is wrong, or the SDF has no shapes whose gap could be measured.
-        """
+        """Check the options and the laundry."""
         if not has_gap(machine.parameters):
             raise input_error(NO_SHAPES)
         self.options, self.clearance = options, _length(options.clearance)
