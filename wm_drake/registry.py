@@ -1,7 +1,7 @@
 """Named declarations that a package of a user can extend: element kinds, measures, studies."""
 
 import importlib.metadata
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Generic, Protocol, TypeVar
 
 from wm_drake.errors import WmDrakeError, input_error, nearest_names
@@ -32,24 +32,16 @@ class Registry(Mapping[str, Declaration], Generic[Declaration]):
     not what a script registered by a function call.
     """
 
-    def __init__(
-        self,
-        word: str,
-        group: str,
-        load: Callable[[], None] = lambda: None,
-        shipped: Sequence[str] = (),
-    ) -> None:
+    def __init__(self, word: str, group: str, shipped: Sequence[str]) -> None:
         """Create an empty registry.
 
         Args:
             word: What a declaration is called in messages, such as "element kind".
             group: Group of entry points.
-            load: Called once before the first look-up; imports the declarations of this package.
-            shipped: Declarations of this package that are entry points, as `module:name`, because a
-                registry in an early room knows those of later rooms only so.
+            shipped: Declarations of this package, as `module:name`. They are imported at the first
+                look-up, because a registry may be in an earlier room than they.
         """
-        self._word, self._group, self._load = word, group, load
-        self._shipped = shipped
+        self._word, self._group, self._shipped = word, group, shipped
         self._declarations: dict[str, Declaration] = {}
         self._is_loaded = False
 
@@ -81,7 +73,6 @@ class Registry(Mapping[str, Declaration], Generic[Declaration]):
     def _all(self) -> dict[str, Declaration]:
         if not self._is_loaded:
             self._is_loaded = True
-            self._load()
             shipped = (importlib.metadata.EntryPoint(v, v, self._group) for v in self._shipped)
             for entry in (*shipped, *importlib.metadata.entry_points(group=self._group)):
                 self._register_entry_point(entry)

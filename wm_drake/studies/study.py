@@ -9,8 +9,9 @@ and writes the result folder, the JSON, the terminal tables, the page and its fi
 
 A study has three parts, as in `studies/drive`:
 
-    options.py   class DriveOptions(Options) and DRIVE = Study(...), which `_load` below lists. It
-                 is imported for `--help`, so it must not import Drake, pandas, scipy or plotting.
+    options.py   class DriveOptions(Options) and DRIVE = Study(...), which `SHIPPED` below lists.
+                 It is imported for `--help`, so it must not import Drake, pandas, scipy or
+                 plotting; `imported` names the task.
     study.py     class DriveTask(Task): checks the options and runs; class DriveResult(Result). Of
                  a large study, both are in task.py.
     page.py      the page: sections of pictures and tables, or a template `page.html` beside it.
@@ -20,9 +21,11 @@ study, many times for an adaptive one. So optimisers of libraries and bisections
 plain functions, and tests can pass any other function of the same form.
 """
 
+import pkgutil
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -251,6 +254,19 @@ class Task(ABC):
         """Run the study; `executor.simulate` runs cases and returns the table of their measures."""
 
 
+def imported(place: str) -> "Callable[..., Any]":
+    """Return a function or class that is imported when it is called for the first time.
+
+    Args:
+        place: Module and name, such as "wm_drake.studies.drive.study:DriveTask".
+    """
+    return partial(_call, place)
+
+
+def _call(place: str, *arguments: Any) -> Any:
+    return pkgutil.resolve_name(place)(*arguments)
+
+
 def _unchanged(parameters: "MachineParameters", _: Any) -> "MachineParameters":
     return parameters
 
@@ -263,8 +279,9 @@ class Study:
         name: Name of the command and of the Python call.
         about: One line of help.
         begin: Called with the options and the built machine, which the driver has checked; returns
-            the task. If the option `machine` is repeatable, it gets all machines. Whatever is wrong
-            with the input raises an `InputError` here, before any work.
+            the task. Mostly the class of the task, by `imported`. If the option `machine` is
+            repeatable, it gets all machines. Whatever is wrong with the input raises an
+            `InputError` here, before any work.
         quick: Options of `--quick`: small sizes, for a first look and for tests.
         has_runs: Whether the task has runs or other values that a ledger keeps. If so, the command
             has the options `--workers`, `--cluster` and `--resume`, and the folder a ledger.
@@ -299,45 +316,28 @@ class Study:
         return self.group if self.group and self.group != "study" else self.command
 
 
-def _load() -> None:
-    from wm_drake.studies.balancer.options import BALANCER
-    from wm_drake.studies.calibration.options import CALIBRATE
-    from wm_drake.studies.drive.options import DRIVE
-    from wm_drake.studies.gasket.options import GASKET
-    from wm_drake.studies.gasket_curves.options import GASKET_CURVES
-    from wm_drake.studies.gasket_damping.options import GASKET_DAMPING
-    from wm_drake.studies.gasket_geometry.options import GASKET_GEOMETRY
-    from wm_drake.studies.modes.options import MODES
-    from wm_drake.studies.pareto.options import DESIGN
-    from wm_drake.studies.spin.options import SPIN
-    from wm_drake.studies.spin_cycle.options import SPIN_CYCLE
-    from wm_drake.studies.spin_identification.options import SPIN_IDENTIFY
-    from wm_drake.studies.steady.options import RESPONSE
-    from wm_drake.studies.tolerance.options import TOLERANCE
-    from wm_drake.studies.verdict.options import VERDICT
+SHIPPED = (
+    "balancer.options:BALANCER",
+    "calibration.options:CALIBRATE",
+    "pareto.options:DESIGN",
+    "drive.options:DRIVE",
+    "gasket.options:GASKET",
+    "gasket_curves.options:GASKET_CURVES",
+    "gasket_damping.options:GASKET_DAMPING",
+    "gasket_geometry.options:GASKET_GEOMETRY",
+    "modes.options:MODES",
+    "steady.options:RESPONSE",
+    "spin.options:SPIN",
+    "spin_cycle.options:SPIN_CYCLE",
+    "spin_identification.options:SPIN_IDENTIFY",
+    "tolerance.options:TOLERANCE",
+    "verdict.options:VERDICT",
+)
+"""Studies of this package: module below `wm_drake.studies`, and name."""
 
-    studies = (
-        BALANCER,
-        CALIBRATE,
-        DESIGN,
-        DRIVE,
-        GASKET,
-        GASKET_CURVES,
-        GASKET_DAMPING,
-        GASKET_GEOMETRY,
-        MODES,
-        RESPONSE,
-        SPIN,
-        SPIN_CYCLE,
-        SPIN_IDENTIFY,
-        TOLERANCE,
-        VERDICT,
-    )
-    for study in studies:
-        STUDIES.register(study)
-
-
-STUDIES: Registry[Study] = Registry("study", "wm_drake.studies", _load)
+STUDIES: Registry[Study] = Registry(
+    "study", "wm_drake.studies", [f"wm_drake.studies.{place}" for place in SHIPPED]
+)
 """Studies by name."""
 
 

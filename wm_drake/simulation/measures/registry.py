@@ -3,41 +3,28 @@
 from wm_drake.registry import Registry
 from wm_drake.simulation.measures.kind import Measure, Variable
 
+SHIPPED = (
+    "extremes:EXTREMES",
+    "amplitudes:AMPLITUDES",
+    "amplitudes:IN_REGIONS",
+    "amplitudes:POWER_MEANS",
+    "gap:GAP",
+    "gap:CONTACTS",
+    "regions:REGIONS",
+    "mounts:MOUNTS",
+    "drive:DRIVE",
+    "feet:FEET",
+    "feet:IN_REGIONS",
+    "mounts:CABINET",
+    "springs:TENSIONS",
+    "radial:RADIAL",
+)
+"""Measures of this package: module of this folder, and name. Files of results have their order."""
 
-def _register_all() -> None:
-    from wm_drake.simulation.measures import (
-        amplitudes,
-        drive,
-        extremes,
-        feet,
-        gap,
-        mounts,
-        radial,
-        regions,
-        springs,
-    )
-
-    for measure in (
-        extremes.EXTREMES,
-        amplitudes.AMPLITUDES,
-        amplitudes.IN_REGIONS,
-        amplitudes.POWER_MEANS,
-        gap.GAP,
-        gap.CONTACTS,
-        regions.REGIONS,
-        mounts.MOUNTS,
-        drive.DRIVE,
-        feet.FEET,
-        feet.IN_REGIONS,
-        mounts.CABINET,
-        springs.TENSIONS,
-        radial.RADIAL,
-    ):
-        MEASURES.register(measure)
-
-
-MEASURES: Registry[Measure] = Registry("measure", "wm_drake.measures", _register_all)
-"""Measures by name. Files of results depend on the order of those of this package."""
+MEASURES: Registry[Measure] = Registry(
+    "measure", "wm_drake.measures", [f"{__package__}.{place}" for place in SHIPPED]
+)
+"""Measures by name."""
 
 
 def tabulated() -> list[Variable]:

@@ -1,11 +1,6 @@
 """Options of the study of rings of balls, and its declaration."""
 
-from typing import TYPE_CHECKING
-
-from wm_drake.studies.study import Options, Study, Task, option
-
-if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
-    from wm_drake.model.machine import Machine
+from wm_drake.studies.study import Options, Study, imported, option
 
 
 class BalancerOptions(Options):
@@ -37,17 +32,11 @@ class BalancerOptions(Options):
     rate: str = option("20 rpm/s", "Rate of the run-up.", "RATE")
 
 
-def _begin(options: BalancerOptions, machine: "Machine") -> Task:
-    from wm_drake.studies.balancer.study import BalancerTask
-
-    return BalancerTask(options, machine)
-
-
 BALANCER = Study(
     "balancer",
     "Say from which speed rings of balls pay, and where they hurt.",
     BalancerOptions,
-    _begin,
+    imported("wm_drake.studies.balancer.study:BalancerTask"),
     quick={
         "mass": "0.4 kg",
         "place": "0,110 mm",

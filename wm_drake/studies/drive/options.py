@@ -3,10 +3,9 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wm_drake.studies.study import LOADS, PROFILE, SEED, Options, Study, Task, option
+from wm_drake.studies.study import LOADS, PROFILE, SEED, Options, Study, imported, option
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
-    from wm_drake.model.machine import Machine
     from wm_drake.parameters import MachineParameters
 
 
@@ -28,12 +27,6 @@ class DriveOptions(Options):
     seed: int = SEED
 
 
-def _begin(options: DriveOptions, machine: "Machine") -> Task:
-    from wm_drake.studies.drive.study import DriveTask
-
-    return DriveTask(options, machine)
-
-
 def _with_motor(parameters: "MachineParameters", _: DriveOptions) -> "MachineParameters":
     from wm_drake.studies.inputs import with_drive
 
@@ -44,7 +37,7 @@ DRIVE = Study(
     "drive",
     "Find the weakest motor that passes every critical speed, and estimate the unbalance.",
     DriveOptions,
-    _begin,
+    imported("wm_drake.studies.drive.study:DriveTask"),
     quick={"load": ("middle",), "torques": 2, "unbalances": 2, "loads": 3},
     adapt=_with_motor,
 )

@@ -1,12 +1,8 @@
 """Options of the gasket study, and its declaration."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from wm_drake.studies.study import PROFILE, Options, Study, Task, option
-
-if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
-    from wm_drake.model.machine import Machine
+from wm_drake.studies.study import PROFILE, Options, Study, imported, option
 
 
 class GasketOptions(Options):
@@ -74,16 +70,10 @@ class GasketOptions(Options):
     profile: Path | None = PROFILE
 
 
-def _begin(options: GasketOptions, machine: "Machine") -> Task:
-    from wm_drake.studies.gasket.task import GasketTask
-
-    return GasketTask(options, machine)
-
-
 GASKET = Study(
     "gasket",
     "Find how stiffness and damping of the gasket affect displacement, force and moment.",
     GasketOptions,
-    _begin,
+    imported("wm_drake.studies.gasket.task:GasketTask"),
     quick={"trials": 150, "load": ("middle",)},
 )

@@ -1,11 +1,6 @@
 """Options of `wm-drake gasket curves`, and its declaration."""
 
-from typing import TYPE_CHECKING
-
-from wm_drake.studies.study import Options, Study, Task, option
-
-if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
-    from wm_drake.model.machine import Machine
+from wm_drake.studies.study import Options, Study, imported, option
 
 
 class CurvesOptions(Options):
@@ -35,17 +30,11 @@ class CurvesOptions(Options):
     around: int = option(8, "Elements around half the ring.", "N", ge=2, le=40)
 
 
-def _begin(options: CurvesOptions, machine: "Machine") -> Task:
-    from wm_drake.studies.gasket_curves.study import CurvesTask
-
-    return CurvesTask(options, machine)
-
-
 GASKET_CURVES = Study(
     "curves",
     "Compute the six curves of a gasket from its drawing, for a machine file.",
     CurvesOptions,
-    _begin,
+    imported("wm_drake.studies.gasket_curves.study:CurvesTask"),
     quick={"points": 2, "elements": 6, "around": 3, "radial": "4 mm", "axial": "8 mm"},
     has_runs=False,
     group="gasket",

@@ -1,11 +1,6 @@
 """Options of the gasket-damping study, and its declaration."""
 
-from typing import TYPE_CHECKING
-
-from wm_drake.studies.study import Options, Study, Task, option
-
-if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
-    from wm_drake.model.machine import Machine
+from wm_drake.studies.study import Options, Study, imported, option
 
 
 class GasketDampingOptions(Options):
@@ -34,17 +29,11 @@ class GasketDampingOptions(Options):
     )
 
 
-def _begin(options: GasketDampingOptions, machine: "Machine") -> Task:
-    from wm_drake.studies.gasket_damping.study import GasketDampingTask
-
-    return GasketDampingTask(options, machine)
-
-
 GASKET_DAMPING = Study(
     "gasket-damping",
     "Find the gasket damping for which computed and measured envelopes agree best.",
     GasketDampingOptions,
-    _begin,
+    imported("wm_drake.studies.gasket_damping.study:GasketDampingTask"),
     quick={"mesh": 20.0},
     has_runs=False,
 )

@@ -1,12 +1,8 @@
 """Options of the study of drawings of a gasket, and its declaration."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from wm_drake.studies.study import LOADS, PROFILE, SEED, Options, Study, Task, option
-
-if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
-    from wm_drake.model.machine import Machine
+from wm_drake.studies.study import LOADS, PROFILE, SEED, Options, Study, imported, option
 
 
 class GeometryOptions(Options):
@@ -46,17 +42,11 @@ class GeometryOptions(Options):
     seed: int = SEED
 
 
-def _begin(options: GeometryOptions, machine: "Machine") -> Task:
-    from wm_drake.studies.gasket_geometry.study import GeometryTask
-
-    return GeometryTask(options, machine)
-
-
 GASKET_GEOMETRY = Study(
     "gasket-geometry",
     "Vary the drawing of a gasket: wall, folds, hardness; find the largest gap.",
     GeometryOptions,
-    _begin,
+    imported("wm_drake.studies.gasket_geometry.study:GeometryTask"),
     quick={
         "drawings": 6,
         "fresh": 2,

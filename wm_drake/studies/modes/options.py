@@ -1,11 +1,6 @@
 """Options of the study of modes, and its declaration."""
 
-from typing import TYPE_CHECKING
-
-from wm_drake.studies.study import Options, Study, Task, option
-
-if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
-    from wm_drake.model.machine import Machine
+from wm_drake.studies.study import Options, Study, imported, option
 
 
 class ModesOptions(Options):
@@ -23,16 +18,10 @@ class ModesOptions(Options):
     replay: bool = option(False, "Also write a 3D animation of each sliding mode.")
 
 
-def _begin(options: ModesOptions, machine: "Machine") -> Task:
-    from wm_drake.studies.modes.task import ModesTask
-
-    return ModesTask(options, machine)
-
-
 MODES = Study(
     "modes",
     "Compute natural modes, critical speeds, and how each number of the machine moves them.",
     ModesOptions,
-    _begin,
+    imported("wm_drake.studies.modes.task:ModesTask"),
     has_runs=False,
 )

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from wm_drake.studies.study import OptionModel, Study, Task, option
+from wm_drake.studies.study import OptionModel, Study, imported, option
 
 
 class OrdersOptions(OptionModel):
@@ -24,17 +24,11 @@ class OrdersOptions(OptionModel):
     )
 
 
-def _begin(options: OrdersOptions) -> Task:
-    from wm_drake.studies.orders.study import OrdersTask
-
-    return OrdersTask(options)
-
-
 ORDERS = Study(
     "orders",
     "Compute waterfall and order map of the signals of a record.",
     OrdersOptions,
-    _begin,
+    imported("wm_drake.studies.orders.study:OrdersTask"),
     has_runs=False,
     group="record",
     has_machine=False,

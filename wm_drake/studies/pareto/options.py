@@ -1,12 +1,8 @@
 """Options of the design study, and its declaration."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from wm_drake.studies.study import PROFILE, SEED, Options, Study, Task, option
-
-if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
-    from wm_drake.model.machine import Machine
+from wm_drake.studies.study import PROFILE, SEED, Options, Study, imported, option
 
 
 class DesignOptions(Options):
@@ -27,16 +23,10 @@ class DesignOptions(Options):
     seed: int = SEED
 
 
-def _begin(options: DesignOptions, machine: "Machine") -> Task:
-    from wm_drake.studies.pareto.task import DesignTask
-
-    return DesignTask(options, machine)
-
-
 DESIGN = Study(
     "design",
     "Find the designs of which no other is better in every objective.",
     DesignOptions,
-    _begin,
+    imported("wm_drake.studies.pareto.task:DesignTask"),
     quick={"evaluations": 48, "population": 16},
 )

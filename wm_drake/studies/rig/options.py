@@ -3,7 +3,7 @@
 from functools import partial
 
 from wm_drake.studies.component_options import ARM, AXIS, JIG_MASS, OUTER_MASS, ComponentOptions
-from wm_drake.studies.study import Study, Task, option
+from wm_drake.studies.study import Study, imported, option
 
 
 class RigOptions(ComponentOptions):
@@ -42,18 +42,12 @@ class AxisRigOptions(RigOptions):
     arm: str | None = ARM
 
 
-def _begin(kind: str, options: RigOptions) -> Task:
-    from wm_drake.studies.rig.study import RigTask
-
-    return RigTask(kind, options)
-
-
 RIG = {
     kind: Study(
         kind,
         about,
         options,
-        partial(_begin, kind),
+        partial(imported("wm_drake.studies.rig.study:RigTask"), kind),
         has_runs=False,
         group="rig",
         has_machine=False,

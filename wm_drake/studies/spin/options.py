@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING, Any
 from pydantic import field_validator
 
 from wm_drake.studies.inputs import with_drive, with_measured
-from wm_drake.studies.study import MEASURED, PROFILE, Options, Study, Task, option
+from wm_drake.studies.study import MEASURED, PROFILE, Options, Study, imported, option
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
-    from wm_drake.model.machine import Machine
     from wm_drake.parameters import MachineParameters
 
 
@@ -64,12 +63,6 @@ class SpinOptions(Options):
         return (value,) if isinstance(value, str) else value
 
 
-def _begin(options: SpinOptions, *machines: "Machine") -> Task:
-    from wm_drake.studies.spin.task import SpinTask
-
-    return SpinTask(options, machines)
-
-
 def _adapted(parameters: "MachineParameters", options: SpinOptions) -> "MachineParameters":
     changed = with_drive(parameters, options.drive)
     return with_measured(changed, options.measured, "--measured")
@@ -79,7 +72,7 @@ SPIN = Study(
     "spin",
     "Simulate the run-up of the drum through the resonances, and report the motion of the tub.",
     SpinOptions,
-    _begin,
+    imported("wm_drake.studies.spin.task:SpinTask"),
     quick={"load": ("middle",)},
     has_runs=False,
     adapt=_adapted,

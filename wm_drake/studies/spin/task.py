@@ -42,7 +42,7 @@ class _Planned:
 class SpinTask(Task):
     """Spin runs of one machine, or of variants that are compared."""
 
-    def __init__(self, options: SpinOptions, machines: Sequence[Machine]) -> None:
+    def __init__(self, options: SpinOptions, *machines: Machine) -> None:
         """Check the options."""
         self.options = options
         self.engine = options.engine or DEFAULT_ENGINE

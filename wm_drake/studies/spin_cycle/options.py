@@ -1,12 +1,9 @@
 """Options of the study of a spin cycle, and its declaration."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from wm_drake.studies.study import Options, Study, Task, option
-
-if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
-    from wm_drake.model.machine import Machine
+from wm_drake.studies.study import Options, Study, imported, option
 
 CASE: Any = option((), "Run only this case. Repeatable.", "NAME")
 
@@ -55,16 +52,10 @@ class SpinCycleOptions(CycleOptions):
     )
 
 
-def _begin(options: SpinCycleOptions, machine: "Machine") -> Task:
-    from wm_drake.studies.spin_cycle.task import SpinCycleTask
-
-    return SpinCycleTask(options, machine)
-
-
 SPIN_CYCLE = Study(
     "spin-cycle",
     "Run a spin cycle with many unbalances, and report RMS displacements per region and sensor.",
     SpinCycleOptions,
-    _begin,
+    imported("wm_drake.studies.spin_cycle.task:SpinCycleTask"),
     quick={"case": ("2",)},
 )

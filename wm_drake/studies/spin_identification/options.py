@@ -1,12 +1,7 @@
 """Options of the identification from a spin cycle, and its declaration."""
 
-from typing import TYPE_CHECKING
-
 from wm_drake.studies.spin_cycle.options import CycleOptions
-from wm_drake.studies.study import Study, Task, option
-
-if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
-    from wm_drake.model.machine import Machine
+from wm_drake.studies.study import Study, imported, option
 
 
 class SpinIdentifyOptions(CycleOptions):
@@ -35,17 +30,11 @@ class SpinIdentifyOptions(CycleOptions):
     )
 
 
-def _begin(options: SpinIdentifyOptions, machine: "Machine") -> Task:
-    from wm_drake.studies.spin_identification.study import SpinIdentifyTask
-
-    return SpinIdentifyTask(options, machine)
-
-
 SPIN_IDENTIFY = Study(
     "spin-identify",
     "Fit numbers of a machine to RMS displacements in a spin cycle; without measurements, to a "
     "virtual experiment.",
     SpinIdentifyOptions,
-    _begin,
+    imported("wm_drake.studies.spin_identification.study:SpinIdentifyTask"),
     quick={"unknown": ("gasket.stiffness_y",), "case": ("2",)},
 )

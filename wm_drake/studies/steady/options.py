@@ -1,11 +1,6 @@
 """Options of the study of the steady response, and its declaration."""
 
-from typing import TYPE_CHECKING
-
-from wm_drake.studies.study import LOADS, Options, Study, Task, option
-
-if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
-    from wm_drake.model.machine import Machine
+from wm_drake.studies.study import LOADS, Options, Study, imported, option
 
 
 class ResponseOptions(Options):
@@ -26,17 +21,11 @@ class ResponseOptions(Options):
     workers: int | None = option(None, "Number of cores. Default: all.", "N", ge=1)
 
 
-def _begin(options: ResponseOptions, machine: "Machine") -> Task:
-    from wm_drake.studies.steady.task import ResponseTask
-
-    return ResponseTask(options, machine)
-
-
 RESPONSE = Study(
     "response",
     "Compute the steady response to unbalance over the drum speed, by harmonic balance.",
     ResponseOptions,
-    _begin,
+    imported("wm_drake.studies.steady.task:ResponseTask"),
     quick={"load": ("middle",), "points": 15, "harmonics": 3, "rate": ("50 rpm/s",)},
     has_runs=False,
 )

@@ -1,12 +1,8 @@
 """Options of the tolerance study, and its declaration."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from wm_drake.studies.study import PROFILE, SEED, Options, Study, Task, option
-
-if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
-    from wm_drake.model.machine import Machine
+from wm_drake.studies.study import PROFILE, SEED, Options, Study, imported, option
 
 
 class ToleranceOptions(Options):
@@ -46,16 +42,10 @@ class ToleranceOptions(Options):
     seed: int = SEED
 
 
-def _begin(options: ToleranceOptions, machine: "Machine") -> Task:
-    from wm_drake.studies.tolerance.task import ToleranceTask
-
-    return ToleranceTask(options, machine)
-
-
 TOLERANCE = Study(
     "tolerance",
     "Find how often the tub touches, how far it moves, and which quantities decide that.",
     ToleranceOptions,
-    _begin,
+    imported("wm_drake.studies.tolerance.task:ToleranceTask"),
     quick={"samples": 512, "sensitivity": 32, "subset": 0},
 )

@@ -1,12 +1,8 @@
 """Options of the verdict, and its declaration."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from wm_drake.studies.study import PROFILE, SEED, Options, Study, Task, option
-
-if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
-    from wm_drake.model.machine import Machine
+from wm_drake.studies.study import PROFILE, SEED, Options, Study, imported, option
 
 
 class VerdictOptions(Options):
@@ -32,17 +28,11 @@ class VerdictOptions(Options):
     seed: int = SEED
 
 
-def _begin(options: VerdictOptions, machine: "Machine") -> Task:
-    from wm_drake.studies.verdict.study import VerdictTask
-
-    return VerdictTask(options, machine)
-
-
 VERDICT = Study(
     "verdict",
     "Say whether the tub touches the housing, how likely that is, and what to change.",
     VerdictOptions,
-    _begin,
+    imported("wm_drake.studies.verdict.study:VerdictTask"),
     quick={"samples": 16},
     group="",
 )
