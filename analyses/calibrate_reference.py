@@ -18,11 +18,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
+from analysis_tools.sdf_text import sdf_with
 
 from wm_drake.batch.ledger import open_ledger
 from wm_drake.model.bodies import sdf_path
 from wm_drake.model.build import build_machine
-from wm_drake.model.sdf_text import sdf_with
 from wm_drake.parameters import (
     MachineParameters,
     load_machine,

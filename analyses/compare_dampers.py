@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from analysis_tools.damper_topology import strut_machine
 
 from wm_drake import Case, build_machine, load_machine, load_profile, simulate_many
 from wm_drake.model.machine import Machine
@@ -20,7 +21,6 @@ from wm_drake.parameters import MachineParameters, SpinProfile
 from wm_drake.parameters.spin import Region
 from wm_drake.parameters.unbalance_cases import load_unbalance_cases
 from wm_drake.simulation.vibration import relative_error
-from wm_drake.studies.spin_cycle.damper_topology import strut_machine
 
 NAMES = ("2", "5", "29")
 

@@ -16,6 +16,9 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from analysis_tools import validation_page as page
+from analysis_tools.validation_page import NOT_COMPARABLE, listed, verdict
+from analysis_tools.validation_rows import spin_cycle_rows
 
 from wm_drake import build_machine, load_machine, load_profile
 from wm_drake.parameters import MachineParameters
@@ -34,9 +37,6 @@ from wm_drake.rigs import (
 from wm_drake.studies.rig.printed import printed_table
 from wm_drake.studies.spin_cycle.runs import compiled_runs
 from wm_drake.studies.spin_cycle.study import SpinCycleResult, average_errors, run_spin_cycle
-from wm_drake.studies.validation import page
-from wm_drake.studies.validation.page import NOT_COMPARABLE, listed, verdict
-from wm_drake.studies.validation.rows import spin_cycle_rows
 
 MM = 1e-3
 CASES = ("2", "5", "11", "20", "29")

@@ -15,6 +15,8 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from analysis_tools import validation_page as page
+from analysis_tools.claims import claims
 
 from wm_drake import Case, build_machine, load_machine, modes, simulate_many
 from wm_drake.batch.ledger import open_ledger
@@ -35,8 +37,6 @@ from wm_drake.studies.doe import make_design
 from wm_drake.studies.gasket.published import Published, published_for
 from wm_drake.studies.gasket.screening import Screening, run_screening
 from wm_drake.studies.gasket.study import GasketTrials
-from wm_drake.studies.validation import page
-from wm_drake.studies.validation.claims import claims
 
 REFERENCE = "reference"
 MACHINES = (REFERENCE, "reference_2026_11")

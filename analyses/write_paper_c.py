@@ -15,6 +15,9 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from analysis_tools import validation_page as page
+from analysis_tools.validation_page import NOT_COMPARABLE, listed, verdict
+from analysis_tools.validation_rows import coulomb_rows
 
 from wm_drake.parameters.damper_laws import DamperNumbers, StvSpongeDamper
 from wm_drake.parameters.types import FloatArray
@@ -27,9 +30,6 @@ from wm_drake.studies.identification.drift import (
     mstv_of_c,
     printed_table,
 )
-from wm_drake.studies.validation import page
-from wm_drake.studies.validation.page import NOT_COMPARABLE, listed, verdict
-from wm_drake.studies.validation.rows import coulomb_rows
 
 MM = 1e-3
 STV = 0.1 * MM

@@ -25,6 +25,8 @@ from typing import Any
 from xml.etree import ElementTree
 
 import pandas as pd
+from analysis_tools import validation_page as page
+from analysis_tools import validation_rows as rows
 from ruamel.yaml import YAML
 
 from wm_drake import Case, build_machine, load_machine, load_profile, simulate_many
@@ -53,7 +55,6 @@ from wm_drake.studies.spin.study import run_spin
 from wm_drake.studies.spin.tables import amplitude_table
 from wm_drake.studies.spin_cycle.runs import compiled_runs
 from wm_drake.studies.spin_cycle.study import run_spin_cycle
-from wm_drake.studies.validation import page, rows
 
 HERE = Path(__file__).parent
 REASONS, VERIFICATION = HERE / "validation_reasons.yaml", HERE / "verification.yaml"

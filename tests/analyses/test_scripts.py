@@ -8,8 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-
-from wm_drake.studies.validation.page import FAILS, HOLDS, NOT_COMPARABLE
+from analysis_tools.validation_page import FAILS, HOLDS, NOT_COMPARABLE
 
 ANALYSES = Path(__file__).parents[2] / "analyses"
 VERDICTS = {HOLDS, FAILS, NOT_COMPARABLE, "met", "missed"}

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from analysis_tools.sdf_text import sdf_with
 from pydrake.math import RollPitchYaw
 
 from wm_drake.errors import InputError
 from wm_drake.model.bodies import sdf_path
 from wm_drake.model.build import build_machine
-from wm_drake.model.sdf_text import sdf_with
 from wm_drake.parameters import load_machine, with_value
 
 NEW = """

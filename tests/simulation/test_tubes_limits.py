@@ -1,6 +1,7 @@
 """Limits of the machine with damper tubes: energy, massless tubes, spin inertia of the tubes."""
 
 import pytest
+from analysis_tools.damper_topology import strut_machine
 from telescopic_machine import OUTER_TUBES, RUN_UP, changed, telescopic, with_bushing, with_tubes
 from tube_energy import balance
 
@@ -9,7 +10,6 @@ from wm_drake.model.build import build_machine
 from wm_drake.parameters import Load, SpinProfile, Unbalance
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.vibration import relative_error
-from wm_drake.studies.spin_cycle.damper_topology import strut_machine
 
 LOAD = Load(unbalances=(Unbalance(mass=0.5, radius=0.24, y=-0.1),))
 

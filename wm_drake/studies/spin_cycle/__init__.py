@@ -2,6 +2,6 @@
 
 Enters: a machine, a table of unbalance cases and a profile with regions; optionally measurements.
 Leaves: a `SpinCycleResult` with the RMS displacement per region, sensor and axis, and errors
-against a measurement. `damper_topology` makes machines with simpler dampers.
+against a measurement.
 May import: `studies.spin`, `batch` and the rooms before it.
 """

@@ -4,10 +4,10 @@ import re
 
 import numpy as np
 import pytest
+from analysis_tools.sdf_text import sdf_with
 
 from wm_drake.model.bodies import sdf_path, with_sdf_values
 from wm_drake.model.build import build_machine
-from wm_drake.model.sdf_text import sdf_with
 from wm_drake.parameters import load_machine, with_value
 
 

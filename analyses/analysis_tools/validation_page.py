@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from analysis_tools.validation_rows import FITTED, MISSED, PREDICTED, Row, counts
 from wm_drake.report.provenance import now, program
-from wm_drake.studies.validation.rows import FITTED, MISSED, PREDICTED, Row, counts
 
 WIDTH = 100
 """Largest length of a line of prose. [characters]"""

@@ -4,12 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
-
-from wm_drake.parameters import PublishedTerm
-from wm_drake.studies.doe import make_design
-from wm_drake.studies.gasket.screening import Responses, run_screening
-from wm_drake.studies.spin_cycle.study import SpinCycleResult
-from wm_drake.studies.validation.page import (
+from analysis_tools.validation_page import (
     BEGIN,
     END,
     UNEXPLAINED,
@@ -18,7 +13,7 @@ from wm_drake.studies.validation.page import (
     renewed,
     verified,
 )
-from wm_drake.studies.validation.rows import (
+from analysis_tools.validation_rows import (
     FITTED,
     MET,
     MISSED,
@@ -32,6 +27,11 @@ from wm_drake.studies.validation.rows import (
     mean_rows,
     spin_cycle_rows,
 )
+
+from wm_drake.parameters import PublishedTerm
+from wm_drake.studies.doe import make_design
+from wm_drake.studies.gasket.screening import Responses, run_screening
+from wm_drake.studies.spin_cycle.study import SpinCycleResult
 
 
 @pytest.fixture
