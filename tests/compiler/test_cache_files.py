@@ -2,10 +2,13 @@
 
 import os
 import resource
+import runpy
 import subprocess
 import sys
 
 import pytest
+
+from wm_drake.compiler import cache_files, compilation
 
 LAW = """
 from wm_drake.compiler.compilation import law
@@ -77,3 +80,19 @@ def test_disk_that_is_full_leaves_the_cache_out(run, tmp_path):
     assert line == f"compiled code cannot be kept in {next(tmp_path.glob('*/*'))} (File too large)"
     assert run(tmp_path) == (["-6.0", "0"], [])
     assert run(tmp_path) == (["-6.0", "1"], [])
+
+
+def test_checkouts_of_the_same_sources_share_their_files(tmp_path, monkeypatch):
+    monkeypatch.setattr(compilation, "CACHE_FOLDER", str(tmp_path / "cache"))
+
+    def hits(checkout, text):
+        """Return how often the law of a checkout is read from the cache when it is called."""
+        monkeypatch.setattr(cache_files, "_PACKAGE", tmp_path / checkout)
+        file = tmp_path / checkout / "laws" / "spring.py"
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text, encoding="utf-8")
+        return sum(runpy.run_path(str(file))["spring"].stats.cache_hits.values())
+
+    assert hits("one", LAW) == 0
+    assert hits("other", LAW) == 1
+    assert hits("other", LAW.replace("-k", "k")) == 0

@@ -21,6 +21,7 @@ from wm_drake.compiler.numba_internals import (
 )
 
 _DIGEST = hashlib.sha256().digest_size
+_PACKAGE = Path(__file__).parents[1]
 
 
 class CheckedCacheFile(IndexDataCacheFile):
@@ -97,13 +98,28 @@ class LawCache(FunctionCache):
         """Choose the files of a function.
 
         Raises:
-            RuntimeError: the folder cannot be written to.
+            RuntimeError, OSError: the folder cannot be written to.
         """
         super().__init__(function)
         files = self._cache_file
-        self._cache_file = CheckedCacheFile(
-            files._cache_path, self._impl.filename_base, files._source_stamp
+        folder, stamp = _shared(Path(files._cache_path), function) or (
+            files._cache_path,
+            files._source_stamp,
         )
+        self._cache_file = CheckedCacheFile(folder, self._impl.filename_base, stamp)
+
+
+def _shared(folder: Path, function: Callable[..., Any]) -> tuple[str, str] | None:
+    """Return folder and stamp of a law of this package, the same in all checkouts of its sources.
+
+    numba names the folder by the absolute path of the source: each checkout would compile anew.
+    """
+    source = Path(function.__code__.co_filename)
+    if not source.is_relative_to(_PACKAGE):
+        return None
+    shared = folder.with_name("_".join(source.relative_to(_PACKAGE).parts[:-1]) or "wm_drake")
+    shared.mkdir(exist_ok=True)
+    return str(shared), hashlib.sha256(source.read_bytes()).hexdigest()
 
 
 def _read(path: Path) -> Any:

@@ -89,7 +89,7 @@ def _compiled(function: Callable[..., Any], **options: Any) -> Any:
     config.CACHE_DIR = CACHE_FOLDER
     try:
         compiled._cache = LawCache(function)
-    except RuntimeError:  # the folder cannot be written to any more
+    except (RuntimeError, OSError):  # the folder cannot be written to any more
         return compiled
     finally:
         config.CACHE_DIR = chosen_by_user
