@@ -76,7 +76,7 @@ def measured(place: str, count: int) -> dict[str, float]:
 def measure_here(place: str, count: int) -> None:
     """Print time per run and growth of the memory of a batch in this process."""
     with RUNS[place](wm.build_machine(linear_machine())) as run:
-        run(WARM)
+        run(min(WARM, count // 2))
         before, begin = peak_mb(), time.perf_counter()
         run(count)
         spent = time.perf_counter() - begin
@@ -110,7 +110,7 @@ def main() -> None:
     if arguments.place:
         measure_here(arguments.place, arguments.count)
         return
-    sizes = (64,) if arguments.quick else SIZES
+    sizes = (8,) if arguments.quick else SIZES
     found: dict[str, list[dict[str, float]]] = {place: [] for place in PLACES}
     lines = []
     for place, rows in found.items():
