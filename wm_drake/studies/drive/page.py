@@ -1,11 +1,13 @@
-"""Draw the page of the drive study: smallest torque limits, map, estimated unbalance."""
+"""Show the drive study: smallest torque limits, map, estimated unbalance."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
-from rich import table as terminal
 
+from wm_drake.parameters import MachineParameters, SpinProfile
+from wm_drake.parameters.units import Unit
 from wm_drake.report.figure import (
     MARK,
     MEASURED,
@@ -19,13 +21,23 @@ from wm_drake.report.figure import (
     Points,
     Text,
 )
-from wm_drake.report.formatting import MISSING, RPM_PER_RAD_S, number
+from wm_drake.report.formatting import GM_PER_KGM, MISSING, RPM_PER_RAD_S, number, plain
 from wm_drake.report.page import Picture, picture
 from wm_drake.report.sections import Section, SectionedPage
 from wm_drake.report.table import Column, Table, line, table_of
-from wm_drake.studies.drive.study import PASSES, DriveResult, Threshold, motor_with_limit
-from wm_drake.studies.drive.tables import error_measures
-from wm_drake.studies.study import Facts
+from wm_drake.studies.drive.study import (
+    PASSES,
+    Estimation,
+    Threshold,
+    TorqueMap,
+    motor_with_limit,
+)
+from wm_drake.studies.study import Facts, Result
+
+if TYPE_CHECKING:
+    from rich.table import Table as TerminalTable
+
+rpm = Unit("rad/s", "rpm").from_si
 
 ERRORS = {
     "loads": Column("random loads", decimals=0),
@@ -37,32 +49,64 @@ ERRORS = {
 """Columns of the table of errors by their names in JSON."""
 
 
-def drive_page(result: DriveResult, facts: Facts) -> str:
-    """Return the page as text of one self-contained HTML file."""
-    has_loads = result.estimation is not None
-    made = [
-        ("Machine", result.parameters.name),
-        ("Runs", f"{result.runs} in {facts.wall_s:.0f} s"),
-        ("Duration of a run", f"{result.profile.duration:g} s"),
-        *facts.rows(),
-    ]
-    return SectionedPage(
-        f"Drive of machine {result.parameters.name}",
-        summary(result),
-        [
-            Section("map", "Torque limit and unbalance", (map_picture(result),)),
-            Section("estimation", "Unbalance seen by the drive", (estimation_picture(result),))
-            if has_loads
-            else None,
-            Section("thresholds", "Smallest torque limit", tables=(thresholds_table(result),)),
-            Section("errors", "Errors of the estimation", tables=(errors_table(result),))
-            if has_loads
-            else None,
-        ],
-        made,
-        result.parameters,
-        facts.warnings,
-    ).html()
+@dataclass(frozen=True)
+class DriveResult(Result):
+    """Result of the study: thresholds and map of a profile, estimation with random loads."""
+
+    parameters: MachineParameters
+    profile: SpinProfile
+    thresholds: tuple[Threshold, ...]
+    map: TorqueMap
+    estimation: Estimation | None
+    runs: int
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Return thresholds, map and, with random loads, the estimation."""
+        shown = {"thresholds": thresholds_frame(self), "map": map_frame(self)}
+        return shown if self.estimation is None else shown | {"estimation": estimation_frame(self)}
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the result for JSON."""
+        shown = {
+            "machine": self.parameters.name,
+            "runs": self.runs,
+            "thresholds": thresholds_frame(self).to_dict("records"),
+            "map": map_frame(self).to_dict("records"),
+            "estimation": error_measures(self),
+        }
+        return plain(shown)
+
+    def terminal(self) -> "list[TerminalTable | str]":
+        """Return the smallest torque limits and a summary."""
+        title = f"Smallest torque limit of machine '{self.parameters.name}'"
+        return [thresholds_table(self).terminal(title), summary(self)]
+
+    def page(self, facts: Facts) -> str:
+        """Return the page."""
+        made = [
+            ("Machine", self.parameters.name),
+            ("Runs", f"{self.runs} in {facts.wall_s:.0f} s"),
+            ("Duration of a run", f"{self.profile.duration:g} s"),
+            *facts.rows(),
+        ]
+        has_loads = self.estimation is not None
+        return SectionedPage(
+            f"Drive of machine {self.parameters.name}",
+            summary(self),
+            [
+                Section("map", "Torque limit and unbalance", (map_picture(self),)),
+                Section("estimation", "Unbalance seen by the drive", (estimation_picture(self),))
+                if has_loads
+                else None,
+                Section("thresholds", "Smallest torque limit", tables=(thresholds_table(self),)),
+                Section("errors", "Errors of the estimation", tables=(errors_table(self),))
+                if has_loads
+                else None,
+            ],
+            made,
+            self.parameters,
+            facts.warnings,
+        ).html()
 
 
 def summary(result: DriveResult) -> str:
@@ -100,10 +144,74 @@ def threshold_cells(result: DriveResult, threshold: Threshold) -> tuple[str, str
     return f"{sign}{number(limit, 3)}", f"{sign}{number(ratio * limit, 2)}", caught
 
 
-def terminal_table(result: DriveResult) -> terminal.Table:
-    """Return the smallest torque limits for the terminal."""
-    title = f"Smallest torque limit of machine '{result.parameters.name}'"
-    return thresholds_table(result).terminal(title)
+def thresholds_frame(result: DriveResult) -> pd.DataFrame:
+    """Return the smallest torque limit of each load, at the motor's shaft and at the drum."""
+    ratio = motor_with_limit(result.parameters)[0].belt_ratio
+    return pd.DataFrame(
+        [
+            {
+                "load": t.load,
+                "caught_below_Nm": t.caught_below,
+                "passes_from_Nm": t.passes_from,
+                "passes_from_at_drum_Nm": ratio * t.passes_from,
+                "caught_rpm": rpm(t.caught_speed),
+                "caught_mean_torque_at_drum_Nm": t.caught_torque,
+            }
+            for t in result.thresholds
+        ]
+    )
+
+
+def map_frame(result: DriveResult) -> pd.DataFrame:
+    """Return the map over torque limit and unbalance, a row for each run.
+
+    The unbalance is the sum of the sizes of mass times radius, so masses that balance each other
+    count.
+    """
+    torque_map = result.map
+    rows = [
+        {
+            "load": torque_map.load,
+            "mass_factor": factor,
+            "sum_of_mass_times_radius_gm": GM_PER_KGM * torque_map.unbalance[u],
+            "torque_limit_Nm": torque,
+            "end_rpm": rpm(float(torque_map.end_speed[u, t])),
+            "caught_rpm": rpm(float(torque_map.caught_speed[u, t])),
+        }
+        for u, factor in enumerate(torque_map.factors)
+        for t, torque in enumerate(torque_map.torques)
+    ]
+    return pd.DataFrame(rows)
+
+
+def estimation_frame(result: DriveResult) -> pd.DataFrame:
+    """Return planted and estimated unbalance of each random load. [g m]"""
+    estimation = result.estimation
+    if estimation is None:
+        return pd.DataFrame()
+    return pd.DataFrame(
+        {
+            "planted_gm": GM_PER_KGM * estimation.planted,
+            "estimated_gm": GM_PER_KGM * estimation.estimated,
+            "error_gm": GM_PER_KGM * estimation.errors,
+            "from_torque_alone_gm": GM_PER_KGM * estimation.from_torque,
+            "from_speed_alone_gm": GM_PER_KGM * estimation.from_speed,
+        }
+    )
+
+
+def error_measures(result: DriveResult) -> dict[str, float] | None:
+    """Return bias, RMS and 95 % quantile of the error of the estimated unbalance. [g m]"""
+    if result.estimation is None:
+        return None
+    errors = GM_PER_KGM * result.estimation.errors
+    return {
+        "loads": float(len(errors)),
+        "bias_gm": float(np.mean(errors)),
+        "rms_gm": float(np.sqrt(np.mean(errors**2))),
+        "p95_gm": float(np.quantile(np.abs(errors), 0.95)),
+        "mean_planted_gm": float(np.mean(GM_PER_KGM * result.estimation.planted)),
+    }
 
 
 def thresholds_table(result: DriveResult) -> Table:
@@ -132,8 +240,8 @@ def map_picture(result: DriveResult) -> Picture:
         Points(torque[good], unbalance[good], size=9.0, key="passes"),
         Points(torque[~good], unbalance[~good], symbol="square", color=MEASURED, size=9.0, key=key),
     ]
-    rpm = RPM_PER_RAD_S * grid.end_speed[~good]
-    for x, y, speed in zip(torque[~good], unbalance[~good], rpm, strict=True):
+    speeds = RPM_PER_RAD_S * grid.end_speed[~good]
+    for x, y, speed in zip(torque[~good], unbalance[~good], speeds, strict=True):
         above = Text(float(x), float(y), f"{speed:.0f}", color=MEASURED, size=11.0, up="bottom")
         marks.append(replace(above, shift=(0.0, 6.0)))
     panel = Panel(

@@ -19,7 +19,6 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 import xarray as xr
 
 from wm_drake.engines.compiled.step_check import drum_inertia
@@ -39,10 +38,10 @@ from wm_drake.simulation.cases import Case
 from wm_drake.studies.drive.options import DriveOptions
 from wm_drake.studies.inputs import selected_cases
 from wm_drake.studies.run import Executor
-from wm_drake.studies.study import Facts, Result, Task
+from wm_drake.studies.study import Task
 
 if TYPE_CHECKING:
-    from rich.table import Table
+    from wm_drake.studies.drive.page import DriveResult
 
 MEASURES = ("drive",)
 """Measures of `simulate_many` that the study needs."""
@@ -126,50 +125,6 @@ class Estimation:
     def errors(self) -> FloatArray:
         """Return estimated less planted unbalance. (n,) [kg m]"""
         return self.estimated - self.planted
-
-
-@dataclass(frozen=True)
-class DriveResult(Result):
-    """Result of the study.
-
-    Attributes:
-        profile: Spin profile of thresholds and map.
-        thresholds: Smallest torque limit of each load.
-        map: Map over torque and unbalance.
-        estimation: Estimation of the unbalance; None without random loads.
-    """
-
-    parameters: MachineParameters
-    profile: SpinProfile
-    thresholds: tuple[Threshold, ...]
-    map: TorqueMap
-    estimation: Estimation | None
-    runs: int
-
-    def tables(self) -> dict[str, pd.DataFrame]:
-        """Return thresholds, map and, with random loads, the estimation."""
-        from wm_drake.studies.drive.tables import estimation_table, map_table, thresholds_table
-
-        shown = {"thresholds": thresholds_table(self), "map": map_table(self)}
-        return shown if self.estimation is None else shown | {"estimation": estimation_table(self)}
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the result for JSON."""
-        from wm_drake.studies.drive.tables import as_plain_data
-
-        return as_plain_data(self)
-
-    def terminal(self) -> "list[Table | str]":
-        """Return the smallest torque limits and a summary."""
-        from wm_drake.studies.drive.page import summary, terminal_table
-
-        return [terminal_table(self), summary(self)]
-
-    def page(self, facts: Facts) -> str:
-        """Return the page."""
-        from wm_drake.studies.drive.page import drive_page
-
-        return drive_page(self, facts)
 
 
 def motor_with_limit(parameters: MachineParameters) -> tuple[MotorDrive, TorqueLimit]:
@@ -365,6 +320,8 @@ class DriveTask(Task):
 
     def run(self, executor: Executor) -> "DriveResult":
         """Find thresholds, draw the map for the load that needs most, and estimate unbalance."""
+        from wm_drake.studies.drive.page import DriveResult
+
         options, parameters = self.options, self.machine.parameters
         run = partial(executor.simulate, self.machine, MEASURES)
         thresholds = find_thresholds(parameters, self.cases, run)

@@ -1,12 +1,10 @@
 """The study: a design of drawings, finite elements of each, runs, surfaces, the best drawing."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from wm_drake.batch import sources_version
 from wm_drake.batch.ledger import key_of
@@ -15,7 +13,6 @@ from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.elements import ForceTable, TorqueTable
-from wm_drake.parameters.files import yaml_text
 from wm_drake.parameters.gasket_drawing import GasketDrawing, load_gasket_drawing
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit, plain_number
@@ -31,7 +28,6 @@ from wm_drake.studies.gasket_curves.machine import (
 from wm_drake.studies.gasket_curves.study import curve_values, positive
 from wm_drake.studies.gasket_geometry.drawings import (
     FOLDS,
-    Factor,
     changed,
     factors_of,
     with_folds,
@@ -40,10 +36,10 @@ from wm_drake.studies.gasket_geometry.options import GeometryOptions
 from wm_drake.studies.gasket_geometry.surface import Surface, fit
 from wm_drake.studies.inputs import pairs_of, selected_cases
 from wm_drake.studies.run import Executor
-from wm_drake.studies.study import Facts, Result, Task
+from wm_drake.studies.study import Task
 
 if TYPE_CHECKING:
-    from rich.table import Table
+    from wm_drake.studies.gasket_geometry.page import GeometryResult
 
 MEASURES = ("amplitudes", "gap", "extremes")
 """Measures of the runs."""
@@ -78,92 +74,6 @@ class Computed:
     stretch: float
 
 
-@dataclass(frozen=True)
-class GeometryResult(Result):
-    """Result of the study.
-
-    Attributes:
-        name: Name or file of the drawing.
-        levels: Levels of all drawings: those of the design, fresh ones, that with the largest gap
-            on the surface. (n, factors)
-        responses: Their responses by name. (n,) each
-        design: Number of drawings of the design.
-        best: The drawing whose runs have the largest gap.
-        limits: Largest values of responses that the best drawing may have.
-        sample: Levels that are distributed as those of the design. (m, factors)
-    """
-
-    name: str
-    factors: tuple[Factor, ...]
-    levels: FloatArray
-    responses: dict[str, FloatArray]
-    design: int
-    surfaces: dict[str, Surface]
-    best: GasketDrawing
-    loads: tuple[str, ...]
-    limits: dict[str, float]
-    sample: FloatArray
-
-    @property
-    def kinds(self) -> list[str]:
-        """Return what each drawing is for."""
-        fresh = len(self.levels) - self.design - 1
-        return ["design"] * self.design + ["fresh"] * fresh + ["best of surface"]
-
-    @property
-    def best_at(self) -> int:
-        """Number of the best drawing that was run."""
-        return int(ranked(self.responses, self.limits)[0])
-
-    @property
-    def keeps_limits(self) -> bool:
-        """Whether the best drawing keeps all limits."""
-        return not excess(self.responses, self.limits)[self.best_at]
-
-    def warnings(self) -> Sequence[str]:
-        """Return whether no drawing keeps the limits."""
-        if self.keeps_limits:
-            return []
-        return ["no drawing that was run keeps all limits; the best one exceeds them the least"]
-
-    def errors(self, name: str) -> float:
-        """Return the RMS error of a surface on fresh drawings, by the response's range. [%]"""
-        fresh = slice(self.design, -1)
-        response = self.responses[name]
-        error = self.surfaces[name].at(self.levels[fresh]) - response[fresh]
-        spread = float(np.ptp(response[: self.design]))
-        return 100.0 * float(np.sqrt(np.mean(error**2))) / spread if spread else 0.0
-
-    def tables(self) -> dict[str, pd.DataFrame]:
-        """Return the drawings with their responses, and what the factors contribute."""
-        from wm_drake.studies.gasket_geometry.tables import contributions_table, drawings_table
-
-        return {"drawings": drawings_table(self), "contributions": contributions_table(self)}
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the tables for JSON."""
-        from wm_drake.studies.gasket_geometry.tables import as_plain_data
-
-        return as_plain_data(self)
-
-    def terminal(self) -> "Iterable[Table | str]":
-        """Return what the factors contribute, and the best drawing."""
-        from wm_drake.studies.gasket_geometry.page import contributions_shown, summary
-
-        return [contributions_shown(self).terminal(f"Gasket {self.name}"), summary(self)]
-
-    def page(self, facts: Facts) -> str:
-        """Return the page."""
-        from wm_drake.studies.gasket_geometry.page import geometry_page
-
-        return geometry_page(self, facts)
-
-    def write(self, folder: Path) -> None:
-        """Write the tables and the best drawing."""
-        super().write(folder)
-        (folder / "best.yaml").write_text(yaml_text(drawing_tree(self.best)), encoding="utf-8")
-
-
 def excess(responses: Mapping[str, FloatArray], limits: Mapping[str, float]) -> FloatArray:
     """Return by how much drawings exceed limits at most, in parts of the limit; 0 if not. (n,)"""
     parts = [responses[name] / limit - 1.0 for name, limit in limits.items()]
@@ -193,28 +103,6 @@ def limits_of(entries: Sequence[str]) -> dict[str, float]:
         if not 0.0 < limits[name] < np.inf:
             raise input_error(f"'{name}={text}': allowed is a number above 0", where="--limit")
     return limits
-
-
-def drawing_tree(drawing: GasketDrawing) -> dict[str, Any]:
-    """Return a drawing as the tree of its file."""
-    length = Unit("m", "mm")
-    points = [
-        {
-            name: length.text(round(getattr(point, name), 6))
-            for name in ("radius", "y", "thickness", "fillet")
-        }
-        for point in drawing.meridian
-    ]
-    rubber: dict[str, Any] = {"shore_a": drawing.rubber.shore_a}
-    if drawing.rubber.prony is None:
-        rubber["loss_factor"] = drawing.rubber.loss_factor
-    else:
-        times = ", ".join(map(repr, drawing.rubber.prony.time))
-        rubber["prony"] = {"time": f"({times}) s", "share": list(drawing.rubber.prony.share)}
-    if drawing.rubber.bulk_modulus is not None:
-        rubber["bulk_modulus"] = Unit("Pa", "MPa").text(drawing.rubber.bulk_modulus)
-    tree = {"about": drawing.about, "meridian": points, "rubber": rubber}
-    return tree if drawing.contact else tree | {"contact": False}
 
 
 def computed_curves(
@@ -303,8 +191,10 @@ class GeometryTask(Task):
             "seed": str(options.seed),
         }
 
-    def run(self, executor: Executor) -> GeometryResult:
+    def run(self, executor: Executor) -> "GeometryResult":
         """Compute all drawings, fit the surfaces, and verify the best drawing."""
+        from wm_drake.studies.gasket_geometry.page import GeometryResult
+
         assert executor.ledger is not None
         levels = np.concatenate([self.design, self.fresh])
         with executor.progress(len(levels), "drawings") as progress:
