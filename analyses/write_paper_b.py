@@ -11,36 +11,25 @@ them; the page says so.
 
 import argparse
 import tempfile
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 from analysis_tools import validation_page as page
 from analysis_tools.claims import claims
+from analysis_tools.gasket_study import LOADS, agreement, screening_of
 
 from wm_drake import Case, build_machine, load_machine, modes, simulate_many
 from wm_drake.batch.ledger import open_ledger
-from wm_drake.parameters import (
-    GASKET_FACTORS,
-    MachineParameters,
-    at_levels,
-    levels_of,
-    load_factors,
-    measured_amplitudes,
-    published_results,
-)
+from wm_drake.parameters import MachineParameters, measured_amplitudes, published_results
 from wm_drake.parameters.free import FreeFile
 from wm_drake.studies.calibration.calibration import Plan, calibrate, identity_of
 from wm_drake.studies.calibration.computed import Runner
 from wm_drake.studies.calibration.targets import EXPERIMENT, targets_of
-from wm_drake.studies.doe import make_design
 from wm_drake.studies.gasket.published import Published, published_for
-from wm_drake.studies.gasket.screening import Screening, run_screening
-from wm_drake.studies.gasket.study import GasketTrials
+from wm_drake.studies.gasket.screening import Screening
 
 REFERENCE = "reference"
 MACHINES = (REFERENCE, "reference_2026_11")
-LOADS = ("middle", "counter")
 ADAMS_SOURCE = "Adams model of [B]"
 DEVIATION = 0.1
 FREE_DAMPING = {
@@ -58,24 +47,6 @@ FREE_DAMPING = {
     },
 }
 """Free quantities of the search of the damping."""
-
-
-def screening_of(machine: MachineParameters, trials: int, tables: str = "linear") -> Screening:
-    """Return the gasket study of [B]; a D-optimal design below 243 trials.
-
-    Args:
-        machine: The machine.
-        trials: Number of trials.
-        tables: How a level changes a stiffness table; "linear" as in [B].
-    """
-    levels = levels_of(machine, load_factors(GASKET_FACTORS), tables)
-    kind = "orthogonal" if trials >= 243 else "d-optimal"
-    design = make_design(kind, tuple(level.name for level in levels), trials=trials)
-    middle = at_levels(machine, levels, [0] * len(levels))
-    loads = [Case(name, machine.loads[name], machine.profile) for name in LOADS]
-    study = GasketTrials(middle, levels, loads, ["D", "F", "M"])
-    run = partial(simulate_many, build_machine(middle), measures=study.measures)
-    return run_screening(design, lambda plan: study.responses(plan, run))
 
 
 def amplitude_lines(machines: dict[str, MachineParameters]) -> list[list[str]]:
@@ -172,15 +143,13 @@ def study_lines(
 
 def summary(name: str, screening: Screening, published: Published) -> list[str]:
     """Return the numbers that sum up a machine."""
-    leaders = published.leaders(screening).values()
-    points = np.abs(list(published.main_points(screening).values()))
-    means = [published.mean_difference(screening, label) or 0.0 for label in screening.tables]
+    found = agreement(screening, published)
     return [
         name,
-        f"{sum(ours == theirs for ours, theirs in leaders)} of {len(leaders)}",
-        f"{points.mean():.1f} / {points.max():.0f}",
-        f"{np.abs(means).mean():.1f} / {np.abs(means).max():.0f}",
-        str(len(published.other_signs(screening))),
+        f"{found.leaders} of {found.responses}",
+        f"{found.points.mean():.1f} / {found.points.max():.0f}",
+        f"{found.means.mean():.1f} / {found.means.max():.0f}",
+        str(found.other_signs),
     ]
 
 

@@ -24,6 +24,7 @@ from analysis_tools.validation_rows import (
     counts,
     effect_rows,
     held_out_rows,
+    held_out_table_rows,
     mean_rows,
     spin_cycle_rows,
 )
@@ -135,7 +136,7 @@ def test_held_out_loads_are_judged_by_their_mean_and_their_intervals():
     table = pd.DataFrame(
         {
             "held_out": ["back front"],
-            "amplitudes": [12],
+            "values": [12],
             "calibrated_mean_percent": [8.5],
             "predicted_mean_percent": [18.3],
             "predicted_largest_percent": [48.9],
@@ -146,6 +147,36 @@ def test_held_out_loads_are_judged_by_their_mean_and_their_intervals():
     assert mean.quantity == "back and front: mean difference of 12 amplitudes"
     assert (mean.ours, mean.verdict, mean.kind) == ("18.3 %", MISSED, PREDICTED)
     assert (covered.ours, covered.verdict) == ("100 %", MET)
+
+
+def test_held_out_tables_of_b_are_judged_by_leading_factors_points_and_intervals():
+    numbers = {"calibrated_mean_percent": 5.0, "predicted_largest_percent": 40.0}
+    kinds = pd.DataFrame(
+        [
+            numbers | {"held_out": "counter", "what": "contributions", "values": 13,
+                       "predicted_mean_percent": 11.9, "in_intervals_percent": 80.0},
+            numbers | {"held_out": "back front", "what": "amplitudes", "values": 12,
+                       "predicted_mean_percent": 12.1, "in_intervals_percent": 91.0},
+        ]
+    )  # fmt: skip
+    studies = pd.DataFrame(
+        {
+            "held_out": ["counter", "counter"],
+            "fit": ["calibrated", "predicted"],
+            "responses": [9, 9],
+            "same_leading_factor": [9, 7],
+        }
+    )
+    table = {row.quantity: row for row in held_out_table_rows(kinds, studies)}
+    assert {name: row.verdict for name, row in table.items()} == {
+        "counter: leading factors": MISSED,
+        "counter: mean difference of 13 contributions": MET,
+        "counter: in the 95 % intervals: 13 contributions": OPEN,
+        "back and front: mean difference of 12 amplitudes": MISSED,
+        "back and front: in the 95 % intervals: 12 amplitudes": MET,
+    }
+    assert table["counter: leading factors"].ours == "7 of 9"
+    assert table["counter: mean difference of 13 contributions"].ours == "11.9 points"
 
 
 def test_part_ends_with_tables_without_verdicts(amplitude_table):

@@ -212,6 +212,25 @@ def test_point_without_a_machine_is_nan_and_does_not_change_others(short, tmp_pa
         assert np.isfinite(array[0]).all()
 
 
+def test_point_whose_step_is_too_long_is_nan_and_the_first_start_is_refused(short, tmp_path):
+    path = tmp_path / "free.yaml"
+    path.write_text(
+        "quantities: {damping: {bounds: '(0, 300) N*s/mm', prior: '(200, 40) N*s/mm', source: test,"
+        " sets: damper_types.friction.damping}}\n"
+    )
+    parameter_map = parameter_map_of(short, load_free(path))
+    evaluation = Evaluation(short, parameter_map, one_case(short))
+    values = evaluation(np.array([[50.0], [200e3], [100.0]]))
+    assert np.isfinite(values.amplitude).all(axis=(1, 2)).tolist() == [True, False, True]
+    assert np.array_equal(values.amplitude[2], evaluation(np.array([[100.0]])).amplitude[0])
+    targets = planted(short, parameter_map, [50.0], loads=(("middle", True),))
+    with (
+        open_ledger(tmp_path / "ledger.sqlite", {}) as ledger,
+        pytest.raises(InputError, match="is too long for the tub"),
+    ):
+        calibrate(Runner(short, ledger), load_free(path), targets, Plan(starts=1, iterations=1))
+
+
 def test_point_that_only_the_gasket_holds_is_nan_for_loads_without_it(short, tmp_path):
     hooks = {f"frames.spring_{n}_housing.position.y": s for n, s in short.set_up().springs.items()}
     quantity = {"bounds": "(-20, 20) mm", "prior": "(0, 10) mm", "sets": dict.fromkeys(hooks, 1)}
@@ -390,20 +409,18 @@ def test_start_values_of_the_free_file_are_not_used_for_predictions(short, recov
     identity = identity_of(short, started, targets, plan)
     with open_ledger(tmp_path / "ledger.sqlite", identity) as ledger:
         (again,) = predict(Runner(short, ledger), started, calibration, [["middle"]])
-    assert np.array_equal(again.predicted, predictions[0].predicted)
+    assert np.array_equal(again.amplitude, predictions[0].amplitude)
 
 
 def test_held_out_loads_are_predicted_from_the_others(recovered):
     (prediction,) = recovered[5]
     assert prediction.loads == ("middle",)
     (row,) = prediction_table([prediction]).to_dict("records")
-    assert (row["held_out"], row["amplitudes"]) == ("middle", prediction.predicted.size)
-    assert row["predicted_mean_percent"] == pytest.approx(
-        100.0 * np.abs(prediction.predicted).mean()
-    )
-    assert prediction.predicted.shape == (1, 6)
-    assert np.abs(prediction.predicted).max() < 0.05
-    assert not np.array_equal(prediction.predicted, prediction.calibrated)
+    (kind,) = prediction.kinds()
+    assert (row["held_out"], row["what"], row["values"]) == ("middle", "amplitudes", 6)
+    assert row["predicted_mean_percent"] == pytest.approx(100.0 * np.abs(kind.predicted).mean())
+    assert np.abs(kind.predicted).max() < 0.05
+    assert not np.array_equal(kind.predicted, kind.calibrated)
 
 
 def test_fewer_quantities_cost_more_and_the_least_determined_goes_first(recovered, short, tmp_path):

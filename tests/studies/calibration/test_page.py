@@ -55,16 +55,12 @@ def calibration(machine, tmp_path_factory):
 def page(machine, calibration):
     short = SpinProfile(time=(0.0, 3.0), speed=(5.0, 20.0))
     cases = [Case(name, machine.parameters.loads[name], short, gasket) for name, gasket in LOADS]
-    predictions = [
-        Prediction(
-            ("back",),
-            np.full((1, 6), 0.02),
-            np.full((1, 6), -0.31),
-            np.full((1, 6), 0.04),
-            np.array([np.full((1, 6), -0.5), [[0.1, 0.1, 0.1, -0.1, -0.1, -0.1]]]),
-            0.07,
-        )
-    ]
+    measured, best = calibration.targets.amplitude, calibration.solutions[0]
+    seen = calibration.targets.without("back")
+    without = replace(best, targets=seen, amplitude=1.04 * seen.amplitude)
+    ends = np.array([0.69, 0.5, 1.0])[:, None, None] * measured
+    ends[2] += 0.001 * np.array([1, 1, 1, -1, -1, -1])  # of 10 mm
+    predictions = [Prediction(("back",), best, without, ends, np.empty((3, 0)), 0.07)]
     modes = [("without gasket", natural_modes(machine, gasket=False))]
     best = run_spin(machine.parameters, cases)
     result = CalibrateResult(calibration, predictions)

@@ -15,14 +15,18 @@ from wm_drake.parameters.measured import measured_amplitudes, measured_responses
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.calibration.computed import Evaluation
 from wm_drake.studies.calibration.parameter_map import parameter_map_of
+from wm_drake.studies.calibration.prediction import Prediction
 from wm_drake.studies.calibration.response_targets import (
     ComputedResponses,
     _Design,
     response_targets_of,
     with_deviations,
 )
+from wm_drake.studies.calibration.solutions import Solution
+from wm_drake.studies.calibration.tables import prediction_table
 from wm_drake.studies.calibration.targets import targets_of
 from wm_drake.studies.doe import orthogonal_levels
+from wm_drake.studies.fitting.posterior import Posterior
 
 HEAD = "load,gasket,source,of,Fx [N],My [N*mm]\n"
 ROWS = "middle,yes,test,machine,50,4000\ncounter,yes,test,machine,30,2000\n"
@@ -142,6 +146,42 @@ def test_effects_and_contributions_of_a_design_are_targets(short, tmp_path):
     limited = of_all.limited({"effect": 0.01})
     beyond = limited.excesses(of_all.amplitude, np.array(found), np.ones((6, 6)))
     assert beyond == pytest.approx([-0.5, 0.5])
+
+
+def test_values_of_held_out_loads_are_predicted_by_kind(short, tmp_path):
+    text = OF_STUDY + "counter,Fx,constant,,30\ncounter,Fx,C_T,40,\n"
+    targets = targets_of(
+        short.parameters,
+        measured_amplitudes(load_machine("reference")),
+        responses=named(short, tmp_path, text),
+    )
+    wanted = np.array([target.value for target in targets.responses])
+    for target, value in zip(targets.responses, wanted, strict=True):
+        assert target.misfits(target.scattered(value, 0.2)) == pytest.approx(0.2)
+    others = targets.without("counter")
+    amplitude, responses = 1.1 * targets.amplitude, wanted.copy()
+    responses[[target.load == "counter" for target in targets.responses]] = [33.0, 50.0]
+    limits = np.stack([responses, responses - 11.0, responses + 4.0])
+    posterior = Posterior(np.zeros(1), np.ones((1, 1)), 1)
+    with_all, without = (
+        Solution(None, t, 0, np.zeros(1), a, r, 1.0, 0.0, posterior, 1)
+        for t, a, r in (
+            (targets, targets.amplitude, wanted),
+            (others, 1.2 * others.amplitude, wanted[: len(others.responses)]),
+        )
+    )
+    bounds = np.stack([amplitude, 0.9 * amplitude, 1.2 * amplitude])
+    prediction = Prediction(("counter",), with_all, without, bounds, limits, 0.04)
+    table = prediction_table([prediction]).set_index("what")
+    assert table["values"].to_dict() == {"amplitudes": 12, "means": 1, "contributions": 1}
+    assert table.predicted_mean_percent.to_dict() == pytest.approx(
+        {"amplitudes": 10.0, "means": 10.0, "contributions": 10.0}
+    )
+    assert table.seen_mean_percent["amplitudes"] == pytest.approx(20.0)
+    assert table.in_intervals_percent.tolist() == [100.0, 100.0, 100.0]
+    assert (table.calibrated_mean_percent == 0.0).all()
+    below = replace(prediction, responses=limits + 20.0)
+    assert [kind.is_covered.all() for kind in below.kinds()] == [True, False, False]
 
 
 @pytest.mark.parametrize(

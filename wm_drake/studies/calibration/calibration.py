@@ -14,7 +14,7 @@ from wm_drake.studies.calibration.computed import Runner, StoredValues
 from wm_drake.studies.calibration.parameter_map import ParameterMap, parameter_map_of
 from wm_drake.studies.calibration.solutions import Solution, distinct
 from wm_drake.studies.calibration.targets import Targets
-from wm_drake.studies.fitting.kinks import METHODS, smooth_jacobian, start_number
+from wm_drake.studies.fitting.kinks import DRAWS, METHODS, smooth_jacobian, start_number
 from wm_drake.studies.fitting.posterior import Posterior
 from wm_drake.studies.fitting.problem import PriorProblem, Residuals, Unknown
 from wm_drake.studies.fitting.search import Search
@@ -56,6 +56,8 @@ class Plan:
             resolution / sqrt(12). [m]
         draws: Number of machines that are drawn from the posterior for the interval of a
             prediction.
+        start_draws: Number of machines that are drawn for each random start, which is the best of
+            them.
     """
 
     method: str = "least-squares"
@@ -65,6 +67,7 @@ class Plan:
     deviation: float = RELATIVE_DEVIATION
     resolution: float = RESOLUTION
     draws: int = 200
+    start_draws: int = DRAWS
 
     def check(self) -> None:
         """Check the method; the options of the study have the limits of the numbers.
@@ -131,16 +134,19 @@ def calibrate(runner: Runner, free: FreeFile, targets: Targets, plan: Plan) -> C
         plan: Settings of the search.
 
     Raises:
-        InputError: the free file does not fit the machine, or a setting of the plan is not allowed.
+        InputError: the free file does not fit the machine, the machine of the first start cannot be
+            run, or a setting of the plan is not allowed.
     """
     plan.check()
     parameter_map = parameter_map_of(runner.machine, free)
     values = runner.values(parameter_map, targets)
+    if np.isnan(values(parameter_map.start[None]).amplitude).all():
+        values.evaluation.check(parameter_map.start)
     problem = calibration_problem(values, plan)
     ended = []
     for number in range(plan.starts):
         search = Search(problem, runner.report_of(number))
-        start = start_number(search, number, plan.seed)
+        start = start_number(search, number, plan.seed, plan.start_draws)
         iterations = plan.iterations or ITERATIONS[plan.method]
         end = METHODS[plan.method](search, start, iterations, plan.seed + number)
         ended.append(_solution(number, search, end.point, values))

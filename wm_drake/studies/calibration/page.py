@@ -183,12 +183,12 @@ def summary(calibration: Calibration, predictions: Sequence[Prediction]) -> str:
         text += f" Beyond their limits: {', '.join(beyond)}."
     if predictions:
         covered = float(np.mean([p.covered for p in predictions]))
-        worst = max(predictions, key=lambda p: percents_of(p.predicted).mean)
+        of_each = [percents_of(p.kinds()[0].predicted).mean for p in predictions]
+        worst = int(np.argmax(of_each))
         text += (
-            " Held-out loads are predicted with a mean absolute difference of at most "
-            f"{number(percents_of(worst.predicted).mean)} % (worst case: "
-            f"{', '.join(worst.loads)}). Their 95 % intervals contain "
-            f"{number(100 * covered, 0)} % of the measured amplitudes."
+            " Amplitudes of held-out loads are predicted with a mean absolute difference of at "
+            f"most {number(of_each[worst])} % (worst case: {', '.join(predictions[worst].loads)}). "
+            f"The 95 % intervals contain {number(100 * covered, 0)} % of the held-out values."
         )
     return text
 
@@ -286,10 +286,10 @@ def relations_table(calibration: Calibration) -> Table | None:
 def intervals_table(calibration: Calibration, prediction: Prediction) -> Table:
     """Return the predicted amplitudes of held-out loads with their 95 % intervals. [mm]"""
     targets = calibration.targets
-    cases = targets.of(*prediction.loads)
-    measured = MM_PER_M * targets.amplitude[cases]
-    lower, upper = measured * (1.0 + prediction.interval)
-    predicted = measured * (1.0 + prediction.predicted)
+    cases = prediction.cases
+    measured, predicted, lower, upper = (
+        MM_PER_M * amplitude[cases] for amplitude in (targets.amplitude, *prediction.amplitude)
+    )
     held = [case for case, is_held in zip(targets.loads, cases, strict=True) if is_held]
     groups = []
     for row, (load, gasket) in enumerate(held):
@@ -302,7 +302,7 @@ def intervals_table(calibration: Calibration, prediction: Prediction) -> Table:
         groups.append(Group(f"{load}, {'with' if gasket else 'without'} gasket", rows))
     caption = (
         f"Held out: {', '.join(prediction.loads)}. Predicted amplitudes, mm. "
-        f"The intervals contain {number(100 * prediction.covered, 0)} % "
+        f"The intervals contain {number(100 * np.mean(prediction.kinds()[0].is_covered), 0)} % "
         "of the measured ones. They allow for the uncertainty of the free quantities and for a "
         f"scatter of {number(100 * prediction.scatter, 0)} % of an amplitude."
     )

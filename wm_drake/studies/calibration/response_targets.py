@@ -84,6 +84,13 @@ class ResponseTarget:
         """`EFFECT`, `CONTRIBUTION`, or "" for a value that is never below 0."""
         return (EFFECT if self.level is not None else CONTRIBUTION) if self.factor else ""
 
+    @property
+    def kind_of_value(self) -> str:
+        """`effects`, `contributions`, `means` over a design, or `responses` of the machine."""
+        if self.statistic:
+            return f"{self.statistic}s"
+        return "means" if self.of_design else "responses"
+
     def errors(self, values: FloatArray) -> FloatArray:
         """Return differences from the target, as fractions like `deviation`."""
         if not self.factor:
@@ -94,6 +101,12 @@ class ResponseTarget:
     def misfits(self, values: FloatArray) -> FloatArray:
         """Return the logarithms of the ratios to the target, or `errors` of effects and such."""
         return self.errors(values) if self.factor else np.log(values / self.value)
+
+    def scattered(self, values: FloatArray, misfits: FloatArray) -> FloatArray:
+        """Return values that miss by `misfits` more; the inverse of `misfits`."""
+        if not self.factor:
+            return values * np.exp(misfits)
+        return values + misfits * (self.mean if self.level is not None else 100.0)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -33,7 +33,7 @@ from wm_drake.studies.calibration.prediction import Prediction, check_held_out, 
 from wm_drake.studies.calibration.response_targets import with_deviations
 from wm_drake.studies.calibration.solutions import percents_of
 from wm_drake.studies.calibration.tables import (
-    KINDS,
+    FITS,
     amplitude_rows,
     fewer_shown,
     fewer_table,
@@ -95,7 +95,7 @@ class CalibrateResult(Result):
             "quantities": json.loads(quantity_table(calibration).to_json(orient="records")),
             "predictions": [
                 {"loads": list(p.loads)}
-                | {kind: percents_of(getattr(p, kind)).named() for kind in KINDS}
+                | {fit: percents_of(getattr(p.kinds()[0], fit)).named() for fit in FITS}
                 | {"covered_percent": 100 * p.covered}
                 for p in self.predictions
             ],

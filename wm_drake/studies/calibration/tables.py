@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from wm_drake.report.table import Column, Table, table_of
@@ -127,28 +128,34 @@ def responses_shown(calibration: Calibration) -> Table:
     return table_of(frame[list(RESPONSES)], caption, RESPONSES)
 
 
-KINDS = ("calibrated", "predicted", "seen")
-"""Errors of a prediction, by the names of its attributes."""
+FITS = ("calibrated", "predicted", "seen")
+"""Errors of a kind of values in a prediction, by the names of its attributes."""
 
 
 def prediction_table(predictions: Sequence[Prediction]) -> pd.DataFrame:
-    """Return a table with a row for each group of held-out loads; differences in percent."""
+    """Return a table with a row for each kind of values of each group of held-out loads.
+
+    Differences are in percent; those of effects in percent of the mean, those of contributions in
+    points.
+    """
     rows = []
     for prediction in predictions:
-        row: dict[str, object] = {"held_out": " ".join(prediction.loads)}
-        row["amplitudes"] = prediction.predicted.size
-        for kind in KINDS:
-            row |= percents_of(getattr(prediction, kind)).named(f"{kind}_")
-        rows.append(row | {"in_intervals_percent": 100.0 * prediction.covered})
+        for kind in prediction.kinds():
+            row: dict[str, object] = {"held_out": " ".join(prediction.loads), "what": kind.name}
+            row["values"] = kind.predicted.size
+            for fit in FITS:
+                row |= percents_of(getattr(kind, fit)).named(f"{fit}_")
+            rows.append(row | {"in_intervals_percent": 100.0 * float(np.mean(kind.is_covered))})
     return pd.DataFrame(rows)
 
 
 PREDICTIONS = {
     "held_out": Column("held-out loads"),
-    "amplitudes": Column("amplitudes", decimals=0),
+    "what": Column("values"),
+    "values": Column("number", decimals=0),
     **{
-        f"{kind}_{error}_percent": Column(f"{kind}: {error}", "%", 1)
-        for kind in KINDS
+        f"{fit}_{error}_percent": Column(f"{fit}: {error}", "%", 1)
+        for fit in FITS
         for error in ("mean", "largest")
     },
     "in_intervals_percent": Column("in the 95 % intervals", "%", 0),
@@ -159,9 +166,10 @@ PREDICTIONS = {
 def predictions_shown(predictions: Sequence[Prediction]) -> Table:
     """Return the errors of loads when they were used for the calibration and when held out."""
     caption = (
-        "Absolute differences from the experiment. Calibrated: these loads in the calibration "
-        "above, which used them. Predicted: these loads when they were held out. Seen: the "
-        "remaining loads in the calibration without them."
+        "Absolute differences from the targets; those of effects in percent of the mean, those of "
+        "contributions in points. Calibrated: these loads in the calibration above, which used "
+        "them. Predicted: these loads when they were held out. Seen: the remaining loads in the "
+        "calibration without them."
     )
     return table_of(prediction_table(predictions), caption, PREDICTIONS)
 

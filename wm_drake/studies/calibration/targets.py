@@ -147,13 +147,15 @@ class Targets:
         return np.array([name in loads for name, _ in self.loads])
 
     def without(self, *loads: str) -> "Targets":
-        """Return the targets with the weights of these loads set to 0."""
-        kept = np.where(self.of(*loads)[:, None], 0.0, self.weight)
-        responses = tuple(
-            replace(target, weight=0.0) if target.load in loads else target
-            for target in self.responses
+        """Return the targets of the other loads."""
+        kept = ~self.of(*loads)
+        return replace(
+            self,
+            loads=tuple(case for case in self.loads if case[0] not in loads),
+            amplitude=self.amplitude[kept],
+            weight=self.weight[kept],
+            responses=tuple(target for target in self.responses if target.load not in loads),
         )
-        return replace(self, weight=kept, responses=responses)
 
     def limited(self, limits: Mapping[str, float]) -> "Targets":
         """Return the targets with limits of the relative differences.

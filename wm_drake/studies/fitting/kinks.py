@@ -28,7 +28,7 @@ START_SPREAD = 0.7
 """Standard deviation of random starts around the first one, in prior deviations."""
 
 DRAWS = 24
-"""Number of points that are drawn for a random start or a hop; the best one is used.
+"""Usual number of points that are drawn for a random start or a hop; the best one is used.
 
 This costs less than one Jacobian and saves several of them.
 """
@@ -43,20 +43,33 @@ POLISH = 10
 """Limit of iterations of least squares after CMA-ES or a hop."""
 
 
-def start_number(search: Search[PriorProblem], number: int, seed: int) -> FloatArray:
+def start_number(
+    search: Search[PriorProblem], number: int, seed: int, draws: int = DRAWS
+) -> FloatArray:
     """Return the start with a number.
 
     Start 0 is that of the problem. Each other start is the best of some points that are drawn
     around it.
+
+    Args:
+        search: The search.
+        number: Number of the start.
+        seed: Seed of the random numbers.
+        draws: Number of points that are drawn.
     """
     begin = search.clipped(search.problem.start)
     if number == 0:
         return begin
-    return best_near(search, begin, START_SPREAD, np.random.default_rng([seed, number]))
+    generator = np.random.default_rng([seed, number])
+    return best_near(search, begin, START_SPREAD, generator, draws)
 
 
 def best_near(
-    search: Search[PriorProblem], point: FloatArray, spread: float, generator: np.random.Generator
+    search: Search[PriorProblem],
+    point: FloatArray,
+    spread: float,
+    generator: np.random.Generator,
+    draws: int = DRAWS,
 ) -> FloatArray:
     """Return the best of some points that are drawn around a point.
 
@@ -65,8 +78,9 @@ def best_near(
         point: (p,) centre of the normal distribution.
         spread: Standard deviation of each coordinate.
         generator: Source of random numbers.
+        draws: Number of points that are drawn.
     """
-    points = search.clipped(point + generator.normal(0.0, spread, (DRAWS, len(point))))
+    points = search.clipped(point + generator.normal(0.0, spread, (draws, len(point))))
     return np.asarray(points[int(np.argmin(search.costs(points)))])
 
 

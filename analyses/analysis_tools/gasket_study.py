@@ -1,0 +1,97 @@
+"""The gasket study of [B], section 4, of a machine, and how well it agrees with the paper."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from wm_drake.batch import simulate_many
+from wm_drake.model.build import build_machine
+from wm_drake.parameters import (
+    GASKET_FACTORS,
+    MachineParameters,
+    at_levels,
+    levels_of,
+    load_factors,
+)
+from wm_drake.simulation.cases import Case
+from wm_drake.studies.doe import make_design
+from wm_drake.studies.gasket.published import Published
+from wm_drake.studies.gasket.screening import Screening, run_screening
+from wm_drake.studies.gasket.study import GasketTrials
+
+ORTHOGONAL = 243
+"""Trials of the orthogonal array; a study of fewer trials has a D-optimal design."""
+
+LOADS = ("middle", "counter")
+"""Loads of the study."""
+
+
+def screening_of(
+    machine: MachineParameters,
+    trials: int = ORTHOGONAL,
+    tables: str = "linear",
+    loads: Sequence[str] = LOADS,
+) -> Screening:
+    """Return the gasket study of a machine.
+
+    Args:
+        machine: The machine.
+        trials: Number of trials.
+        tables: How a level changes a stiffness table; "linear" as in [B].
+        loads: Names of the loads.
+    """
+    levels = levels_of(machine, load_factors(GASKET_FACTORS), tables)
+    kind = "orthogonal" if trials >= ORTHOGONAL else "d-optimal"
+    design = make_design(kind, tuple(level.name for level in levels), trials=trials)
+    middle = at_levels(machine, levels, [0] * len(levels))
+    cases = [Case(name, machine.loads[name], machine.profile) for name in loads]
+    study = GasketTrials(middle, levels, cases, ["D", "F", "M"])
+    run = partial(simulate_many, build_machine(middle), measures=study.measures)
+    return run_screening(design, lambda plan: study.responses(plan, run))
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How well a gasket study agrees with the published one.
+
+    Attributes:
+        leaders: Number of responses whose largest main effect is the published one.
+        responses: Number of responses.
+        points: Absolute differences of the contributions of main effects. [points]
+        means: Absolute differences of the grand means. [%]
+        other_signs: Number of terms whose effects have another sign.
+    """
+
+    leaders: int
+    responses: int
+    points: np.ndarray
+    means: np.ndarray
+    other_signs: int
+
+    def row(self) -> dict[str, float]:
+        """Return the numbers by name, for a table."""
+        return {
+            "responses": self.responses,
+            "same_leading_factor": self.leaders,
+            "contributions_mean_points": float(self.points.mean()),
+            "contributions_largest_points": float(self.points.max()),
+            "means_mean_percent": float(self.means.mean()),
+            "means_largest_percent": float(self.means.max()),
+            "other_signs": self.other_signs,
+        }
+
+
+def agreement(screening: Screening, published: Published) -> Agreement:
+    """Return how well a study agrees with the published one."""
+    leaders = published.leaders(screening).values()
+    points = list(published.main_points(screening).values())
+    means = [published.mean_difference(screening, label) or 0.0 for label in screening.tables]
+    return Agreement(
+        sum(ours == theirs for ours, theirs in leaders),
+        len(leaders),
+        np.abs(points),
+        np.abs(means),
+        len(published.other_signs(screening)),
+    )
