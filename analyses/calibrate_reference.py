@@ -161,7 +161,7 @@ def _searched(arguments: argparse.Namespace) -> tuple[FreeFile, Plan, tuple[tupl
 
 def _targets_for(arguments: argparse.Namespace, parameters: MachineParameters) -> Targets:
     if arguments.machine == REFERENCE and not arguments.quick:
-        return _adams_targets(parameters)
+        return adams_targets(parameters)
     targets = _targets(parameters, with_means=not arguments.quick)
     return targets if arguments.quick or arguments.fewer else targets.limited(LIMITS)
 
@@ -189,7 +189,7 @@ def _targets(parameters: MachineParameters, *, with_means: bool) -> Targets:
     return replace(targets, responses=responses)
 
 
-def _adams_targets(parameters: MachineParameters) -> Targets:
+def adams_targets(parameters: MachineParameters) -> Targets:
     """Return amplitudes of the Adams model, measured ones where it has none, and all of Table 5."""
     table = measured_amplitudes(parameters)
     table = table.sort_values("source", key=lambda source: source != ADAMS_SOURCE, kind="stable")

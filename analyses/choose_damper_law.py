@@ -1,0 +1,157 @@
+"""Which damper law do the printed results of the Adams model of [B] choose?
+
+The script fits the free quantities of reference_free.yaml to the targets of calibrate_reference.py,
+once with each damper law, from the shipped machine on, by the same number of iterations. Friction
+may fall to 5 N. It prints the cost and the errors of each law, and the friction that it finds.
+
+    python analyses/choose_damper_law.py
+"""
+
+import argparse
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from analysis_tools import validation_page as page
+from calibrate_reference import ADAMS_PLAN, REFERENCE, adams_targets
+
+from wm_drake.batch.ledger import open_ledger
+from wm_drake.model.build import build_machine
+from wm_drake.parameters import load_machine
+from wm_drake.parameters.damper_laws import DAMPER_LAWS
+from wm_drake.parameters.files import read_yaml, yaml_text
+from wm_drake.parameters.free import FreeFile
+from wm_drake.report.progress import progress_bar
+from wm_drake.studies.calibration.calibration import calibrate, identity_of
+from wm_drake.studies.calibration.computed import Runner
+from wm_drake.studies.calibration.solutions import Solution, percents_of
+
+FREE = Path(__file__).with_name("reference_free.yaml")
+KEY = "damper_types.friction"
+ITERATIONS = 12
+FRICTION = "(5, 90) N"
+"""Bounds of the friction."""
+
+ONLY_HAVSIN = {"full_friction_velocity"}
+SPONGE = {
+    "sponge_stiffness": ("(5, 100) N/mm", "(30, 15) N/mm"),
+    "sponge_damping": ("(0.005, 0.3) N*s/mm", "(0.1, 0.04) N*s/mm"),
+    "slider_damping": ("(0.001, 0.3) N*s/mm", "(0.05, 0.04) N*s/mm"),
+}
+TRANSITION = {"transition_velocity": ("(5, 600) mm/s", "(150, 100) mm/s")}
+FREE_NUMBERS: dict[str, dict[str, tuple[str, str]]] = {
+    "coulomb": {},
+    "stv": TRANSITION,
+    "havsin": {"full_friction_velocity": TRANSITION["transition_velocity"]},
+    "mstv": SPONGE,
+    "stv_sponge": TRANSITION | SPONGE,
+    "free_stroke": {
+        "friction_damping": ("(0.001, 0.3) N*s/mm", "(0.06, 0.04) N*s/mm"),
+        "basic_friction_force": ("(1, 60) N", "(10, 8) N"),
+        "basic_full_friction_velocity": TRANSITION["transition_velocity"],
+    },
+}
+"""Bounds and prior of the numbers that each law has beside friction and dashpot."""
+
+FREE_STROKE = {
+    "displacement": "(-20, -14, -10, -7, -5, -3, 3, 5, 7, 10, 14, 20) mm",
+    "force": "(-160, -75, -38, -18, -7, 0, 0, 7, 18, 38, 75, 160) N",
+}
+"""Sponge of the free-stroke damper, that of the machine `free_stroke`."""
+
+DASHPOT = {"coulomb", "stv", "havsin"}
+"""Laws with a dashpot beside the friction."""
+
+
+def machine_text(law: str) -> str:
+    """Return a machine file that gives the reference machine dampers of another law."""
+    numbers: dict[str, Any] = {"law": law, "friction_force": "34.4 N"}
+    numbers |= {"full_friction_velocity": None, "damping": None}
+    numbers |= {name: prior_mean(prior) for name, (_, prior) in FREE_NUMBERS[law].items()}
+    if law in DASHPOT:
+        numbers["damping"] = "0.052 N*s/mm"
+    if law == "free_stroke":
+        numbers["sponge"] = FREE_STROKE
+    return yaml_text(
+        {"extends": REFERENCE, "name": f"reference_{law}", "damper_types": {"friction": numbers}}
+    )
+
+
+def prior_mean(prior: str) -> str:
+    """Return the expected value of a prior such as ``(30, 15) N/mm``."""
+    numbers, unit = prior[1:].split(")")
+    return f"{numbers.split(',')[0]}{unit}"
+
+
+def free_of(law: str) -> FreeFile:
+    """Return the free quantities of the reference machine with the numbers of a law."""
+    tree = read_yaml(FREE)
+    quantities = tree["quantities"]
+    for name in ONLY_HAVSIN | (set() if law in DASHPOT else {"damper_damping"}):
+        del quantities[name]
+    quantities["damper_friction"]["bounds"] = FRICTION
+    for name, (bounds, prior) in FREE_NUMBERS[law].items():
+        quantities[name] = {
+            "bounds": bounds,
+            "prior": prior,
+            "sets": {f"{KEY}.{name}": 1},
+            "source": f"order of the dampers of [A] and [C]; law {law}",
+        }
+    return FreeFile.model_validate(tree)
+
+
+def row_of(law: str, best: Solution) -> dict[str, Any]:
+    """Return what a fit with a law comes to."""
+    targets = best.targets.responses
+    errors = best.response_errors
+    row: dict[str, Any] = {"law": law, "cost": round(best.cost)}
+    row["amplitudes, %"] = percents_of(best.errors)
+    for kind, unit in (("means", "%"), ("effects", "%"), ("contributions", "points")):
+        chosen = [target.kind_of_value == kind for target in targets]
+        row[f"{kind}, {unit}"] = percents_of(errors[chosen])
+    names = best.parameter_map.names
+    values = dict(zip(names, best.parameter_map.in_units(best.point), strict=True))
+    row["friction, N"] = f"{values['damper_friction']:.1f}"
+    others = ((name, values[name]) for name in (*FREE_NUMBERS[law], "damper_damping"))
+    row["others"] = ", ".join(f"{name} {value:.3g}" for name, value in others if name in values)
+    row["at bounds"] = best.verdicts().count("bound")
+    return {
+        key: f"{value.mean:.1f} / {value.largest:.0f}" if hasattr(value, "largest") else value
+        for key, value in row.items()
+    }
+
+
+def main() -> None:
+    """Fit with each law and print a table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="one law, three quantities, one step")
+    parser.add_argument("--out", type=Path, help="also write the result to this file")
+    arguments = parser.parse_args()
+    laws = list(FREE_NUMBERS)[:1] if arguments.quick else list(DAMPER_LAWS)
+    plan = replace(ADAMS_PLAN, iterations=1 if arguments.quick else ITERATIONS)
+    rows = []
+    with tempfile.TemporaryDirectory() as folder, progress_bar(len(laws), "laws") as done:
+        for number, law in enumerate(laws, start=1):
+            path = Path(folder) / f"{law}.yaml"
+            path.write_text(machine_text(law), encoding="utf-8")
+            machine, free = build_machine(load_machine(path)), free_of(law)
+            targets = adams_targets(load_machine(REFERENCE))
+            if arguments.quick:
+                few = ("damper_friction", "damper_damping", "motor_mass")
+                free = FreeFile(quantities={name: free.quantities[name] for name in few})
+                targets = targets.without("middle", "back", "front")
+            identity = identity_of(machine, free, targets, plan)
+            with open_ledger(path.with_suffix(".sqlite"), identity) as ledger:
+                found = calibrate(Runner(machine, ledger), free, targets, plan)
+            rows.append(row_of(law, found.solutions[0]))
+            done(number)
+    rows.sort(key=lambda row: float(row["cost"]))
+    lines = [[str(cell) for cell in row.values()] for row in rows]
+    text = page.table_text("Damper laws", list(rows[0]), lines)
+    print(text)
+    page.write(text, arguments.out, None)
+
+
+if __name__ == "__main__":
+    main()
