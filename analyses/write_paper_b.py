@@ -20,7 +20,12 @@ from analysis_tools.gasket_study import LOADS, agreement, screening_of
 
 from wm_drake import Case, build_machine, load_machine, modes, simulate_many
 from wm_drake.batch.ledger import open_ledger
-from wm_drake.parameters import MachineParameters, measured_amplitudes, published_results
+from wm_drake.parameters import (
+    MachineParameters,
+    SpinProfile,
+    measured_amplitudes,
+    published_results,
+)
 from wm_drake.parameters.free import FreeFile
 from wm_drake.studies.calibration.calibration import Plan, calibrate, identity_of
 from wm_drake.studies.calibration.computed import Runner
@@ -233,12 +238,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--quick", action="store_true", help="150 trials in place of 243")
+    parser.add_argument("--quick", action="store_true", help="150 trials, runs of 2 s")
     parser.add_argument("--page", type=Path, help="page to renew between its marks")
     parser.add_argument("--out", type=Path, help="also write the text to this file")
     arguments = parser.parse_args()
     trials = 150 if arguments.quick else 243
     machines = {name: load_machine(name) for name in MACHINES}
+    if arguments.quick:
+        begin = SpinProfile(time=(0.0, 2.0), speed=(0.0, 15.0))
+        machines = {name: m.model_copy(update={"profile": begin}) for name, m in machines.items()}
     short, study = study_text(machines, trials)
     origin = page.origin(
         "python analyses/write_paper_b.py --page docs/paper-b.md",

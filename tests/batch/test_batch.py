@@ -13,8 +13,6 @@ from machines_of_each_kind import machines_of_each_kind
 from simple_machines import with_gasket_tables
 
 from wm_drake.batch import SimulationInterrupted, simulate_many, work_items
-from wm_drake.batch.runs import Runner
-from wm_drake.batch.work_items import Preparation
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.errors import InputError, InputNotice
 from wm_drake.model.build import build_machine
@@ -120,16 +118,6 @@ def test_smallest_gap_is_that_of_the_scene(machine, reference, cases):
         assert told.smallest_gap.values[index] == pytest.approx(
             alone.smallest_gap.distance, rel=1e-9
         )
-
-
-def test_likeness_changes_no_bit(machine, reference, cases):
-    """Compare a runner that looks at the gap of the first run first with a plain one."""
-    key, items = next(Preparation(machine, 2.5e-3, "auto").batches(cases[:5]))
-    plain, alike = (
-        Runner(reference, ("gap",), histories=False).run(key, items, are_alike=of)
-        for of in (False, True)
-    )
-    assert [run.gap for run in alike] == [run.gap for run in plain]
 
 
 def test_scenes_are_used_again_and_change_no_bit(machine, cases):

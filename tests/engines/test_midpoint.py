@@ -5,6 +5,7 @@ import pytest
 from simple_machines import constant_speed
 from telescopic_machine import RUN_UP, changed, telescopic
 
+from wm_drake.compiler.lane_memory import aligned, fill_lanes
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.engines.compiled.linear import jacobians
 from wm_drake.engines.compiled.midpoint import integrate_midpoint_lanes, midpoint_work
@@ -13,7 +14,7 @@ from wm_drake.engines.compiled.midpoint_check import (
     relaxation_matrices,
     step_matrices,
 )
-from wm_drake.engines.compiled.packing import aligned, fill_lanes, initial_state, pack
+from wm_drake.engines.compiled.packing import initial_state, pack
 from wm_drake.engines.compiled.step_check import free_states
 from wm_drake.engines.compiled.stepping import choose_stepping
 from wm_drake.errors import InputError

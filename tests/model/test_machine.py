@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from applied_force import elastic_and_gravity_force
 from machine_with_bearing import with_bearing
 from scipy.linalg import eigh
 from simple_machines import with_gasket_tables
@@ -159,7 +160,7 @@ def mass_and_finite_difference_stiffness(machine, setup):
         forces = []
         for sign in (1.0, -1.0):
             plant.SetPositions(context, rest + sign * step * direction)
-            forces.append(machine.elastic_and_gravity_force(setup))
+            forces.append(elastic_and_gravity_force(machine, setup))
         stiffness[:, column] = -(forces[0] - forces[1]) / (2 * step)
     return mass[:6, :6], stiffness
 

@@ -63,13 +63,16 @@ def test_smallest_gap_is_that_of_brute_force(scene):
     assert (gap.moving, gap.fixed) == (scene._name(pair[0]), scene._name(pair[1]))
 
 
-def test_gap_of_a_similar_motion_changes_nothing_but_the_time_it_takes(scene):
-    poses, time = random_poses(60, 3), np.arange(60.0)
-    expected = scene.smallest_gap(time, poses, REST)
-    for seed in range(3):
-        near = scene.smallest_gap(time, random_poses(60, seed), REST)
-        assert scene.smallest_gap(time, poses, REST, near) == expected
-    assert scene.smallest_gap(time[:9], poses[:9], REST, near).time < 9.0  # of a longer motion
+def test_gaps_of_runs_side_by_side_are_those_of_each(scene):
+    time, good = np.arange(60.0), [60, 17, 0]
+    runs = [random_poses(60, seed) for seed in range(3)]
+    samples = np.stack([*runs, *runs[-1:] * 5], axis=-1)
+    rests = [REST, np.full(6, 0.002), REST]
+    paths = scene.paths(time, samples, good, rests)
+    for poses, count, rest, path in zip(runs, good, rests, paths, strict=True):
+        expected = scene.smallest_gap(time[:count], poses[:count], rest)
+        assert scene.smallest_gap(time[:count], poses[:count], rest, path) == expected
+    assert paths[2] is None
 
 
 def test_overlap_is_a_negative_gap_and_no_samples_are_no_gap(scene):

@@ -1,6 +1,7 @@
 """Forces on a tub at rest: the compiled mounts and the weight against Drake's gravity."""
 
 import numpy as np
+from applied_force import elastic_and_gravity_force
 
 from wm_drake import with_values
 from wm_drake.model.tub_statics import TubStatics, about_tub, weight_of
@@ -16,7 +17,7 @@ def test_wrench_is_that_of_drake_at_any_pose(machine):
         q = machine.plant.GetPositions(setup.plant_context)
         q[machine.state_layout.tub] = pose
         machine.plant.SetPositions(setup.plant_context, q)
-        expected = machine.elastic_and_gravity_force(setup)
+        expected = elastic_and_gravity_force(machine, setup)
         found = about_tub(statics.wrench(pose), pose)
         np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-10)  # N and N m
 
@@ -39,7 +40,7 @@ def test_rest_pose_is_one_of_drake(machine):
     for values in ({}, {"bodies.motor.mass": 7.0}, {"gasket.damping_x": 30.0}):
         changed = with_values(machine.parameters, values)
         setup = machine.set_up(parameters=changed)
-        assert np.abs(machine.elastic_and_gravity_force(setup)).max() < 1e-9  # N and N m
+        assert np.abs(elastic_and_gravity_force(machine, setup)).max() < 1e-9  # N and N m
 
 
 def test_setup_for_the_compiled_engine_has_the_same_numbers(machine):

@@ -9,12 +9,12 @@ from typing import cast
 import numpy as np
 
 from wm_drake.batch.work_items import BatchKey, WorkItem
+from wm_drake.compiler.lane_memory import aligned, fill_lanes
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.elements.mount import WRENCH_SIZE
 from wm_drake.elements.sensor import POINT_SIZE
 from wm_drake.elements.state_map import RATES_SIZE
 from wm_drake.engines.compiled.mechanics import DRUM_ANGLE, DRUM_RATE, STATE_SIZE
-from wm_drake.engines.compiled.packing import aligned, fill_lanes
 from wm_drake.engines.compiled.run import integrate_runs
 from wm_drake.engines.compiled.samples import trajectory_of
 from wm_drake.engines.schedule import Schedule, schedule_of
@@ -26,7 +26,7 @@ from wm_drake.engines.trajectory import (
     divergence_text,
     diverging_coordinate,
 )
-from wm_drake.model.scene import Gap, Scene
+from wm_drake.model.scene import Gap, Path, Scene
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.band import pass_band
@@ -34,7 +34,7 @@ from wm_drake.simulation.cabinet import floor_forces
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.displacements import amplitudes, filtered_lanes
 from wm_drake.simulation.feet import cabinet_of
-from wm_drake.simulation.histories import measure_samples_lanes, poses_of_runs
+from wm_drake.simulation.histories import measure_samples_lanes
 from wm_drake.simulation.measures import MEASURES, Run
 from wm_drake.simulation.measures.run import FeetLoaded
 from wm_drake.simulation.mount_histories import measure_mounts_lanes
@@ -122,16 +122,12 @@ class Runner:
         self._spare = [] if scenes is None else scenes
         self.scenes: list[Scene] = []
 
-    def run(
-        self, key: BatchKey, work_items: list[WorkItem], *, are_alike: bool = False
-    ) -> list[RunResult]:
+    def run(self, key: BatchKey, work_items: list[WorkItem]) -> list[RunResult]:
         """Run up to `WIDTH` work items side by side and measure them.
 
         Args:
             key: What they have in common.
             work_items: The work items.
-            are_alike: Whether they differ little, so that the smallest gap of the first leads to
-                those of the others.
 
         Returns:
             A result for each work item; none if `stopped` was set meanwhile.
@@ -182,26 +178,18 @@ class Runner:
             lengths.reshape(-1, WIDTH),
             filtered,
             *_peaks(filtered),
-            np.moveaxis(self._poses(samples, rows, size), 0, -1),
         )
+        paths: list[Path | None] = [None] * len(work_items)
+        if "shapes" in self.needs:
+            good = arrays[2][-1, : len(work_items)].astype(int).tolist()
+            rest_poses = [item.begin[:6] for item in work_items]
+            paths = self.scene().paths(schedule.time, arrays[0], good, rest_poses)
         runs = [
-            LaneRun(item, schedule, self.scene, Lane(*(array[..., lane] for array in arrays)))
-            for lane, item in enumerate(work_items)
+            LaneRun(item, schedule, self.scene, Lane(*(array[..., lane] for array in arrays)), path)
+            for lane, (item, path) in enumerate(zip(work_items, paths, strict=True))
         ]
-        if are_alike and "shapes" in self.needs:
-            near = runs[0].find_gap()
-            for run in runs[1:]:
-                run.find_gap(near)
         blocks = [measure.evaluate(runs) for measure in self.measures]
         return [self._result(run, lane, blocks) for lane, run in enumerate(runs)]
-
-    def _poses(self, samples: FloatArray, rows: int, size: int) -> FloatArray:
-        """Return the poses of the tub of each run (lanes, rows, 6), if a measure needs them."""
-        if "shapes" not in self.needs:
-            return np.empty((WIDTH, 0, 6))
-        poses = self._array("poses", rows * 6).reshape(WIDTH, rows, 6)
-        poses_of_runs(samples, rows, size, poses)
-        return poses
 
     def _filtered(self, moved: FloatArray, good: FloatArray, key: BatchKey) -> FloatArray:
         """Return the filtered displacements at the sensors of runs side by side, if needed.
@@ -250,7 +238,7 @@ class Runner:
         item, keeps = run.item, self.histories
         keeps = keeps if isinstance(keeps, bool) else item.number in keeps
         record = self._record(item, run.schedule, run.lane.samples.copy()) if keeps else None
-        gap = run.find_gap() if "shapes" in self.needs else None
+        gap = run.gap if "shapes" in self.needs else None
         motion = run.motion() if item.number in self.motions else None
         return RunResult(item.number, item.case, values, run.diverged, record, gap, motion)
 
@@ -307,7 +295,6 @@ class Lane:
             empty if not needed. [m]
         sizes, at: (sensors,) amplitudes of these displacements [m], and the numbers of their
             samples.
-        poses: (n, 6) poses of the tub; empty if not needed. [rad, m]
     """
 
     samples: FloatArray
@@ -319,17 +306,22 @@ class Lane:
     of_batch: FloatArray
     sizes: FloatArray
     at: np.ndarray
-    poses: FloatArray
 
 
 class LaneRun(Run):
     """The run in one lane of a batch."""
 
     def __init__(
-        self, item: WorkItem, schedule: Schedule, scene: Callable[[], Scene], lane: Lane
+        self,
+        item: WorkItem,
+        schedule: Schedule,
+        scene: Callable[[], Scene],
+        lane: Lane,
+        path: Path | None = None,
     ) -> None:
-        """Hold a work item, its schedule, the function that returns the shapes, and its lane."""
+        """Hold a work item, its schedule, the function that returns the shapes, lane and path."""
         self.item, self.schedule, self._find_scene, self.lane = item, schedule, scene, lane
+        self.path = path
         self.profile, self.period = item.case.profile, item.numbers.setup.parameters.output_period
         self.good = int(lane.extremes[-1])
         self._sensors = lane.moved.shape[1] - 3  # the last three points are the detergent point's
@@ -377,7 +369,7 @@ class LaneRun(Run):
 
     @property
     def poses(self) -> FloatArray:
-        return self.lane.poses[: self.good]
+        return self.lane.samples[: self.good, :6]
 
     @property
     def rest_pose(self) -> FloatArray:

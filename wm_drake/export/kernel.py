@@ -201,16 +201,39 @@ def kernel_code(plan: Any) -> dict[str, str]:
     return dict(json.loads(kept(f"fmu {plan!r}", compiled)))
 
 
-def kernel(plan: Any) -> dict[str, Any]:  # noqa: C901 - the functions of one machine
+def kernel(plan: Any) -> dict[str, Any]:
     """Return the compiled functions of a machine, by the name of their symbol.
 
     `wm_evaluate` (v, c, mode) writes rates and outputs; mode 1: the acceleration of a prescribed
     drum is that of model exchange, 0: the one in force. `wm_step` (v, c, h, n) takes n steps of
     length h.
     """
-    at, of, count, elements, gasket, follows_speed = plan
-    begins = elements.begins
-    size, motor, cabinet, bearing = begins.size, elements.motor, elements.cabinet, elements.bearing
+    at, follows_speed = plan.at, plan.follows_speed
+    prepare, set_drive, write_outputs = _preparation(plan), _drive(plan), _outputs(plan)
+    write_rate = _rate(plan)
+    step = _step(plan, write_rate)
+
+    @cfunc(types.void(POINTER, POINTER, types.int64), **OPTIONS)
+    def wm_evaluate(v, c, mode):
+        prepare(v, c)
+        if mode == 1 or not follows_speed:
+            set_drive(v, numbers_at(v, at.time_constant)[0])
+        write_rate(v)
+        write_outputs(v, c)
+
+    @cfunc(types.void(POINTER, POINTER, types.float64, types.int64), **OPTIONS)
+    def wm_step(v, c, h, n):
+        prepare(v, c)
+        set_drive(v, h * n)
+        for _ in range(n):
+            step(v, h)
+
+    return {"wm_evaluate": wm_evaluate, "wm_step": wm_step}
+
+
+def _preparation(plan: Any) -> Any:
+    """Return the function (v, c) that packs the numbers, with the parameters and the unbalance."""
+    at, of, count = plan.at, plan.of, plan.count
 
     @njit(**OPTIONS)
     def prepare(v, c):
@@ -235,6 +258,13 @@ def kernel(plan: Any) -> dict[str, Any]:  # noqa: C901 - the functions of one ma
                 value += constants[of.harmonics + 9 * k + i] * sums[1 + i]
             p[HARMONICS_BEGIN + k] = value
 
+    return prepare
+
+
+def _rate(plan: Any) -> Any:
+    """Return the function (v) that writes the time derivative of the state."""
+    at, elements = plan.at, plan.elements
+
     @njit(**OPTIONS)
     def write_rate(v):
         p, x = numbers_at(v, at.packed), numbers_at(v, at.state)
@@ -251,6 +281,13 @@ def kernel(plan: Any) -> dict[str, Any]:  # noqa: C901 - the functions of one ma
             elements,
         )
 
+    return write_rate
+
+
+def _drive(plan: Any) -> Any:
+    """Return the function (v, time_constant) that sets what turns the drum from the inputs."""
+    at, follows_speed, begins = plan.at, plan.follows_speed, plan.elements.begins
+
     @njit(**OPTIONS)
     def set_drive(v, time_constant):
         numbers, x = numbers_at(v, 0), numbers_at(v, at.state)
@@ -259,6 +296,13 @@ def kernel(plan: Any) -> dict[str, Any]:  # noqa: C901 - the functions of one ma
             numbers[at.in_force] = numbers[at.acceleration] + lag
         else:
             x[begins.motor + 1] = numbers[at.torque]
+
+    return set_drive
+
+
+def _step(plan: Any, write_rate: Any) -> Any:
+    """Return the function (v, h) that takes a step of length h."""
+    at, follows_speed, elements = plan.at, plan.follows_speed, plan.elements
 
     @njit(**OPTIONS)
     def write_node(v, k, speed, angle):
@@ -286,6 +330,16 @@ def kernel(plan: Any) -> dict[str, Any]:  # noqa: C901 - the functions of one ma
             turned = LARGEST_ANGLE if x[DRUM_ANGLE] > 0.0 else -LARGEST_ANGLE
             x[DRUM_ANGLE] = x[DRUM_ANGLE] - turned
             numbers[at.turned] = numbers[at.turned] + turned
+
+    return step
+
+
+def _outputs(plan: Any) -> Any:
+    """Return the function (v, c) that writes the outputs."""
+    at, of, count, elements, gasket, _ = plan
+    cabinet, size = elements.cabinet, elements.begins.size
+    write_floor, write_drum = _floor(plan), _drum(plan)
+    smallest_gap = _gap(plan)
 
     @njit(**OPTIONS)
     def write_outputs(v, c):
@@ -320,6 +374,13 @@ def kernel(plan: Any) -> dict[str, Any]:  # noqa: C901 - the functions of one ma
         if count.pairs:
             numbers[at.gap] = smallest_gap(motion, constants)
 
+    return write_outputs
+
+
+def _floor(plan: Any) -> Any:
+    """Return the function (numbers, x, p, cabinet) that writes the forces of the floor."""
+    at, begins = plan.at, plan.elements.begins
+
     @njit(**OPTIONS)
     def write_floor(numbers, x, p, cabinet):
         if cabinet is not None:
@@ -329,6 +390,14 @@ def kernel(plan: Any) -> dict[str, Any]:  # noqa: C901 - the functions of one ma
                 foot = foot_of(x, first, standing, p, cabinet + FEET_BEGIN, i)
                 for k in range(3):
                     numbers[at.feet + 3 * i + k] = foot.force[k]
+
+    return write_floor
+
+
+def _drum(plan: Any) -> Any:
+    """Return the function (numbers, x, rate, p) that writes motion and torque of the drum."""
+    at, elements = plan.at, plan.elements
+    begins, motor, bearing = elements.begins, elements.motor, elements.bearing
 
     @njit(**OPTIONS)
     def write_drum(numbers, x, rate, p):
@@ -356,6 +425,13 @@ def kernel(plan: Any) -> dict[str, Any]:  # noqa: C901 - the functions of one ma
         motion, _ = carrier_motion(x, begins.carrier)
         return motion, read_rates(rate, begins.carrier + BODY_RATES)
 
+    return write_drum
+
+
+def _gap(plan: Any) -> Any:
+    """Return the function (motion, c) that returns the smallest gap between tub and housing."""
+    of, count = plan.of, plan.count
+
     @njit(**OPTIONS)
     def smallest_gap(motion, c):
         smallest = np.inf
@@ -369,19 +445,4 @@ def kernel(plan: Any) -> dict[str, Any]:  # noqa: C901 - the functions of one ma
             smallest = min(smallest, bound + dot(motion.position, d))
         return smallest
 
-    @cfunc(types.void(POINTER, POINTER, types.int64), **OPTIONS)
-    def wm_evaluate(v, c, mode):
-        prepare(v, c)
-        if mode == 1 or not follows_speed:
-            set_drive(v, numbers_at(v, at.time_constant)[0])
-        write_rate(v)
-        write_outputs(v, c)
-
-    @cfunc(types.void(POINTER, POINTER, types.float64, types.int64), **OPTIONS)
-    def wm_step(v, c, h, n):
-        prepare(v, c)
-        set_drive(v, h * n)
-        for _ in range(n):
-            step(v, h)
-
-    return {"wm_evaluate": wm_evaluate, "wm_step": wm_step}
+    return smallest_gap

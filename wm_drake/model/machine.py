@@ -18,7 +18,8 @@ from wm_drake.errors import input_error, nearest_names
 from wm_drake.model.bodies import add_load, set_bodies
 from wm_drake.model.cabinet import cabinet_at_rest
 from wm_drake.model.equilibrium import force_as_drawn, preloaded, put_to_rest, rest_pose
-from wm_drake.model.placed_elements import AppliedForce, PlacedElements, placed_elements
+from wm_drake.model.frame_poses import FramePoses
+from wm_drake.model.placed_elements import PlacedElements, placed_elements
 from wm_drake.model.set_up_cache import SetUpCache
 from wm_drake.model.state_layout import StateLayout
 from wm_drake.model.tub_points import TubPoints, measured_points, tub_points
@@ -215,7 +216,7 @@ class MachineSystems:
         self,
         load: Load | str | None = None,
         *,
-        context: Context,
+        context: Context | None = None,
         parameters: MachineParameters | None = None,
         profile: SpinProfile | None = None,
         gasket: bool = True,
@@ -233,6 +234,7 @@ class MachineSystems:
             load: Point masses in the drum, or the name of one of the machine's loads; None for the
                 empty machine. Preloads and rest pose are always those of the empty machine.
             context: Root Context of the diagram; what belongs to the machine is overwritten in it.
+                A new one at time 0 if None, of a machine with a diagram of its own.
             parameters: Numbers to use; those it was built from if None. They must have the same
                 elements, the same laws and tables of the same length.
             profile: Spin profile to follow; that of the parameters if None.
@@ -247,7 +249,7 @@ class MachineSystems:
             InputError: the elements are not those that were built, a name is not in the SDF, or
                 there is no equilibrium.
         """
-        parameters = parameters or self.parameters
+        parameters, context = parameters or self.parameters, context or self.new_context()
         self.cache.check(self.parameters, parameters)
         load = self._load(load, parameters)
         layout, poses = self.state_layout, self.cache.frame_poses(self.plant, parameters)
@@ -257,22 +259,11 @@ class MachineSystems:
         plant_context = self.plant.GetMyContextFromRoot(context)
         if systems:
             self.set_up_bodies(None, parameters, context)
-        if weight:
-            as_drawn = TubStatics(unloaded.at_rest(), weight).wrench(np.zeros(6))
-        else:
-            as_drawn = force_as_drawn(self.plant, plant_context, layout, unloaded.at_rest())
-        balanced = (*unloaded.springs.values(), as_drawn.tobytes())
-        springs = poses.placed("preloads", balanced, lambda: preloaded(unloaded, as_drawn).springs)
-        elements = replace(unloaded, springs=springs)
+        elements = self._preloaded(unloaded, poses, weight, plant_context)
         elements = elements if gasket else elements.without_gasket()
         elements = elements if dampers else elements.without_dampers()
         elements = elements if friction else elements.without_friction()
-        q = np.zeros(layout.size)
-        if weight:
-            q[layout.tub], residual = rest_pose(elements.at_rest(), weight)
-        else:
-            residual = put_to_rest(self.plant, plant_context, layout, elements.at_rest())
-            q = self.plant.GetPositions(plant_context)
+        q, residual = self._at_rest(elements, weight, plant_context)
         parts = parameters.sensors, parameters.clearance_frame, parameters.accelerometers
         points = poses.placed("points", parts, lambda: tub_points(poses, parameters))
         measured = measured_points(points, q[layout.tub])
@@ -288,14 +279,48 @@ class MachineSystems:
         rest = q[layout.tub], residual, q[layout.tubes], q[layout.carrier]
         return Setup(self, parameters, context, elements, points, *rest, cabinet, measured)
 
+    def new_context(self) -> Context:
+        """Return a new root Context at time 0; only a machine with a diagram of its own has one."""
+        raise input_error("is that of the diagram that contains the machine", key="context")
+
+    def _preloaded(
+        self,
+        unloaded: PlacedElements,
+        poses: FramePoses,
+        weight: Weight | None,
+        plant_context: Context,
+    ) -> PlacedElements:
+        """Return the elements with the spring preloads that balance the machine as drawn."""
+        if weight:
+            as_drawn = TubStatics(unloaded.at_rest(), weight).wrench(np.zeros(6))
+        else:
+            as_drawn = force_as_drawn(
+                self.plant, plant_context, self.state_layout, unloaded.at_rest()
+            )
+        balanced = (*unloaded.springs.values(), as_drawn.tobytes())
+        springs = poses.placed("preloads", balanced, lambda: preloaded(unloaded, as_drawn).springs)
+        return replace(unloaded, springs=springs)
+
+    def _at_rest(
+        self, elements: PlacedElements, weight: Weight | None, plant_context: Context
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the positions of the plant at rest, and the wrench that remains on the tub."""
+        if weight:
+            q = np.zeros(self.state_layout.size)
+            q[self.state_layout.tub], residual = rest_pose(elements.at_rest(), weight)
+            return q, residual
+        residual = put_to_rest(self.plant, plant_context, self.state_layout, elements.at_rest())
+        return self.plant.GetPositions(plant_context), residual
+
     def set_up_bodies(
-        self, load: Load | None, parameters: MachineParameters, context: Context
+        self, load: Load | None, parameters: MachineParameters, context: Context | None = None
     ) -> Context:
         """Set bodies, frames and load in a Context and return it; all positions are zero, as drawn.
 
         Raises:
             InputError: a name is not in the SDF.
         """
+        context = context or self.new_context()
         plant_context = self.plant.GetMyContextFromRoot(context)
         self.plant.SetDefaultContext(plant_context)
         set_bodies(self.plant, plant_context, parameters)
@@ -327,21 +352,6 @@ class MachineSystems:
         self.inputs["drum_acceleration"].FixValue(
             self.speed_source.GetMyContextFromRoot(context), [acceleration]
         )
-
-    def elastic_and_gravity_force(self, setup: Setup) -> FloatArray:
-        """Return the moment about To and the force of all elements and gravity on the tub, in W.
-
-        Args:
-            setup: Machine at the pose of its Context.
-
-        Returns:
-            (6,) [N m, N]
-        """
-        context = setup.plant_context
-        applied = AppliedForce(setup.elements, self.state_layout)
-        force = applied(self.plant.GetPositionsAndVelocities(context))
-        force += self.plant.CalcGravityGeneralizedForces(context)
-        return np.asarray(force[self.state_layout.tub])
 
     def _load(self, load: Load | str | None, parameters: MachineParameters) -> Load | None:
         """Return a load that may be given by its name."""
@@ -417,39 +427,9 @@ class Machine(MachineSystems):
 
     diagram: Diagram
 
-    def set_up(
-        self,
-        load: Load | str | None = None,
-        *,
-        context: Context | None = None,
-        parameters: MachineParameters | None = None,
-        profile: SpinProfile | None = None,
-        gasket: bool = True,
-        dampers: bool = True,
-        friction: bool = True,
-        systems: bool = True,
-    ) -> Setup:
-        """Set numbers and load in a Context, at rest; a fresh Context at time 0 if None is given.
-
-        See `MachineSystems.set_up`.
-        """
-        return super().set_up(
-            load,
-            context=context or self.diagram.CreateDefaultContext(),
-            parameters=parameters,
-            profile=profile,
-            gasket=gasket,
-            dampers=dampers,
-            friction=friction,
-            systems=systems,
-        )
-
-    def set_up_bodies(
-        self, load: Load | None, parameters: MachineParameters, context: Context | None = None
-    ) -> Context:
-        """Set bodies, frames and load in a Context, a fresh one if None; see `MachineSystems`."""
-        context = context or self.diagram.CreateDefaultContext()
-        return super().set_up_bodies(load, parameters, context)
+    def new_context(self) -> Context:
+        """Return a new root Context at time 0."""
+        return self.diagram.CreateDefaultContext()
 
     def set_drum_acceleration(self, context: Context, acceleration: float) -> None:
         """Fix the drum's acceleration in a root Context; see `MachineSystems`. [rad/s^2]"""

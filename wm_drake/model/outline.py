@@ -4,8 +4,11 @@ import numpy as np
 
 from wm_drake.compiler.compilation import law, long_running
 from wm_drake.compiler.elementary import lanes_to_rows, rows_to_lanes, sqrt, where
-from wm_drake.compiler.lanes import WIDTH, align_stack, keep, lane_array, lanes_any
+from wm_drake.compiler.lanes import WIDTH, align_stack, keep, lane_array
 from wm_drake.compiler.vectors import dot, rotate_back, rotation_from_rpy
+
+BLOCK = 16
+"""Number of samples whose bounds of distances are kept as one."""
 
 
 @law
@@ -90,68 +93,68 @@ def raise_bounds(poses, direction, moving, fixed, are_round, bound):
 
 
 @long_running
-def measure_motion(poses, reference, reach, motion):
-    """Compute how far the tub moves from a reference pose.
+def measure_shifts(samples, size, good, references, farthest):
+    """Compute how far the tub moves from reference poses in `lanes.WIDTH` runs side by side.
+
+    All arrays are flat arrays of lanes.
 
     Args:
-        poses: Poses of the tub: roll, pitch, yaw, x, y, z. (n, 6) [rad, m]
-        reference: The same of the reference pose. (6,)
-        reach: Largest distance of a point of the tub group from To. [m]
-        motion: Written, a flat array of lanes: for each `lanes.WIDTH` poses the translation x, y, z
-            and the largest displacement of a point of the tub group by the rotation. The last
-            entries repeat the last pose. [m]
-
-    Returns:
-        The first pose with the largest displacement of any point, and this displacement. [m]
+        samples: Samples, one after the other, each with the pose first: roll, pitch, yaw, x, y, z.
+            [rad, m]
+        size: Number of the numbers in each sample.
+        good: Number of samples of each run that count, as a float.
+        references: Reference pose of each run, and the largest distance of a point of the tub group
+            from To. (7,)
+        farthest: The first sample with the largest displacement of any point, and this displacement
+            or more [m], written. (2,)
     """
     align_stack()
-    x_numbers, numbers = np.empty(6 * WIDTH), np.empty(WIDTH)
-    x, answer, displacements = lane_array(x_numbers), lane_array(numbers), lane_array(motion)
-    farthest, shift = 0, -1.0
-    for begin in range(0, len(poses), WIDTH):
-        rows_to_lanes(poses, begin, x_numbers)
-        turned = abs(x[0] - reference[0]) + abs(x[1] - reference[1]) + abs(x[2] - reference[2])
-        turned = turned * reach
-        moved = (x[3] - reference[3], x[4] - reference[4], x[5] - reference[5])
-        at = begin // WIDTH * 4
-        displacements[at], displacements[at + 1], displacements[at + 2] = moved
-        displacements[at + 3] = turned
-        answer[0] = sqrt(dot(moved, moved)) + turned
-        for lane in range(min(WIDTH, len(poses) - begin)):
-            if numbers[lane] > shift:
-                farthest, shift = begin + lane, numbers[lane]
-    keep(x_numbers)
-    return farthest, shift
+    x, count, reference = lane_array(samples), lane_array(good), lane_array(references)
+    answer = lane_array(farthest)
+    zero, reach = 0.0 * count[0], reference[6]
+    answer[0], answer[1] = zero, zero - 1.0
+    for row in range(len(samples) // (size * WIDTH)):
+        k = row * size
+        turned = abs(x[k] - reference[0]) + abs(x[k + 1] - reference[1])
+        turned = turned + abs(x[k + 2] - reference[2])
+        moved = (x[k + 3] - reference[3], x[k + 4] - reference[4], x[k + 5] - reference[5])
+        displacement = sqrt(dot(moved, moved)) + turned * reach
+        is_farther = (count[0] > row) & (displacement > answer[1])
+        answer[0] = where(is_farther, zero + row, answer[0])
+        answer[1] = where(is_farther, displacement, answer[1])
 
 
 @long_running
-def find_near(motion, count, direction, limit, stride, near):
-    """Find the poses at which the lower bound of the change of a distance is below a limit.
+def find_lowest_bounds(samples, size, good, directions, shapes, are_round, lowest):
+    """Find the lowest bounds of distances in blocks of the samples of runs side by side.
 
     Args:
-        motion: From `measure_motion`.
-        count: Number of poses.
-        direction: Unit vector along which the distance is measured. (3,)
-        limit: The limit. [m]
-        stride: 1, or a multiple of `lanes.WIDTH`: only every pose of this stride is looked at, from
-            the first one.
-        near: Their numbers, written. (count,)
-
-    Returns:
-        How many they are.
+        samples, size, good: As for `measure_shifts`.
+        directions: Flat array of lanes: for each pair of shapes the unit vector in W along which
+            the first shape moves away, and the smallest coordinate of the second shape in the
+            opposite direction.
+        shapes, are_round: The first shape of each pair, see `lowest_point`. (pairs, 15), (pairs,)
+        lowest: Flat array of lanes: for each `BLOCK` samples the lowest bound of each pair; inf
+            without samples that count. Written. [m]
     """
     align_stack()
-    numbers = np.empty(WIDTH)
-    answer, moved = lane_array(numbers), lane_array(motion)
-    lanes = WIDTH if stride == 1 else 1
-    near_count = 0
-    for begin in range(0, count, max(stride, WIDTH)):
-        at = begin // WIDTH * 4
-        along = direction[0] * moved[at] + direction[1] * moved[at + 1]
-        answer[0] = along + direction[2] * moved[at + 2] - moved[at + 3]
-        if lanes_any(answer[0] < limit):
-            for lane in range(min(lanes, count - begin)):
-                if numbers[lane] < limit:
-                    near[near_count] = begin + lane
-                    near_count += 1
-    return near_count
+    x, count, along = lane_array(samples), lane_array(good), lane_array(directions)
+    least, pairs = lane_array(lowest), len(shapes)
+    zero, rows = 0.0 * count[0], len(samples) // (size * WIDTH)
+    for begin in range(0, rows, BLOCK):
+        first = begin // BLOCK * pairs
+        for pair in range(pairs):
+            least[first + pair] = zero + np.inf
+        for row in range(begin, min(begin + BLOCK, rows)):
+            k, is_good = row * size, count[0] > row
+            rotation = rotation_from_rpy(x[k], x[k + 1], x[k + 2])
+            position = (x[k + 3], x[k + 4], x[k + 5])
+            for pair in range(pairs):
+                at = 4 * pair
+                d = (along[at], along[at + 1], along[at + 2])
+                lowest_of_shape = lowest_point(
+                    rotate_back(rotation, d), shapes[pair], are_round[pair]
+                )
+                bound = dot(position, d) + lowest_of_shape + along[at + 3]
+                is_lower = is_good & (bound < least[first + pair])
+                least[first + pair] = where(is_lower, bound, least[first + pair])

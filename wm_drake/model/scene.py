@@ -5,7 +5,7 @@ read again with its shapes and set to the poses of a finished run.
 """
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,21 +15,28 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 
+from wm_drake.compiler.lane_memory import aligned, fill_lanes
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.model.bodies import add_bodies, sdf_path, set_bodies, unusable
 from wm_drake.model.cabinet import with_fixed_cabinet
-from wm_drake.model.outline import find_near, lowest_points, measure_motion, raise_bounds
+from wm_drake.model.outline import (
+    BLOCK,
+    find_lowest_bounds,
+    lowest_points,
+    measure_shifts,
+    raise_bounds,
+)
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
-
-_COARSE_STRIDE = 16
-"""Stride of the poses that the first pass of the search for the smallest gap uses."""
 
 _REFERENCE_GRID = 0.001
 """Grid of the reference poses that bounds of distances start from. [rad, m]"""
 
 _REFERENCES_KEPT = 64
 """Number of reference poses whose distances are cached."""
+
+_LEAST = float(np.nextafter(0.0, 1.0))
+"""Smallest distance of shapes that do not touch. [m]"""
 
 REPLAY_RATE = 32.0
 """Frames of a replay per simulated second. [Hz]"""
@@ -95,48 +102,46 @@ def _reference(rest_pose: FloatArray) -> tuple[float, ...]:
 
 
 @dataclass(frozen=True)
-class _Motion:
-    """How far the tub moves from a reference pose; bounds of the distance of a pair of shapes.
+class _Pair:
+    """A pair of shapes, of the tub group and of the housing, at a reference pose.
 
     Attributes:
-        count: Number of poses.
-        motion: From `measure_motion`.
-        farthest: Pose with the largest displacement of any point.
-        shift: This displacement. [m]
+        shapes: The shapes.
+        distance: Signed distance. [m]
+        bound: Unit vector in W along which the first shape moves away from the second, and the
+            smallest coordinate of the second shape in the opposite direction [m]. (4,)
     """
 
-    count: int
-    motion: FloatArray
-    farthest: int
-    shift: float
+    shapes: tuple[GeometryId, GeometryId]
+    distance: float
+    bound: FloatArray
 
-    @classmethod
-    def of(cls, poses: FloatArray, reference: tuple[float, ...], reach: float) -> "_Motion":
-        """Return the motion of poses of the tub.
 
-        Args:
-            poses: Roll, pitch, yaw, x, y, z. (n, 6) [rad, m]
-            reference: The same of the reference pose.
-            reach: Largest distance of a point of the tub group from To. [m]
-        """
-        motion = np.empty(-(-len(poses) // WIDTH) * WIDTH * 4)
-        farthest, shift = measure_motion(poses, np.array(reference), reach, motion)
-        return cls(len(poses), motion, farthest, shift)
+@dataclass(frozen=True)
+class Path:
+    """Poses of the tub over time, with bounds that lead to the smallest distances.
 
-    def nearer_than(
-        self, limit: float, distance: float, direction: FloatArray, stride: int
-    ) -> NDArray[np.int64]:
-        """Return the poses at which the lower bound of the distance of a pair is below a limit.
+    Attributes:
+        poses: Roll, pitch, yaw, x, y, z. (n, 6) [rad, m]
+        farthest: Gap of the nearest pair at rest, at the pose farthest from rest.
+        pairs: The pairs of shapes that may touch or come nearer than that.
+        lowest: Lowest bound of the distance of each pair in each block of poses. (blocks, pairs)
+            [m]
+    """
 
-        Args:
-            limit: The limit. [m]
-            distance: Distance of the pair at the reference. [m]
-            direction: Direction at the reference in which the shape of the tub moves away. (3,)
-            stride: Only every pose of this stride is looked at, from the first one.
-        """
-        near = np.empty(self.count, dtype=np.int64)
-        count = find_near(self.motion, self.count, direction, limit - distance, stride, near)
-        return near[:count]
+    poses: FloatArray
+    farthest: Gap
+    pairs: Sequence[_Pair]
+    lowest: FloatArray
+
+    def near(self, number: int, limit: float) -> NDArray[np.int64]:
+        """Return the poses in blocks in which the bound of a pair is below a limit."""
+        return self.poses_of(np.flatnonzero(self.lowest[:, number] < limit))
+
+    def poses_of(self, blocks: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the numbers of the poses in blocks."""
+        every = (BLOCK * blocks[:, None] + np.arange(BLOCK)).ravel()
+        return every[every < len(self.poses)]
 
 
 class Scene:
@@ -186,9 +191,7 @@ class Scene:
         except (RuntimeError, SystemExit) as error:  # Drake turns failed assertions into exits
             raise unusable(sdf_path(parameters.model), error) from None
         self._outlines = {shape: self._outline(shape) for pair in self._pairs for shape in pair}
-        self._references: dict[
-            tuple[float, ...], list[tuple[float, FloatArray, tuple[GeometryId, GeometryId]]]
-        ] = {}
+        self._references: dict[tuple[float, ...], list[_Pair]] = {}
         self._names = tuple(f"{self._name(a)}|{self._name(b)}" for a, b in self._pairs)
         outlines = [self._outlines[shape] for shape, _ in self._pairs]
         # largest distance of a point of the tub group from To
@@ -295,7 +298,11 @@ class Scene:
         self.plant.SetPositions(self._plant_context, self._positions)
 
     def smallest_gap(
-        self, time: FloatArray, poses: FloatArray, rest_pose: FloatArray, near: Gap | None = None
+        self,
+        time: FloatArray,
+        poses: FloatArray,
+        rest_pose: FloatArray,
+        path: Path | None = None,
     ) -> Gap | None:
         """Return the smallest distance between tub group and housing over sampled poses.
 
@@ -304,37 +311,93 @@ class Scene:
         each pair of shapes, the direction near rest gives a bound at all poses. The distance
         is computed at the pose with the lowest bound, and its direction raises the bounds of all
         poses. This repeats until no bound is below the smallest distance found. The result is
-        exact over the samples, after a few dozen distances.
+        exact over the samples, after a few distances.
 
         Args:
             time: (n,) [s]
             poses: Poses of the tub: roll, pitch, yaw, x, y, z. (n, 6) [rad, m]
             rest_pose: Pose of the tub at rest. (6,) [rad, m]
-            near: Smallest gap of a similar motion, if there is one. It is looked at first, which
-                saves time; the result is the same.
+            path: From `paths`, if it is known.
 
         Returns:
             The smallest gap; None if there is no sample or the SDF has no shapes to measure.
         """
-        if not self._pairs or not len(time):
+        path = path or self._path(time, poses, rest_pose)
+        if path is None:
             return None
-        poses = np.ascontiguousarray(poses)
-        reference = _reference(rest_pose)
-        near_rest, motion = self._at(reference), _Motion.of(poses, reference, self._reach)
-        if near is None:
-            first, at = near_rest[0][2], motion.farthest
-        else:
-            first = self._pairs[self.pair_names().index(f"{near.moving}|{near.fixed}")]
-            at = min(int(np.searchsorted(time, near.time)), len(time) - 1)
-        best = self._gap(first, time[at], poses[at])[0]
-        # the coarse pass finds a small gap, which excludes most poses of the fine pass
-        for stride in (_COARSE_STRIDE, 1) if near is None else (1,):
-            for distance, direction, pair in near_rest:
-                if distance - motion.shift >= best.distance:
-                    break  # this pair and all that follow are farther apart at every pose
-                left = motion.nearer_than(best.distance, distance, direction, stride)
-                best = self._smallest_of_pair(pair, direction, best, time[left], poses[left])
+        if not path.pairs:
+            return path.farthest
+        block, number = divmod(int(np.argmin(path.lowest)), len(path.pairs))
+        lowest = path.poses_of(np.array([block]))  # gives a small gap, which excludes most blocks
+        best = self._smallest_of_pair(path, number, path.farthest, time, lowest)
+        for number in range(len(path.pairs)):
+            near = path.near(number, best.distance)
+            best = self._smallest_of_pair(path, number, best, time, near)
         return best
+
+    def _path(self, time: FloatArray, poses: FloatArray, rest_pose: FloatArray) -> Path | None:
+        samples = fill_lanes(aligned(poses.size * WIDTH), [poses.ravel()])
+        return self.paths(time, samples.reshape(*poses.shape, WIDTH), [len(time)], [rest_pose])[0]
+
+    def paths(
+        self,
+        time: FloatArray,
+        samples: FloatArray,
+        good: Sequence[int],
+        rest_poses: Sequence[FloatArray],
+    ) -> list[Path | None]:
+        """Return the poses of runs side by side, with bounds that lead to the smallest distances.
+
+        Args:
+            time: (n,) [s]
+            samples: Samples, each with the pose first. (n, >= 6, lanes) [rad, m]
+            good: Number of samples of each run that count.
+            rest_poses: Pose of the tub at rest of each run. (6,) [rad, m]
+
+        Returns:
+            Path of each run; None if there is no sample or the SDF has no shapes to measure.
+        """
+        if not self._pairs or not max(good):
+            return [None] * len(good)
+        rows, size, _ = samples.shape
+        counts = fill_lanes(aligned(WIDTH), [np.array([float(count)]) for count in good])
+        flat = samples.ravel(), size, counts
+        references = [_reference(pose) for pose in rest_poses]
+        places = [np.array([*pose, self._reach]) for pose in references]
+        farthest = aligned(2 * WIDTH)
+        measure_shifts(*flat, fill_lanes(aligned(7 * WIDTH), places), farthest)
+        numbers, shift = farthest[:WIDTH].astype(int).tolist(), farthest[WIDTH:]
+        at_rest = [self._at(reference) for reference in references]
+        firsts, chosen = list[Gap | None](), set[int]()
+        for lane, pairs in enumerate(at_rest):
+            if not good[lane]:
+                firsts.append(None)
+                continue
+            nearest, at = min(pairs, key=lambda pair: pair.distance), numbers[lane]
+            first = self._gap(nearest.shapes, time[at], samples[at, :6, lane])[0]
+            limit = max(first.distance, _LEAST) + shift[lane]
+            chosen |= {number for number, pair in enumerate(pairs) if pair.distance < limit}
+            firsts.append(first)
+        of_runs = [[pairs[number] for number in sorted(chosen)] for pairs in at_rest]
+        moving = [self._outlines[pair.shapes[0]] for pair in of_runs[0]]
+        bounds: list[FloatArray] = [
+            np.array([pair.bound for pair in pairs]).ravel() for pairs in of_runs
+        ]
+        lowest = aligned(-(-rows // BLOCK) * len(moving) * WIDTH)
+        find_lowest_bounds(
+            *flat,
+            fill_lanes(aligned(len(bounds[0]) * WIDTH), bounds),
+            np.array([outline.numbers for outline in moving]).reshape(len(moving), 15),
+            np.array([outline.is_round for outline in moving], dtype=bool),
+            lowest,
+        )
+        lowest = lowest.reshape(-(-rows // BLOCK), len(moving), WIDTH)
+        return [
+            Path(samples[:count, :6, lane], first, of_runs[lane], lowest[..., lane])
+            if first
+            else None
+            for lane, (count, first) in enumerate(zip(good, firsts, strict=True))
+        ]
 
     def separations(self, pose: FloatArray) -> list[tuple[Outline, Outline, FloatArray]]:
         """Return both outlines of each pair of shapes, and the direction that separates them.
@@ -355,31 +418,30 @@ class Scene:
         """Return the names of the pairs of shapes: one of the tub group, one of the housing."""
         return list(self._names)
 
-    def contacts(self, time: FloatArray, poses: FloatArray, rest_pose: FloatArray) -> FloatArray:
+    def contacts(
+        self,
+        time: FloatArray,
+        poses: FloatArray,
+        rest_pose: FloatArray,
+        path: Path | None = None,
+    ) -> FloatArray:
         """Return the smallest distance of each pair that touches over sampled poses.
 
         Args:
-            time: (n,) [s]
-            poses: Poses of the tub: roll, pitch, yaw, x, y, z. (n, 6) [rad, m]
-            rest_pose: Pose of the tub at rest. (6,) [rad, m]
+            time, poses, rest_pose, path: As for `smallest_gap`.
 
         Returns:
             By pair, in the order of `pair_names`; NaN for a pair that does not touch. [m]
         """
         distances = np.full(len(self._pairs), np.nan)
-        if not len(time):
+        path = path or self._path(time, poses, rest_pose)
+        if path is None:
             return distances
-        poses = np.ascontiguousarray(poses)
-        reference = _reference(rest_pose)
-        near_rest, motion = self._at(reference), _Motion.of(poses, reference, self._reach)
-        apart = Gap(float(np.nextafter(0.0, 1.0)), 0.0, "", "", (0.0, 0.0, 0.0))
-        for distance, direction, pair in near_rest:
-            if distance - motion.shift > 0.0:
-                break  # this pair and all that follow are apart at every pose
-            near = motion.nearer_than(apart.distance, distance, direction, 1)
-            nearest = self._smallest_of_pair(pair, direction, apart, time[near], poses[near])
+        apart = Gap(_LEAST, 0.0, "", "", (0.0, 0.0, 0.0))
+        for number, pair in enumerate(path.pairs):
+            nearest = self._smallest_of_pair(path, number, apart, time, path.near(number, _LEAST))
             if nearest.distance <= 0.0:
-                distances[self._pairs.index(pair)] = nearest.distance
+                distances[self._pairs.index(pair.shapes)] = nearest.distance
         return distances
 
     def _gap(
@@ -392,45 +454,41 @@ class Scene:
             float(distance), float(time), self._name(pair[0]), self._name(pair[1]), (x, y, z)
         ), direction
 
-    def _at(
-        self, reference: tuple[float, ...]
-    ) -> list[tuple[float, FloatArray, tuple[GeometryId, GeometryId]]]:
-        """Return distance, direction and pair of all pairs at a pose, nearest first."""
+    def _at(self, reference: tuple[float, ...]) -> list[_Pair]:
+        """Return the pairs of shapes at a pose."""
         if reference not in self._references:
-            candidates = [(*self._nearest(np.array(reference), pair), pair) for pair in self._pairs]
-            nearest_first = sorted(candidates, key=lambda entry: entry[0])
+            pairs = []
+            for shapes in self._pairs:
+                distance, _, away = self._nearest(np.array(reference), shapes)
+                opposite = self._outlines[shapes[1]].lower_extent(-away, np.zeros((1, 6)))
+                pairs.append(_Pair(shapes, distance, np.append(away, opposite)))
             if len(self._references) == _REFERENCES_KEPT:
                 del self._references[next(iter(self._references))]
-            self._references[reference] = [
-                (distance, away, pair) for distance, _, away, pair in nearest_first
-            ]
+            self._references[reference] = pairs
         return self._references[reference]
 
     def _smallest_of_pair(
-        self,
-        pair: tuple[GeometryId, GeometryId],
-        direction: FloatArray,
-        best: Gap,
-        time: FloatArray,
-        poses: FloatArray,
+        self, path: Path, number: int, best: Gap, time: FloatArray, near: NDArray[np.int64]
     ) -> Gap:
         """Return the smaller of a known gap and the smallest gap of one pair of shapes.
 
         Args:
-            direction: Direction of the first bound, see `_nearest`. (3,)
-            time: (n,) [s]
-            poses: Poses of the tub. (n, 6) [rad, m]
+            number: Number of the pair in the path.
+            best: The smallest gap known.
+            near: Numbers of the poses to look at.
         """
-        if not len(time):
+        pair = path.pairs[number]
+        if not len(near):
             return best
-        moving, fixed = (self._outlines[shape] for shape in pair)
+        poses, direction = path.poses[near], pair.bound[:3]
+        moving, fixed = (self._outlines[shape] for shape in pair.shapes)
         numbers = moving.numbers, fixed.numbers, (moving.is_round, fixed.is_round)
-        bound = np.full(len(time), -np.inf)
+        bound = np.full(len(near), -np.inf)
         while True:
             index = raise_bounds(poses, direction, *numbers, bound)
             if not bound[index] < best.distance:
                 return best
-            gap, direction = self._gap(pair, time[index], poses[index])
+            gap, direction = self._gap(pair.shapes, time[near[index]], poses[index])
             best = min(best, gap, key=lambda candidate: candidate.distance)
             bound[index] = np.inf  # this distance is known
 

@@ -8,8 +8,8 @@ import numpy as np
 import xarray as xr
 
 from wm_drake.compiler.kept import kept
+from wm_drake.compiler.lane_memory import aligned
 from wm_drake.compiler.lanes import WIDTH
-from wm_drake.engines.compiled.packing import aligned
 from wm_drake.model.scene import REPLAY_RATE
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.band import (

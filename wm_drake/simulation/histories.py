@@ -177,18 +177,3 @@ def measure_samples_lanes(
             shortest[k] = where((good > 0.5) & (length < shortest[k]), length, shortest[k])
         largest[count + 6] = largest[count + 6] + good
     keep(x_numbers)
-
-
-@long_running
-def poses_of_runs(samples, rows, size, poses):
-    """Copy the poses of the tub of `lanes.WIDTH` runs, so that those of each run are contiguous.
-
-    Args:
-        samples: Flat array of lanes: samples, one after the other, each with the pose first.
-        rows, size: Number of samples, and of the numbers in each.
-        poses: (lanes.WIDTH, rows, 6) roll, pitch, yaw, x, y, z, written. [rad, m]
-    """
-    for row in range(rows):
-        for lane in range(WIDTH):
-            for k in range(6):
-                poses[lane, row, k] = samples[(row * size + k) * WIDTH + lane]

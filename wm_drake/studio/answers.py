@@ -183,7 +183,7 @@ def _run_turned(
         case = machine.case(state)
         turned = _turned(machine, case, keys[:LANES])
         batch_key, items = _batch(machine, [case, *(other for _, _, other in turned)])
-    results = runner.run(batch_key, items, are_alike=True)
+    results = runner.run(batch_key, items)
     return turned, {run.number: run for run in results}
 
 

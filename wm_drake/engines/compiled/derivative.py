@@ -2,9 +2,10 @@
 
 import numpy as np
 
+from wm_drake.compiler.lane_memory import aligned, fill_lanes
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.engines.compiled.integration import derivative_lanes
-from wm_drake.engines.compiled.packing import aligned, fill_lanes, pack
+from wm_drake.engines.compiled.packing import pack
 from wm_drake.model.machine import Setup
 from wm_drake.parameters.types import FloatArray
 

@@ -8,6 +8,7 @@ from collections import namedtuple
 
 from wm_drake.compiler.compilation import law, long_running
 from wm_drake.compiler.elementary import sine_cosine
+from wm_drake.compiler.lane_memory import aligned
 from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
 from wm_drake.engines.compiled.drum import sample_controller
 from wm_drake.engines.compiled.mechanics import (
@@ -19,7 +20,6 @@ from wm_drake.engines.compiled.mechanics import (
     write_sample,
 )
 from wm_drake.engines.compiled.multistep import PAST_INPUTS, PAST_RATES, multistep_step, remember
-from wm_drake.engines.compiled.packing import aligned
 from wm_drake.engines.compiled.rubber import follow_paths, write_paths
 
 Work = namedtuple("Work", ("rate", "inputs", "stage", "total", "past_rates", "past_inputs"))

@@ -12,6 +12,7 @@ import numpy as np
 
 from wm_drake.compiler.compilation import law, long_running
 from wm_drake.compiler.elementary import decay_factor, sine_cosine, where
+from wm_drake.compiler.lane_memory import aligned, fill_lanes
 from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
 from wm_drake.engines.compiled.cabinet import CABINET_STATE_SIZE, write_cabinet_jacobian
 from wm_drake.engines.compiled.mechanics import (
@@ -29,7 +30,7 @@ from wm_drake.engines.compiled.multistep import (
     extrapolated,
     remember,
 )
-from wm_drake.engines.compiled.packing import Layout, aligned, fill_lanes
+from wm_drake.engines.compiled.packing import Layout
 from wm_drake.parameters.types import FloatArray
 
 SMOOTH, INTERNAL, PATH, CABINET = 0, 1, 2, 3

@@ -25,6 +25,7 @@ from collections import namedtuple
 
 from wm_drake.compiler.compilation import law, long_running
 from wm_drake.compiler.elementary import sine_cosine
+from wm_drake.compiler.lane_memory import aligned
 from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
 from wm_drake.elements.motion import BODY_STATE, TREE_STATE, rpy_rates
 from wm_drake.elements.telescopic_damper import DEFORMATION, TUBES_STATE_SIZE
@@ -35,7 +36,6 @@ from wm_drake.engines.compiled.mechanics import (
     state_derivative,
     write_sample,
 )
-from wm_drake.engines.compiled.packing import aligned
 
 BODY, TUBES = 6, 7
 """Degrees of freedom of a floating body, and of the tubes of a damper."""

@@ -9,7 +9,6 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ForceElementIndex, RevoluteJoint, SpatialInertia
 from pydrake.systems.framework import Context
 
-from wm_drake.compiler.lanes import WIDTH
 from wm_drake.compiler.matrices import about_centre, inverse
 from wm_drake.elements.kind import ElementKind
 from wm_drake.elements.motion import POSE
@@ -155,34 +154,6 @@ def _shared(layout: Layout) -> Layout:
 def state_map(setup: Setup) -> StateMap:
     """Return the order of the states of a machine as it is set up."""
     return setup.elements.states(drive=bool(setup.motor), cabinet=bool(setup.cabinet))
-
-
-def aligned(size: int) -> FloatArray:
-    """Return zeros at an address that is aligned to the size of a vector of lanes. (size,)"""
-    raw = np.zeros(size + WIDTH)
-    begin = (-raw.ctypes.data // raw.itemsize) % WIDTH
-    return raw[begin : begin + size]
-
-
-def fill_lanes(lanes: FloatArray, runs: list[FloatArray]) -> FloatArray:
-    """Write arrays of up to `WIDTH` runs into a flat array of lanes.
-
-    Idle lanes repeat the last run.
-
-    Args:
-        lanes: (size * WIDTH,), written.
-        runs: Array (size,) of each run.
-
-    Returns:
-        The array of lanes.
-    """
-    idle = WIDTH - len(runs)
-    rows = lanes.reshape(-1, WIDTH)
-    if len(runs) == 1:
-        rows[:] = runs[0][:, None]
-    else:
-        np.stack([*runs, *runs[-1:] * idle], axis=1, out=rows)
-    return lanes
 
 
 def initial_state(setup: Setup, profile: SpinProfile) -> FloatArray:

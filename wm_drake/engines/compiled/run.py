@@ -4,10 +4,11 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from wm_drake.compiler.lane_memory import aligned, fill_lanes
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.engines.compiled.integration import integrate_lanes, work_arrays
 from wm_drake.engines.compiled.midpoint import integrate_midpoint_lanes, midpoint_work
-from wm_drake.engines.compiled.packing import Layout, aligned, fill_lanes, initial_state, pack
+from wm_drake.engines.compiled.packing import Layout, initial_state, pack
 from wm_drake.engines.compiled.samples import trajectory_of
 from wm_drake.engines.compiled.stepping import Stepping
 from wm_drake.engines.memory import check_size

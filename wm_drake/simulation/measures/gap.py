@@ -13,17 +13,17 @@ MM = Unit("m", "mm")
 
 
 def _gap(run: Run) -> Sequence[FloatArray]:
-    gap = run.find_gap()
+    gap = run.gap
     return [np.array(np.nan if gap is None else gap.distance)]
 
 
 def _contacts(run: Run) -> Sequence[FloatArray]:
-    gap, pairs = run.find_gap(), run.scene.pair_names()
+    gap, pairs = run.gap, run.scene.pair_names()
     touching: FloatArray = np.full(len(pairs), np.nan)
     if gap is None:
         return np.array(np.nan), np.array(np.nan), touching
     if gap.distance <= 0.0:
-        touching = run.scene.contacts(run.time, run.poses, run.rest_pose)
+        touching = run.scene.contacts(run.time, run.poses, run.rest_pose, run.path)
     nearest = np.array(float(pairs.index(f"{gap.moving}|{gap.fixed}")))
     speed = np.array(np.interp(gap.time, run.time, run.drum_speed))
     return nearest, speed, touching

@@ -152,7 +152,7 @@ def measure(
     used = {dim for dims, _ in variables.values() for dim in dims}
     table = xr.Dataset(variables, {dim: run.labels[dim] for dim in run.labels if dim in used})
     drive = drive_measures(run.time, run.drum_angle, run.drum_speed, run.motor_torque, run.profile)
-    gap = run.find_gap() if scene else None
+    gap = run.gap if scene else None
     return Measures(table, gap, drive, walk_of(record), run.has_needs(("feet",)))
 
 

@@ -7,7 +7,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from wm_drake.model.scene import Gap, Scene
+from wm_drake.model.scene import Gap, Path, Scene
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.cabinet import Cabinet
 from wm_drake.parameters.types import FloatArray
@@ -51,10 +51,12 @@ class Run(ABC):
 
     Attributes:
         period: Time between samples. [s]
+        path: Poses of the tub, as for `Scene.smallest_gap`, if they have bounds already.
     """
 
     profile: SpinProfile
     period: float
+    path: Path | None = None
 
     @property
     @abstractmethod
@@ -115,13 +117,10 @@ class Run(ABC):
     def scene(self) -> Scene:
         """Return the shapes of the machine."""
 
-    def find_gap(self, near: Gap | None = None) -> Gap | None:
-        """Return the smallest gap; `near` is that of a similar run, which makes it faster."""
-        if "_gap" not in self.__dict__:
-            at = self.time, self.poses, self.rest_pose
-            self.__dict__["_gap"] = self.scene.smallest_gap(*at, near)
-        gap: Gap | None = self.__dict__["_gap"]
-        return gap
+    @functools.cached_property
+    def gap(self) -> Gap | None:
+        """Return the smallest gap; None if there is none to measure."""
+        return self.scene.smallest_gap(self.time, self.poses, self.rest_pose, self.path)
 
     @property
     @abstractmethod

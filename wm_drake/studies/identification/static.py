@@ -3,7 +3,7 @@
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -26,6 +26,10 @@ DEVELOPED = 0.1
 
 NOMINAL = 0.2
 """Part of the curve whose linear fit gives the nominal stiffness, as in [B] section 4."""
+
+
+Signal: TypeAlias = tuple[FloatArray, FloatArray, FloatArray]
+"""Smoothed displacement, force and rate of a test."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,13 +82,7 @@ class StaticCurve:
         Args:
             knots: Points on each side of zero, where the range has that side.
         """
-        low, high = float(self.position[0]), float(self.position[-1])
-        sides: list[FloatArray] = [
-            np.linspace(low, 0.0, knots + 1)[:-1] if low < 0.0 else np.zeros(0),
-            np.zeros(1),
-        ]
-        sides.append(np.linspace(0.0, high, knots + 1)[1:] if high > 0.0 else np.zeros(0))
-        places = np.concatenate(sides)
+        places = _places(float(self.position[0]), float(self.position[-1]), knots)
         force = np.interp(places, self.position, _never_falling(self.position, self.elastic))
         names = ("angle", "torque") if self.rotates else ("displacement", "force")
         return dict(zip(names, (tuple(places.tolist()), tuple(force.tolist())), strict=True))
@@ -127,23 +125,8 @@ def static_curve(axis: str, loops: Sequence[MeasuredLoop]) -> StaticCurve:
         InputError: The motion does not contain zero, or does not come back.
     """
     signals = [_signal(loop) for loop in loops]
-    low = min(float(np.min(position)) for position, _, _ in signals)
-    high = max(float(np.max(position)) for position, _, _ in signals)
-    size = high - low
-    if low > 0.05 * size or high < -0.05 * size:
-        raise input_error(
-            "displacement does not contain zero, which is the rest position of the component",
-            where=loops[0].path,
-        )
-    low, high = (0.0 if abs(end) < 0.05 * size else end for end in (low, high))
-    places = np.unique(
-        np.concatenate(
-            [
-                np.linspace(low, 0.0, NODES + 1) if low < 0.0 else [0.0],
-                np.linspace(0.0, high, NODES + 1) if high > 0.0 else [0.0],
-            ]
-        )
-    )
+    low, high, size = _range(signals, loops[0].path)
+    places = _places(low, high, NODES)
     sides: dict[bool, list[FloatArray]] = {True: [], False: []}
     energy, way = 0.0, 0.0
     for position, force, _ in signals:
@@ -162,17 +145,12 @@ def static_curve(axis: str, loops: Sequence[MeasuredLoop]) -> StaticCurve:
         )
     loading, unloading = (_mean(sides[rises]) for rises in (True, False))
     half = 0.5 * (loading - unloading)
-    known = np.isfinite(half)
-    if not np.any(known):
+    if not np.any(np.isfinite(half)):
         raise input_error(
             "loading and unloading have no displacement in common where friction has developed",
             where=loops[0].path,
         )
-    nearest = np.interp(places, places[known], half[known])
-    raised = np.where(np.isfinite(loading), loading - nearest, unloading + nearest)
-    elastic = np.where(known, 0.5 * (loading + unloading), raised)
-    there = np.isfinite(elastic)
-    elastic = np.interp(places, places[there], elastic[there])
+    elastic = _elastic(places, loading, unloading)
     offset = float(np.interp(0.0, places, elastic))
     elastic = elastic - offset
     first = np.abs(places) <= NOMINAL * max(high, -low) * (1.0 + 1e-9)
@@ -192,7 +170,39 @@ def static_curve(axis: str, loops: Sequence[MeasuredLoop]) -> StaticCurve:
     )
 
 
-def _signal(loop: MeasuredLoop) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _range(signals: Sequence[Signal], path: str) -> tuple[float, float, float]:
+    """Return both ends of the displacements, zero for one near it, and the size of their range."""
+    low = min(float(np.min(position)) for position, _, _ in signals)
+    high = max(float(np.max(position)) for position, _, _ in signals)
+    size = high - low
+    if low > 0.05 * size or high < -0.05 * size:
+        raise input_error(
+            "displacement does not contain zero, which is the rest position of the component",
+            where=path,
+        )
+    low, high = (0.0 if abs(end) < 0.05 * size else end for end in (low, high))
+    return low, high, size
+
+
+def _places(low: float, high: float, count: int) -> FloatArray:
+    """Return zero and a number of places on each side of it, where the range has that side."""
+    below = np.linspace(low, 0.0, count + 1)[:-1] if low < 0.0 else np.zeros(0)
+    above = np.linspace(0.0, high, count + 1)[1:] if high > 0.0 else np.zeros(0)
+    return np.concatenate([below, [0.0], above])
+
+
+def _elastic(places: FloatArray, loading: FloatArray, unloading: FloatArray) -> FloatArray:
+    """Return the mean of loading and unloading; where one is missing, from the next half width."""
+    half = 0.5 * (loading - unloading)
+    known = np.isfinite(half)
+    nearest = np.interp(places, places[known], half[known])
+    raised = np.where(np.isfinite(loading), loading - nearest, unloading + nearest)
+    elastic = np.where(known, 0.5 * (loading + unloading), raised)
+    there = np.isfinite(elastic)
+    return np.interp(places, places[there], elastic[there])
+
+
+def _signal(loop: MeasuredLoop) -> Signal:
     """Return smoothed displacement, force and rate of a test."""
     time = loop.time - loop.time[0]
     curve = smoothed(time, loop.displacement, None, loop.path)

@@ -1,6 +1,6 @@
 """Modes of a machine: three linearisations, Campbell diagram, critical speeds, sensitivities."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -161,12 +161,8 @@ def modes(
         6
     """
     machine = machine_of(machine)
-    if not 0.0 < amplitude <= 0.1:
-        raise input_error(
-            f"{1e3 * amplitude:g} mm is no amplitude; allowed are more than 0 and up to 100 mm",
-            key="amplitude",
-        )
     parameters = machine.parameters
+    _check_amplitude(amplitude)
     check_fixed_cabinet(parameters)
     linear = {
         STUCK: _linearisation(machine, load, gasket, friction=True),
@@ -179,18 +175,10 @@ def modes(
     amplitudes = np.union1d(AMPLITUDES, amplitude)
     over = amplitude_modes(setup, spectra[STUCK], natural[STUCK], amplitudes)
     progress(0.3)
-    last = SPEEDS_RPM[1] * max(parameters.profile.speed)
-    speeds = np.linspace(SPEEDS_RPM[0] * np.pi / 30.0, last, int(SPEEDS_RPM[2]))
-    diagrams = {
-        name: campbell(one.spectrum, speeds, len(spectra[name].values))
-        for name, one in linear.items()
-    }
+    diagrams = _diagrams(linear, spectra, max(parameters.profile.speed))
     progress(0.4)
     bars = _sensitivities(machine, load, gasket, spectra, lambda part: progress(0.4 + 0.5 * part))
-    peaks = None
-    if run_up and parameters.loads:
-        cases = [case_of(parameters, name, gasket=gasket) for name in parameters.loads]
-        peaks = simulate_many(machine, cases, measures=["amplitudes"])
+    peaks = _run_up_peaks(machine, gasket) if run_up and parameters.loads else None
     progress(1.0)
     return MachineModes(
         parameters,
@@ -207,6 +195,33 @@ def modes(
         bars,
         peaks,
     )
+
+
+def _check_amplitude(amplitude: float) -> None:
+    if not 0.0 < amplitude <= 0.1:
+        raise input_error(
+            f"{1e3 * amplitude:g} mm is no amplitude; allowed are more than 0 and up to 100 mm",
+            key="amplitude",
+        )
+
+
+def _diagrams(
+    linear: Mapping[str, Linearisation], spectra: Mapping[str, Spectrum], highest: float
+) -> dict[str, Campbell]:
+    """Return the Campbell diagrams up to beyond the highest speed of the profile. [rad/s]"""
+    first, last = SPEEDS_RPM[0] * np.pi / 30.0, SPEEDS_RPM[1] * highest
+    speeds = np.linspace(first, last, int(SPEEDS_RPM[2]))
+    return {
+        name: campbell(one.spectrum, speeds, len(spectra[name].values))
+        for name, one in linear.items()
+    }
+
+
+def _run_up_peaks(machine: Machine, gasket: bool) -> xr.Dataset:
+    """Return the amplitudes of all loads of the machine over its spin profile."""
+    parameters = machine.parameters
+    cases = [case_of(parameters, name, gasket=gasket) for name in parameters.loads]
+    return simulate_many(machine, cases, measures=["amplitudes"])
 
 
 @on_one_thread
