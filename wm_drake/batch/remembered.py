@@ -71,8 +71,11 @@ def run_keys(
     }
     common |= {"step": checked_step(parameters, step), "integrator": parameters.integrator}
     common |= {"measures": sorted(set(measures))}
+    last, numbers = None, ""
     for case in cases:
-        numbers = (case.parameters or parameters).model_dump_json(exclude=_EXCLUDED)
+        changed = case.parameters or parameters
+        if changed is not last:  # loads of one machine follow each other
+            last, numbers = changed, changed.model_dump_json(exclude=_EXCLUDED)
         yield key_of(
             **common, numbers=numbers, load=case.load, profile=case.profile, gasket=case.gasket
         )

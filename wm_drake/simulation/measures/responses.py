@@ -162,5 +162,4 @@ def measures_of(parameters: MachineParameters, responses: Iterable[Response]) ->
 
 def has_gap(parameters: MachineParameters) -> bool:
     """Return whether the SDF has shapes on both the tub and the housing."""
-    at_origin = np.zeros((1, 6))
-    return Scene(parameters).smallest_gap(np.zeros(1), at_origin, at_origin[0]) is not None
+    return bool(Scene(parameters).pair_names())

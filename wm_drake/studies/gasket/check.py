@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import pandas as pd
 import xarray as xr
@@ -41,6 +42,10 @@ class Check:
 
     def frame(self) -> pd.DataFrame:
         """Return prediction, 95 % half width, run and difference of each setting and response."""
+        return self._frame.copy()
+
+    @cached_property
+    def _frame(self) -> pd.DataFrame:
         rows = []
         for number, setting in enumerate(self.settings):
             for load, values in self.responses.values.items():

@@ -110,9 +110,9 @@ class GasketResult(Result):
     def page(self, facts: Facts) -> str:
         """Return the page: the proposed setting, what to do, effects, the model, tables."""
         screening, words, parameters = self.screening, self.words, self.trials.parameters
-        models = surfaces(screening)
         findings = summary(screening, words, self.compared)
         proposal = self.compared.proposal
+        models = proposal.check.surfaces if proposal else surfaces(screening)
         return SectionedPage(
             f"Gasket study of machine {parameters.name}",
             answer(proposal, words) if proposal else " ".join(findings),

@@ -54,19 +54,28 @@ class Aim:
     @cached_property
     def names(self) -> list[str]:
         """Names of the responses that have a goal and vary."""
-        every = self.screening.names
-        return [n for n in every if self._goal(n) and self._ends(n)[1] > self._ends(n)[0]]
+        return list(self.ends)
+
+    @cached_property
+    def ends(self) -> dict[str, FloatArray]:
+        """Best and worst value of any run, of the responses that have a goal and vary.
+
+        Values are signed so that less is better. (2,)
+        """
+        ends = {}
+        for name in filter(self._goal, self.screening.names):
+            frames = self.screening.responses.values.values()
+            values = np.concatenate([frame[name].to_numpy() for frame in frames])
+            signed = self._goal(name) * values
+            best, worst = np.nanmin(signed), np.nanmax(signed)
+            if worst > best:
+                ends[name] = np.array([best, worst])
+        return ends
 
     def _goal(self, name: str) -> float:
         """Return 1 if less of a response is better, -1 if more is, 0 if neither."""
         meaning = self.screening.responses.meanings.get(name)
         return {"smaller": 1.0, "larger": -1.0, "": 0.0}[meaning.goal if meaning else ""]
-
-    def _ends(self, name: str) -> tuple[float, float]:
-        """Return the best and the worst value of any run; less is better."""
-        sign, frames = self._goal(name), self.screening.responses.values.values()
-        values = sign * np.concatenate([frame[name].to_numpy() for frame in frames])
-        return float(np.nanmin(values)), float(np.nanmax(values))
 
     def worst(self, places: FloatArray) -> FloatArray:
         """Return the responses of the worst load, signed so that less is better. (n, responses)
@@ -85,7 +94,7 @@ class Aim:
         """Return how good settings are: 0 to about 1, below 0 with a loss elsewhere. (n,)"""
         worst, zero = self.worst(places), self.worst(np.zeros((1, places.shape[1])))
         excess = np.max((worst - zero) / np.maximum(np.abs(zero), 1e-12), axis=1) - MOST_LOSS
-        ends = np.array([self._ends(name) for name in self.names])
+        ends = np.array(list(self.ends.values()))
         parts = (ends[:, 1] - worst) / (ends[:, 1] - ends[:, 0])
         if GAP in self.names:
             aim = parts[:, self.names.index(GAP)]

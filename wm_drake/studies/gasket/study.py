@@ -6,6 +6,7 @@ the forces and moments of the gasket.
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
@@ -53,7 +54,7 @@ class GasketTrials:
         responses = chosen_responses(self.parameters, self.loads[0].profile, self.response_names)
         object.__setattr__(self, "chosen", responses)
 
-    @property
+    @cached_property
     def measures(self) -> tuple[str, ...]:
         """Measures of each run, as for `simulate_many`."""
         return measures_of(self.parameters, self.chosen)
