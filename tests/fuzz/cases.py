@@ -16,11 +16,11 @@ from ruamel.yaml import YAML
 
 from wm_drake.model.bodies import SDF_FOLDER
 from wm_drake.parameters.components import COMPONENTS_FOLDER
-from wm_drake.parameters.designs import DESIGNS_FOLDER
+from wm_drake.parameters.designs import DESIGNS
 from wm_drake.parameters.factors import GASKET_FACTORS
 from wm_drake.parameters.files import CYCLES_FOLDER, MACHINES_FOLDER
-from wm_drake.parameters.gasket_drawing import shipped_gaskets
-from wm_drake.parameters.tolerances import TOLERANCES_FOLDER
+from wm_drake.parameters.gasket_drawing import GASKETS
+from wm_drake.parameters.tolerances import TOLERANCES
 
 
 @dataclass
@@ -375,9 +375,9 @@ SHIPPED = {
     "regions": CYCLES_FOLDER / "profile_spin_cycle.yaml",
     "component": COMPONENTS_FOLDER / "mstv_damper.yaml",
     "factors": GASKET_FACTORS,
-    "tolerance": TOLERANCES_FOLDER / "laundry.yaml",
-    "design file": DESIGNS_FOLDER / "gasket.yaml",
-    "drawing": shipped_gaskets()["folded"],
+    "tolerance": TOLERANCES.path("laundry"),
+    "design file": DESIGNS.path("gasket"),
+    "drawing": GASKETS.path("folded"),
 }
 TEXTS = {
     "limits": "limits:\n- {quantity: gap, at_least: 0 mm, allowed_share: 0.1 %}\n",

@@ -11,7 +11,8 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput, Multiplexer, Sine
 
-from wm_drake.elements.friction_damper import FrictionDamperParameters, packed_damper_law
+from wm_drake.elements.damper_law import packed_damper_law
+from wm_drake.elements.friction_damper import FrictionDamperParameters
 from wm_drake.errors import InputError
 from wm_drake.laws.damper import mstv_damper
 from wm_drake.parameters import (

@@ -17,10 +17,10 @@ from wm_drake.elements.bushing import (
     SixComponentBushingParameters,
     packed_bushing_law,
 )
+from wm_drake.elements.damper_law import packed_damper_law
 from wm_drake.elements.friction_damper import (
     FRICTION_DAMPER_STRUT,
     FrictionDamperParameters,
-    packed_damper_law,
 )
 from wm_drake.elements.layouts import packed_stiffness
 from wm_drake.elements.mount import mounts_at

@@ -209,18 +209,3 @@ FRICTION_DAMPER_STRUT = ElementKind(
     words="damper as a massless strut between a point of the tub and a point of the housing",
     on_plant=evaluate_friction_damper,
 )
-
-
-__all__ = [
-    "END_BUSHING",
-    "FRICTION_DAMPER",
-    "FRICTION_DAMPER_STRUT",
-    "FrictionDamperParameters",
-    "evaluate_friction_damper",
-    "friction_damper_force",
-    "friction_damper_line",
-    "friction_damper_tension",
-    "friction_damper_wrench",
-    "packed_damper_law",
-    "read_friction_damper",
-]

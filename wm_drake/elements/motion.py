@@ -44,7 +44,7 @@ scalars, in W."""
 
 DrumMotion = namedtuple(
     "DrumMotion",
-    ("rotation", "position", "angular_velocity", "velocity", "drum_angle", "drum_rate"),
+    "rotation position angular_velocity velocity drum_angle drum_rate",
 )
 """A `TubMotion`, and angle and rate of the drum against the tub. [rad, rad/s]"""
 

@@ -37,16 +37,7 @@ WRENCH_SIZE = 6
 
 Mounts = namedtuple(
     "Mounts",
-    (
-        "springs",
-        "dampers",
-        "bushings",
-        "telescopes",
-        "branches",
-        "others",
-        "sponge_states",
-        "tube_states",
-    ),
+    "springs dampers bushings telescopes branches others sponge_states tube_states",
 )
 """Indices at which the mounts of a machine begin.
 

@@ -59,35 +59,9 @@ LARGEST_ANGLE = 2000.0 * np.pi
 
 Places = namedtuple(
     "Places",
-    (
-        "speed",
-        "acceleration",
-        "torque",
-        "time_constant",
-        "unbalances",
-        "parameters",
-        "displacements",
-        "accelerations",
-        "drum",
-        "current",
-        "gasket",
-        "mounts",
-        "cabinet",
-        "feet",
-        "gap",
-        "state",
-        "rate",
-        "in_force",
-        "turned",
-        "packed",
-        "inputs",
-        "stage",
-        "total",
-        "nodes",
-        "sample",
-        "wrenches",
-        "size",
-    ),
+    "speed acceleration torque time_constant unbalances parameters displacements "
+    "accelerations drum current gasket mounts cabinet feet gap state rate in_force turned "
+    "packed inputs stage total nodes sample wrenches size",
 )
 """Indices in the array of an instance.
 
@@ -101,10 +75,7 @@ all; feet: force of the floor on each [N]; gap: smallest distance [m]; state, ra
 engine and its derivative; in_force: acceleration of a prescribed drum [rad/s^2]; turned: angle
 taken off the drum's [rad]; the others are packed numbers and arrays to work in; size: of the array.
 """
-Constants = namedtuple(
-    "Constants",
-    ("packed", "start", "entries", "harmonics", "drum", "points", "pairs", "current", "size"),
-)
+Constants = namedtuple("Constants", "packed start entries harmonics drum points pairs current size")
 """Indices in the array of constants.
 
 packed: packed numbers without unbalance; start: values of the parameters that belong to them;
@@ -114,17 +85,7 @@ harmonics: matrix of the drum's harmonics; drum: rotation of D in T by rows, the
 """
 Counts = namedtuple(
     "Counts",
-    (
-        "packed",
-        "parameters",
-        "entries",
-        "unbalances",
-        "points",
-        "mounts",
-        "feet",
-        "pairs",
-        "currents",
-    ),
+    "packed parameters entries unbalances points mounts feet pairs currents",
 )
 """How many of each there are."""
 Plan = namedtuple("Plan", ("at", "of", "count", "elements", "gasket", "follows_speed"))

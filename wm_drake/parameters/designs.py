@@ -13,8 +13,8 @@ from wm_drake.parameters.text_files import DATA, ShippedFiles
 from wm_drake.parameters.tolerances import OneSided, fraction
 from wm_drake.parameters.types import Name
 
-DESIGNS_FOLDER = DATA / "designs"
-_FILES = ShippedFiles("design file", DESIGNS_FOLDER)
+DESIGNS = ShippedFiles("design file", DATA / "designs")
+"""Design files of the package."""
 
 
 class DesignVariable(Frozen):
@@ -156,16 +156,6 @@ def check_over(text: str) -> None:
             ) from None
 
 
-def shipped_designs() -> dict[str, Path]:
-    """Return the design files that the package contains, by name."""
-    return _FILES.listed()
-
-
-def design_path(name_or_path: str | Path) -> Path:
-    """Return the path of a design file, given the name of a shipped one or a path."""
-    return _FILES.path(name_or_path)
-
-
 def load_design(name_or_path: str | Path = "gasket") -> DesignTask:
     """Read a design file."""
-    return read_model(DesignTask, design_path(name_or_path))
+    return read_model(DesignTask, DESIGNS.path(name_or_path))

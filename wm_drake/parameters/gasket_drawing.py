@@ -20,7 +20,8 @@ from wm_drake.parameters.problems import problems_of
 from wm_drake.parameters.text_files import DATA, ShippedFiles
 from wm_drake.parameters.types import FloatArray
 
-_FILES = ShippedFiles("gasket drawing", DATA / "gaskets")
+GASKETS = ShippedFiles("gasket drawing", DATA / "gaskets")
+"""Gasket drawings of the package."""
 
 STIFFEST_STRETCH = 3.0
 """Stretch up to which a rubber must stiffen in tension and compression: beyond folded gaskets."""
@@ -342,18 +343,13 @@ class GasketDrawing(_Described):
         return centre + np.column_stack([c * arm[0] - s * arm[1], s * arm[0] + c * arm[1]])
 
 
-def shipped_gaskets() -> dict[str, Path]:
-    """Return the drawings that the package contains, by name."""
-    return _FILES.listed()
-
-
 def load_gasket_drawing(name_or_path: str | Path) -> GasketDrawing:
     """Read a drawing of a gasket.
 
     Args:
         name_or_path: Name of a shipped drawing, or path of a YAML file.
     """
-    path = _FILES.path(name_or_path)
+    path = GASKETS.path(name_or_path)
     if "dxf" not in read_yaml(path):
         return read_model(GasketDrawing, path)
     read = read_model(_DxfDrawing, path)

@@ -16,8 +16,8 @@ from wm_drake.parameters.text_files import DATA, ShippedFiles
 from wm_drake.parameters.types import Name
 from wm_drake.parameters.units import Share
 
-TOLERANCES_FOLDER = DATA / "tolerances"
-_FILES = ShippedFiles("tolerance file", TOLERANCES_FOLDER)
+TOLERANCES = ShippedFiles("tolerance file", DATA / "tolerances")
+"""Tolerance files of the package."""
 
 Kind: TypeAlias = Literal["normal", "lognormal", "uniform", "triangular"]
 
@@ -232,23 +232,13 @@ class _Limits(Frozen):
     limits: tuple[Limit, ...] = Field(min_length=1)
 
 
-def shipped_tolerances() -> dict[str, Path]:
-    """Return the tolerance files that the package contains, by name."""
-    return _FILES.listed()
-
-
 def load_tolerances(name_or_path: str | Path = "laundry") -> Tolerances:
     """Read a tolerance file.
 
     Args:
         name_or_path: Name of a shipped file or path of a YAML file.
     """
-    return read_model(Tolerances, tolerances_path(name_or_path))
-
-
-def tolerances_path(name_or_path: str | Path) -> Path:
-    """Return the path of a tolerance file, given the name of a shipped one or a path."""
-    return _FILES.path(name_or_path)
+    return read_model(Tolerances, TOLERANCES.path(name_or_path))
 
 
 def check_load(tolerances: Tolerances, machine: MachineParameters, path: Path) -> None:

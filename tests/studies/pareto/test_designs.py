@@ -11,7 +11,7 @@ from pages import data_of, drawings
 
 from wm_drake.errors import InputError
 from wm_drake.parameters import load_machine
-from wm_drake.parameters.designs import DesignTask, load_design, shipped_designs
+from wm_drake.parameters.designs import DESIGNS, DesignTask, load_design
 from wm_drake.parameters.tolerances import Tolerances
 from wm_drake.simulation.cases import Case, case_of
 from wm_drake.studies.pareto.envelopes import front_envelopes
@@ -259,7 +259,7 @@ def test_failed_runs_are_not_on_the_front(machine):
 
 
 def test_shipped_files_fit_the_reference_machine(machine):
-    for name in shipped_designs():
+    for name in DESIGNS.listed():
         designs = designs_of(machine, load_design(name))
         assert len(designs.dimensions) == 8
         for corner in (0.0, 1.0):

@@ -8,11 +8,11 @@ from scipy import stats
 from wm_drake.errors import InputError
 from wm_drake.parameters import load_machine
 from wm_drake.parameters.tolerances import (
+    TOLERANCES,
     Limit,
     Tolerances,
     load_limits,
     load_tolerances,
-    shipped_tolerances,
 )
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import MEASURES
@@ -93,7 +93,7 @@ def test_split_laundry_is_two_lumps(machine):
 
 
 def test_shipped_files_fit_the_reference_machine(machine):
-    for name in shipped_tolerances():
+    for name in TOLERANCES.listed():
         found = uncertain(machine, load_tolerances(name).model_dump())
         assert all(variable.source for variable in found.variables)
         found.check(lambda case: None)

@@ -9,7 +9,7 @@ from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters import designs as design_files
-from wm_drake.parameters.tolerances import Tolerances, check_load, load_tolerances, tolerances_path
+from wm_drake.parameters.tolerances import TOLERANCES, Tolerances, check_load, load_tolerances
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.studies.inputs import problems_of_file, selected_cases
 from wm_drake.studies.pareto.envelopes import front_envelopes
@@ -35,7 +35,7 @@ class DesignTask(Task):
             raise input_error(f"no search '{options.search}'{hint}", where="--search")
         self.settings = SearchSettings(options.evaluations, options.population, options.seed)
         self.options, self.file = options, design_files.load_design(options.file)
-        with problems_of_file(design_files.design_path(options.file)):
+        with problems_of_file(design_files.DESIGNS.path(options.file)):
             self.machine, self.designs = self._designs(machine)
         needed = {response.measure for response in self.designs.responses} or {"extremes"}
         self.measures = tuple(name for name in MEASURES if name in needed)
@@ -50,7 +50,7 @@ class DesignTask(Task):
             design_files.check_loads(task, full)
             cases = selected_cases(full, list(task.loads), True, profile)
             return build_machine(full), machine_designs(full, task, cases)
-        check_load(tolerances, full, tolerances_path(task.robust.tolerances))
+        check_load(tolerances, full, TOLERANCES.path(task.robust.tolerances))
         load = tolerances.load or next(iter(full.loads))
         (case,) = selected_cases(full, [load], True, profile)
 

@@ -11,11 +11,11 @@ from wm_drake.model.bodies import with_sdf_values
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
 from wm_drake.parameters.tolerances import (
+    TOLERANCES,
     Limit,
     check_load,
     load_limits,
     load_tolerances,
-    tolerances_path,
 )
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import MEASURES
@@ -69,7 +69,7 @@ class ToleranceTask(Task):
         """Return the built machine and its uncertain quantities, checked at their ends."""
         parameters, tolerances = machine.parameters, self.tolerances
         spin = profile_of(parameters, options.profile)
-        path = tolerances_path(options.file)
+        path = TOLERANCES.path(options.file)
         check_load(tolerances, parameters, path)
         load = next(iter(parameters.loads.values()))
         if tolerances.load:
