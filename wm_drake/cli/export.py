@@ -1,13 +1,12 @@
 """Command `wm-drake export`: a machine as a file for other programs."""
 
-import inspect
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from wm_drake.cli.common import MachineOption, SetOption
-from wm_drake.cli.options import parameters_of
+from wm_drake.cli.options import with_options
 from wm_drake.export.options import FmuOptions
 from wm_drake.report.terminal import say
 from wm_drake.studies.inputs import load_parameters, located_in, machine_warnings
@@ -48,14 +47,4 @@ def fmu(
     )
 
 
-def _with_options() -> Any:
-    """Return the function of the command, with a signature that typer understands."""
-    signature = inspect.signature(fmu)
-    named = [p for p in signature.parameters.values() if p.kind is not p.VAR_KEYWORD]
-    both = [p.replace(kind=p.KEYWORD_ONLY) for p in (*named, *parameters_of(FmuOptions))]
-    fmu.__signature__ = inspect.Signature(both)  # type: ignore[attr-defined]
-    fmu.__annotations__ = {p.name: p.annotation for p in both}
-    return fmu
-
-
-app.command("fmu")(_with_options())
+app.command("fmu")(with_options(fmu, FmuOptions))

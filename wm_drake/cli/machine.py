@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from wm_drake.cli.common import JsonOption, SetOption
-from wm_drake.cli.new_machine import machine_new_with_options
+from wm_drake.cli.new_machine import NewOptions, machine_new
+from wm_drake.cli.options import with_options
 from wm_drake.errors import InputError, WmDrakeError, input_error, shortened
 from wm_drake.report.terminal import say
 from wm_drake.studies.inputs import (
@@ -184,4 +185,4 @@ def machine_list(as_json: JsonOption = False) -> None:
         typer.echo(f"{name:{width}}  {text}")
 
 
-app.command("new")(machine_new_with_options())
+app.command("new")(with_options(machine_new, NewOptions))

@@ -1,6 +1,5 @@
 """Command `wm-drake machine new`: files to start from, from another machine or from numbers."""
 
-import inspect
 import json
 import os
 import re
@@ -10,7 +9,6 @@ from typing import Annotated, Any
 
 import typer
 
-from wm_drake.cli.options import parameters_of
 from wm_drake.errors import InputError, input_error
 from wm_drake.report.terminal import say
 from wm_drake.studies.inputs import existing_file
@@ -69,16 +67,6 @@ def machine_new(
         return
     _write_new(path, _template(path, base))
     say(f"{path} extends '{base}'. Edit it, then: wm-drake machine check {path}")
-
-
-def machine_new_with_options() -> Any:
-    """Return the function of the command, with a signature that typer understands."""
-    signature = inspect.signature(machine_new)
-    named = [p for p in signature.parameters.values() if p.kind is not p.VAR_KEYWORD]
-    both = [p.replace(kind=p.KEYWORD_ONLY) for p in (*named, *parameters_of(NewOptions))]
-    machine_new.__signature__ = inspect.Signature(both)  # type: ignore[attr-defined]
-    machine_new.__annotations__ = {p.name: p.annotation for p in both}
-    return machine_new
 
 
 def _new_path(name: str) -> Path:

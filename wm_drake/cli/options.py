@@ -62,6 +62,16 @@ def command_of(study: Study) -> Callable[..., None]:
     return run
 
 
+def with_options(command: Any, model: type[BaseModel]) -> Any:
+    """Return a command whose `**` arguments are the fields of a model, as typer understands it."""
+    signature = inspect.signature(command)
+    named = [p for p in signature.parameters.values() if p.kind is not p.VAR_KEYWORD]
+    both = [p.replace(kind=p.KEYWORD_ONLY) for p in (*named, *parameters_of(model))]
+    command.__signature__ = inspect.Signature(both)
+    command.__annotations__ = {p.name: p.annotation for p in both}
+    return command
+
+
 def _is_set(context: typer.Context, name: str) -> bool:
     """Return whether the user has set an option, which then counts more than `--quick`."""
     source = context.get_parameter_source(name)

@@ -5,7 +5,7 @@ import inspect
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Annotated, Any, TextIO
+from typing import Annotated, Any
 
 import typer
 
@@ -57,19 +57,12 @@ def _notices_shown() -> Iterator[None]:
         warnings.simplefilter("always", InputNotice)
         others, known = warnings.showwarning, set[str]()
 
-        def show(
-            message: Warning | str,
-            category: type[Warning],
-            filename: str,
-            lineno: int,
-            file: TextIO | None = None,
-            line: str | None = None,
-        ) -> None:
+        def show(message: Warning | str, category: type[Warning], *place: Any) -> None:
             if not issubclass(category, InputNotice):
-                others(message, category, filename, lineno, file, line)
+                others(message, category, *place)
             elif str(message) not in known:
                 known.add(str(message))
                 say(f"notice: {message}", err=True)
 
-        warnings.showwarning = show
+        warnings.showwarning = show  # type: ignore[assignment]
         yield
