@@ -15,7 +15,7 @@ from wm_drake.engines.trajectory import Trajectory
 from wm_drake.model.machine import Setup
 from wm_drake.parameters.cabinet import Cabinet
 from wm_drake.parameters.types import FloatArray
-from wm_drake.simulation.variables import Variables
+from wm_drake.simulation.variables import Variables, declared
 
 
 @dataclass(frozen=True)
@@ -60,16 +60,14 @@ def cabinet_variables(setup: Setup, trajectory: Trajectory) -> Variables:
     forces = floor_forces(states, setup.cabinet.packed())
     slips = states[:, BODY_STATE_SIZE:].reshape(-1, FEET_COUNT, 2)
     slips = np.concatenate([slips, np.zeros_like(slips[:, :, :1])], axis=2)
-    by_axis, by_foot = ("time", "axis"), ("time", "foot", "axis")
-    angle = "roll, pitch, yaw of the cabinet in W (3-2-1 Euler angles)"
-    return {
-        "cabinet_angle": (("time", "angle"), states[:, :3], "rad", angle),
-        "cabinet_position": (by_axis, states[:, 3:6], "m", "displacement of the cabinet in W"),
-        "cabinet_angular_velocity": (by_axis, states[:, 6:9], "rad/s", "of the cabinet, in W"),
-        "cabinet_velocity": (by_axis, states[:, 9:12], "m/s", "velocity of the cabinet in W"),
-        "floor_force": (by_foot, forces, "N", "force of the floor on each foot"),
-        "foot_slip": (by_foot, slips, "m", "how far each foot has slid on the floor, in W"),
-    }
+    return declared(
+        cabinet_angle=states[:, :3],
+        cabinet_position=states[:, 3:6],
+        cabinet_angular_velocity=states[:, 6:9],
+        cabinet_velocity=states[:, 9:12],
+        floor_force=forces,
+        foot_slip=slips,
+    )
 
 
 def floor_forces(states: FloatArray, p: FloatArray) -> FloatArray:

@@ -29,9 +29,8 @@ MARGINS = ("smallest_foot_load", "slide_margin", "turn_margin", "tilt_margin")
 BY_FOOT = ("foot_normal_smallest", "foot_normal_largest", "foot_tangential_largest")
 """Names of what is measured of each foot, in the order of the rows of `foot_histories`."""
 
-FOOT_VARIABLES = (*BY_FOOT, *MARGINS)
 REGION_VARIABLES = tuple(f"region_{name}" for name in MARGINS)
-"""Names of what is measured of the feet over a run, and in each region of the profile."""
+"""Names of what is measured of the feet in each region of the profile."""
 
 
 def cabinet_of(parameters: MachineParameters) -> Cabinet:
@@ -119,10 +118,10 @@ def foot_measures(
             profile that has none.
 
     Returns:
-        By the names of `FOOT_VARIABLES` and `REGION_VARIABLES`: smallest and largest normal load
-        and largest tangential load (4,) of the feet [N]; smallest load of any foot [N] and smallest
-        margins of sliding [N], turning [N m] and tilting [N m] over the run; the same in each
-        region (regions,). NaN without samples, and where the run ended before the region did.
+        By the names of `BY_FOOT`, `MARGINS` and `REGION_VARIABLES`: smallest and largest normal
+        load and largest tangential load (4,) of the feet [N]; smallest load of any foot [N] and
+        smallest margins of sliding [N], turning [N m] and tilting [N m] over the run; the same in
+        each region (regions,). NaN without samples, and where the run ended before the region did.
     """
     p, regions = packed_feet(cabinet, gravity), region_limits(profile, period)
     parts: list[Any] = [slice(*limits) for limits in regions] or [*ranges]

@@ -10,8 +10,8 @@ from wm_drake.model.machine import Setup
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cabinet import cabinet_variables
 from wm_drake.simulation.histories import output_history, position_history
-from wm_drake.simulation.mounts import POINT, mount_wrenches, mounts_along
-from wm_drake.simulation.variables import Variables
+from wm_drake.simulation.mounts import mount_wrenches, mounts_along
+from wm_drake.simulation.variables import Variables, declared
 
 AXES = ("x", "y", "z")
 
@@ -46,61 +46,21 @@ def _motion(setup: Setup, trajectory: Trajectory, displacements: FloatArray) -> 
         for places in (setup.sensor_points, setup.accelerometer_points)
     )
     sensors, detergent = np.split(displacements, [len(points)], axis=1)
-    return {
-        "tub_angle": (
-            ("time", "angle"),
-            state[:, 0:3],
-            "rad",
-            "roll, pitch, yaw of T in W (3-2-1 Euler angles)",
-        ),
-        "tub_position": (("time", "axis"), state[:, 3:6], "m", "position of To in W"),
-        "tub_angular_velocity": (
-            ("time", "axis"),
-            state[:, 7:10],
-            "rad/s",
-            "angular velocity of T in W",
-        ),
-        "tub_velocity": (("time", "axis"), state[:, 10:13], "m/s", "velocity of To in W"),
-        "tub_angular_acceleration": (
-            ("time", "axis"),
-            acceleration[:, :3],
-            "rad/s^2",
-            "angular acceleration of T in W",
-        ),
-        "tub_acceleration": (
-            ("time", "axis"),
-            acceleration[:, 3:],
-            "m/s^2",
-            "acceleration of To in W",
-        ),
-        "drum_angle": (("time",), state[:, 6], "rad", "angle of the drum against the tub"),
-        "drum_speed": (("time",), state[:, 13], "rad/s", "speed of the drum against the tub"),
-        "displacement": (
-            ("time", "sensor"),
-            sensors,
-            "m",
-            "displacement at the sensors, along their axes",
-        ),
-        "sensor_point": (("sensor", "axis"), points, "m", "points of the sensors in T"),
-        "accelerometer_point": (
-            ("accelerometer", "axis"),
-            accelerometers,
-            "m",
-            "points of the vibration sensors in T",
-        ),
-        "detergent_displacement": (
-            ("time", "axis"),
-            detergent,
-            "m",
-            "displacement of the point nearest the detergent box",
-        ),
-        "damper_deformation": (
-            ("time", "damper"),
-            trajectory.deformation,
-            "m",
-            "deformation of the damper's sponge",
-        ),
-    }
+    return declared(
+        tub_angle=state[:, 0:3],
+        tub_position=state[:, 3:6],
+        tub_angular_velocity=state[:, 7:10],
+        tub_velocity=state[:, 10:13],
+        tub_angular_acceleration=acceleration[:, :3],
+        tub_acceleration=acceleration[:, 3:],
+        drum_angle=state[:, 6],
+        drum_speed=state[:, 13],
+        displacement=sensors,
+        sensor_point=points,
+        accelerometer_point=accelerometers,
+        detergent_displacement=detergent,
+        damper_deformation=trajectory.deformation,
+    )
 
 
 def _tubes(trajectory: Trajectory) -> Variables:
@@ -108,40 +68,18 @@ def _tubes(trajectory: Trajectory) -> Variables:
     tubes = trajectory.tubes
     if not tubes.shape[1]:
         return {}
-    return {
-        "tube_angle": (
-            ("time", "tube", "angle"),
-            tubes[:, :, :3],
-            "rad",
-            "roll, pitch, yaw of the outer tubes in W",
-        ),
-        "tube_position": (
-            ("time", "tube", "axis"),
-            tubes[:, :, 3:6],
-            "m",
-            "displacement of the link frames of the outer tubes in W",
-        ),
-        "tube_extension": (
-            ("time", "tube"),
-            tubes[:, :, 6],
-            "m",
-            "extension of the damper beyond its length in the SDF",
-        ),
-    }
+    return declared(
+        tube_angle=tubes[:, :, :3],
+        tube_position=tubes[:, :, 3:6],
+        tube_extension=tubes[:, :, 6],
+    )
 
 
 def _branches(setup: Setup, trajectory: Trajectory) -> Variables:
     """Return the stretches of the branches of rubber bushings; none without them."""
     if not branch_names(setup):
         return {}
-    return {
-        "branch_stretch": (
-            ("time", "branch"),
-            trajectory.stretches,
-            "m, rad about an axis",
-            "stretch of the friction or the Maxwell spring of a bushing of rubber",
-        ),
-    }
+    return declared(branch_stretch=trajectory.stretches)
 
 
 def branch_names(setup: Setup) -> tuple[str, ...]:
@@ -162,33 +100,12 @@ def _whirl(setup: Setup, trajectory: Trajectory) -> Variables:
     # the law takes the states of two trees, tub and carrier; each includes the position of a joint
     states = np.hstack([trajectory.state, carrier[:, :6], zeros, carrier[:, 6:], zeros])
     drum_bearing_history(states, np.empty((len(carrier), 0)), setup.bearing.packed(), outputs)
-    dims, where = ("time", "axis"), "in the tub's frame, y along the drum axis"
-    return {
-        "drum_displacement": (
-            dims,
-            outputs[:, 0:3],
-            "m",
-            f"displacement of the drum axis in the bearing, {where}",
-        ),
-        "drum_tilt": (
-            dims,
-            outputs[:, 3:6],
-            "rad",
-            f"rotation vector of the drum's bearing against the tub, {where}",
-        ),
-        "bearing_force": (
-            dims,
-            outputs[:, 6:9],
-            "N",
-            f"force of the drum on the tub in the bearing, {where}",
-        ),
-        "bearing_moment": (
-            dims,
-            outputs[:, 9:12],
-            "N m",
-            f"moment of the drum on the tub in the bearing, {where}",
-        ),
-    }
+    return declared(
+        drum_displacement=outputs[:, 0:3],
+        drum_tilt=outputs[:, 3:6],
+        bearing_force=outputs[:, 6:9],
+        bearing_moment=outputs[:, 9:12],
+    )
 
 
 def _current(setup: Setup, trajectory: Trajectory) -> Variables:
@@ -196,8 +113,7 @@ def _current(setup: Setup, trajectory: Trajectory) -> Variables:
     factor = setup.motor.current_per_drum_torque if setup.motor else None
     if factor is None:
         return {}
-    current = factor * trajectory.motor_torque
-    return {"motor_current": (("time",), current, "A", "current of the motor")}
+    return declared(motor_current=factor * trajectory.motor_torque)
 
 
 def _forces(
@@ -210,29 +126,13 @@ def _forces(
         dampers: (n, dampers) tensions. [N]
         bushings: (n, bushings, 6) force and moment on the housing. [N, N m]
     """
-    dims = ("time", "bushing", "axis")
-    return {
-        "motor_torque": (
-            ("time",),
-            trajectory.motor_torque,
-            "N m",
-            "torque of the motor on the drum",
-        ),
-        "spring_tension": (("time", "spring"), springs, "N", "spring tension"),
-        "damper_tension": (("time", "damper"), dampers, "N", "damper tension"),
-        "bushing_force": (
-            dims,
-            bushings[:, :, :3],
-            "N",
-            "force of gasket and bushings on the housing",
-        ),
-        "bushing_moment": (
-            dims,
-            bushings[:, :, 3:],
-            "N m",
-            "moment of gasket and bushings on the housing",
-        ),
-    }
+    return declared(
+        motor_torque=trajectory.motor_torque,
+        spring_tension=springs,
+        damper_tension=dampers,
+        bushing_force=bushings[:, :, :3],
+        bushing_moment=bushings[:, :, 3:],
+    )
 
 
 def others_by_kind(setup: Setup) -> dict[str, list[str]]:
@@ -279,22 +179,12 @@ def _on_cabinet(wrenches: FloatArray) -> Variables:
     Args:
         wrenches: (n, mounts, 6) from `mount_wrenches`. [N m, N]
     """
-    resultant, dims = wrenches.sum(axis=1), ("time", "axis")
-    return {
-        "mount_force": (
-            ("time", "mount", "axis"),
-            wrenches[:, :, 3:],
-            "N",
-            "force of each spring, damper and bushing on the cabinet",
-        ),
-        "cabinet_force": (dims, resultant[:, 3:], "N", "force of all mounts on the cabinet"),
-        "cabinet_moment": (
-            dims,
-            resultant[:, :3],
-            "N m",
-            f"moment of all mounts on the cabinet about {POINT}",
-        ),
-    }
+    resultant = wrenches.sum(axis=1)
+    return declared(
+        mount_force=wrenches[:, :, 3:],
+        cabinet_force=resultant[:, 3:],
+        cabinet_moment=resultant[:, :3],
+    )
 
 
 def tub_outputs(setup: Setup, trajectory: Trajectory) -> tuple[FloatArray, ...]:
