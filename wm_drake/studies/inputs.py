@@ -83,7 +83,13 @@ def load_parameters(
     """
     from wm_drake.parameters import load_machine
 
-    parameters = change(load_machine(file))
+    return changed_parameters(change(load_machine(file)), sets)
+
+
+def changed_parameters(
+    parameters: "MachineParameters", sets: Sequence[str] | None
+) -> "MachineParameters":
+    """Return parameters with the changes of `--set`."""
     changed, sources = with_sets(parameters, parameters.sources, sets)
     return changed.model_copy(update={"sources": sources})
 
@@ -213,24 +219,15 @@ def existing_file(path: Path, option: str) -> Path:
     return path
 
 
-def check_buildable(file: str, parameters: "MachineParameters") -> "tuple[Problem, ...]":
-    """Raise an InputError for faults that only building the machine reveals.
-
-    Returns:
-        Values of the machine that are legal but unusual, with file and line.
-    """
-    return built_with_problems(file, parameters)[1]
-
-
 def build_checked(file: str, parameters: "MachineParameters") -> "Machine":
-    """Return the built machine, after the checks of `check_buildable`."""
+    """Return the built machine, after the checks of `built_with_problems`."""
     return built_with_problems(file, parameters)[0]
 
 
 def built_with_problems(
     file: str, parameters: "MachineParameters"
 ) -> "tuple[Machine, tuple[Problem, ...]]":
-    """Return the built machine and its unusual values, after the checks of `check_buildable`."""
+    """Return the built machine, and what is legal but unusual in it, with file and line."""
     from wm_drake.engines.compiled.packing import pack
     from wm_drake.engines.compiled.stepping import choose_stepping
     from wm_drake.engines.memory import check_size

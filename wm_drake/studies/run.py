@@ -18,6 +18,7 @@ from wm_drake.report.provenance import command_line
 from wm_drake.report.terminal import QUIET, say
 from wm_drake.studies.inputs import (
     build_checked,
+    changed_parameters,
     friction_warnings,
     load_parameters,
     machine_warnings,
@@ -447,14 +448,6 @@ def _stepping(machine: "Machine | None") -> tuple[float, str]:
     if machine is None:
         return 0.0, ""
     return checked_step(machine.parameters, None), checked_integrator(machine.parameters, None)
-
-
-def changed_parameters(parameters: "MachineParameters", sets: Sequence[str]) -> "MachineParameters":
-    """Return parameters with the changes of `--set`."""
-    from wm_drake.studies.inputs import with_sets
-
-    changed, sources = with_sets(parameters, parameters.sources, sets)
-    return changed.model_copy(update={"sources": sources})
 
 
 def _written(result: Result, facts: Facts, out: Path | None, run: Run) -> tuple[str, ...]:
