@@ -18,3 +18,18 @@ from numba.core.compiler import Compiler, CompileResult
 from numba.core.imputils import lower_constant
 from numba.core.typeconv import Conversion
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+
+__all__ = [
+    "AbstractTemplate",
+    "CompileResult",
+    "CompileResultCacheImpl",
+    "Compiler",
+    "Conversion",
+    "FunctionCache",
+    "IndexDataCacheFile",
+    "JITCodeLibrary",
+    "cgutils",
+    "infer_global",
+    "lower_constant",
+    "signature",
+]

@@ -20,3 +20,24 @@ from wm_drake.rigs.bench import (
 from wm_drake.rigs.integration import NotSteadyError
 from wm_drake.rigs.loops import ForceLoop, LoopMeasures, force_loop, force_loops, measures_of
 from wm_drake.rigs.run import JIG_ARM, MATRICES, RigRun, beyond_tables, run_rig
+
+__all__ = [
+    "AXES",
+    "JIG_ARM",
+    "MATRICES",
+    "Bench",
+    "BushingBench",
+    "DamperBench",
+    "ForceLoop",
+    "Harmonic",
+    "LoopMeasures",
+    "NotSteadyError",
+    "RigRun",
+    "beyond_tables",
+    "bushing_bench",
+    "damper_bench",
+    "force_loop",
+    "force_loops",
+    "measures_of",
+    "run_rig",
+]

@@ -9,3 +9,14 @@ from wm_drake.simulation.measures.kind import Measure, Variable, each_run
 from wm_drake.simulation.measures.record import Measures, measure
 from wm_drake.simulation.measures.registry import MEASURES, register_measure
 from wm_drake.simulation.measures.run import Run
+
+__all__ = [
+    "MEASURES",
+    "Measure",
+    "Measures",
+    "Run",
+    "Variable",
+    "each_run",
+    "measure",
+    "register_measure",
+]
