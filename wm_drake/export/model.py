@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -49,17 +50,15 @@ class Variable:
 
     Attributes:
         index: Its index in the array of an instance, which is its value reference.
-        causality, variability: As the standard has them.
         start: Value before a run; None for one that is computed.
         minimum, maximum: Bounds; None without one.
         nominal: Usual size.
         derivative: Index of the state whose derivative it is; -1 for others.
+        causality, variability: As the standard has them.
     """
 
     name: str
     index: int
-    causality: Literal["input", "output", "parameter", "local"]
-    variability: Literal["continuous", "tunable"] = "continuous"
     unit: str = ""
     words: str = ""
     start: float | None = None
@@ -67,6 +66,13 @@ class Variable:
     maximum: float | None = None
     nominal: float | None = None
     derivative: int = -1
+    causality: Literal["input", "output", "parameter", "local"] = "local"
+    variability: Literal["continuous", "tunable"] = "continuous"
+
+
+_input = partial(Variable, causality="input")
+_output = partial(Variable, causality="output")
+_tunable = partial(Variable, causality="parameter", variability="tunable")
 
 
 @dataclass(frozen=True)
@@ -289,102 +295,30 @@ class _Contents:
         ]
 
     def _inputs(self, at: Any, numbers: FloatArray) -> list[Variable]:
-        variables: list[Variable] = []
         if self.input_kind == "speed":
-            variables += [
-                Variable(
-                    "drum_speed",
-                    at.speed,
-                    "input",
-                    unit="rad/s",
-                    start=float(numbers[at.speed]),
-                    words="speed of the drum against the tub",
-                    nominal=40.0,
-                ),
-                Variable(
-                    "drum_acceleration",
-                    at.acceleration,
-                    "input",
-                    unit="rad/s^2",
-                    start=0.0,
-                    words="rate of drum_speed; 0 if it is not known: the drum then follows "
-                    "drum_speed a step later",
-                ),
-                Variable(
-                    "drum_time_constant",
-                    at.time_constant,
-                    "parameter",
-                    "tunable",
-                    "s",
-                    "model exchange: time constant with which the drum follows drum_speed",
-                    TIME_CONSTANT,
-                    1e-4,
-                    1.0,
-                ),
-            ]
+            variables = _speed_inputs(at, float(numbers[at.speed]))
         else:
             at_motor = motor_of(self.setup.parameters.drive)
             where = "the motor's shaft" if at_motor and at_motor.rotor_inertia else "the drum"
-            variables.append(
-                Variable(
-                    "motor_torque_demand",
-                    at.torque,
-                    "input",
-                    unit="N*m",
-                    start=0.0,
-                    words=f"torque at {where}",
-                )
-            )
-        for k, values in enumerate(self.unbalances):
+            variables = [_input("motor_torque_demand", at.torque, "N*m", f"torque at {where}", 0.0)]
+        for k, (mass, phase, y, radius) in enumerate(self.unbalances):
             begin, name = at.unbalances + UNBALANCE_SIZE * k, f"unbalance[{k + 1}]"
-            mass, phase, y, radius = values
+            of_mass = "mass of a point mass in the drum"
+            around = "its angle from the top, positive as the drum turns"
+            along = "its position along the drum axis, to the rear, from mid-depth"
+            away = "its distance from the drum axis"
             variables += [
-                Variable(
-                    f"{name}.mass",
-                    begin,
-                    "input",
-                    unit="kg",
-                    start=mass,
-                    minimum=0.0,
-                    maximum=20.0,
-                    nominal=1.0,
-                    words="mass of a point mass in the drum",
-                ),
-                Variable(
-                    f"{name}.phase",
-                    begin + 1,
-                    "input",
-                    unit="rad",
-                    start=phase,
-                    words="its angle from the top, positive as the drum turns",
-                ),
-                Variable(
-                    f"{name}.y",
-                    begin + 2,
-                    "input",
-                    unit="m",
-                    start=y,
-                    nominal=0.1,
-                    words="its position along the drum axis, to the rear, from mid-depth",
-                ),
-                Variable(
-                    f"{name}.radius",
-                    begin + 3,
-                    "parameter",
-                    "tunable",
-                    "m",
-                    "its distance from the drum axis",
-                    radius,
-                    0.0,
-                    1.0,
-                ),
+                _input(f"{name}.mass", begin, "kg", of_mass, mass, 0.0, 20.0, nominal=1.0),
+                _input(f"{name}.phase", begin + 1, "rad", around, phase),
+                _input(f"{name}.y", begin + 2, "m", along, y, nominal=0.1),
+                _tunable(f"{name}.radius", begin + 3, "m", away, radius, 0.0, 1.0),
             ]
         return variables
 
     def _parameters(self, at: Any) -> list[Variable]:
         return [
-            Variable(
-                structured(t.key), at.parameters + k, "parameter", "tunable", t.unit.si,
+            _tunable(
+                structured(t.key), at.parameters + k, t.unit.si,
                 f"{t.key} of the machine file", t.value, t.minimum, t.maximum,
             )
             for k, t in enumerate(self.tuned)
@@ -394,10 +328,7 @@ class _Contents:
         variables: list[Variable] = []
 
         def add(names: Sequence[str], begin: int, unit: str, words: str) -> None:
-            variables.extend(
-                Variable(name, begin + k, "output", unit=unit, words=words)
-                for k, name in enumerate(names)
-            )
+            variables.extend(_output(name, begin + k, unit, words) for k, name in enumerate(names))
 
         points = [*self.setup.sensors, *(f"detergent_{axis}" for axis in AXES)]
         add(
@@ -448,29 +379,29 @@ class _Contents:
         words = self.states.words()
         free = [k for k in range(self.states.size) if k not in driven]
         for number, k in enumerate(free, start=1):
-            about = f"{roles[k][1]} of {words[k]}"
-            start = float(numbers[at.state + k])
+            name, about = f"state[{number}]", f"{roles[k][1]} of {words[k]}"
+            place, rate = at.state + k, at.rate + k
+            start = float(numbers[place])
             nominal = 1.0 if roles[k][1] not in PLACES else 0.1
-            variables.append(
-                Variable(
-                    f"state[{number}]",
-                    at.state + k,
-                    "local",
-                    words=about,
-                    start=start,
-                    nominal=nominal,
-                )
-            )
-            variables.append(
-                Variable(
-                    f"der(state[{number}])",
-                    at.rate + k,
-                    "local",
-                    words=f"rate: {about}",
-                    derivative=at.state + k,
-                )
-            )
+            variables += [
+                Variable(name, place, words=about, start=start, nominal=nominal),
+                Variable(f"der({name})", rate, words=f"rate: {about}", derivative=place),
+            ]
         return variables
+
+
+def _speed_inputs(at: Any, speed: float) -> list[Variable]:
+    """Return the inputs of a machine whose drum follows a speed."""
+    of_speed = "speed of the drum against the tub"
+    of_rate = (
+        "rate of drum_speed; 0 if it is not known: the drum then follows drum_speed a step later"
+    )
+    of_time = "model exchange: time constant with which the drum follows drum_speed"
+    return [
+        _input("drum_speed", at.speed, "rad/s", of_speed, speed, nominal=40.0),
+        _input("drum_acceleration", at.acceleration, "rad/s^2", of_rate, 0.0),
+        _tunable("drum_time_constant", at.time_constant, "s", of_time, TIME_CONSTANT, 1e-4, 1.0),
+    ]
 
 
 def _currents(setup: Setup) -> list[float]:
