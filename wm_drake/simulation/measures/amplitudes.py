@@ -7,7 +7,7 @@ import numpy as np
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.simulation.displacements import amplitudes, power_means
-from wm_drake.simulation.measures.kind import Measure, Variable, each_run
+from wm_drake.simulation.measures.kind import Measure, Variable, detail, each_run
 from wm_drake.simulation.measures.run import Run
 
 MM, RPM = Unit("m", "mm"), Unit("rad/s", "rpm")
@@ -62,26 +62,20 @@ AMPLITUDES = Measure(
 IN_REGIONS = Measure(
     "amplitudes in regions",
     (
-        Variable(
+        detail(
             "region_amplitude",
             ("region", "sensor"),
             MM,
             "amplitude in a region",
             "largest absolute value of the envelopes in each region of the spin profile",
-            is_response=False,
-            json=None,
-            studio=None,
         ),
-        Variable(
+        detail(
             "region_critical_speed",
             ("region", "sensor"),
             RPM,
             "critical speed in a region",
             "drum speed at which the amplitude of a region occurs",
             better="",
-            is_response=False,
-            json=None,
-            studio=None,
         ),
     ),
     each_run(_in_regions),

@@ -3,7 +3,7 @@
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.simulation.drive import measured_drive
-from wm_drake.simulation.measures.kind import Better, Measure, Variable, each_run
+from wm_drake.simulation.measures.kind import Better, Measure, Variable, detail, each_run
 from wm_drake.simulation.measures.run import Run
 
 _TORQUE, _SPEED = Unit("N*m", "N*m"), Unit("rad/s", "rpm")
@@ -14,7 +14,9 @@ def _drive(run: Run) -> list[FloatArray]:
     return measured_drive(run.time, run.drum_angle, run.drum_speed, run.motor_torque, run.profile)
 
 
-def _number(name: str, unit: Unit, about: str, better: Better, json: str | None) -> Variable:
+def _number(
+    name: str, unit: Unit, about: str, json: str | None, better: Better = "smaller"
+) -> Variable:
     """Return a variable that is one number of the run and a response of studies."""
     return Variable(
         f"drive_{name}",
@@ -31,73 +33,57 @@ def _number(name: str, unit: Unit, about: str, better: Better, json: str | None)
 
 def _of_order_one(name: str, unit: str, about: str) -> Variable:
     """Return a variable with the parts of a signal that go round with the drum."""
-    return Variable(
-        f"drive_{name}_order_one",
-        ("order",),
-        Unit(unit, unit),
-        f"{name} of order one",
-        about,
-        is_response=False,
-        json=None,
-        studio=None,
-    )
+    words = f"{name} of order one"
+    return detail(f"drive_{name}_order_one", ("order",), Unit(unit, unit), words, about)
 
 
 DRIVE = Measure(
     "drive",
     (
         _number(
-            "peak_torque",
-            _TORQUE,
-            "largest torque of the motor on the drum",
-            "smaller",
-            "peak_torque_Nm",
+            "peak_torque", _TORQUE, "largest torque of the motor on the drum", "peak_torque_Nm"
         ),
         _number(
             "mean_torque",
             _TORQUE,
             "largest torque of the motor averaged over a revolution",
-            "smaller",
             "mean_torque_Nm",
         ),
         _number(
             "mean_torque_speed",
             _SPEED,
             "speed of the drum at the largest mean torque",
-            "",
             "mean_torque_rpm",
+            "",
         ),
-        _number(
-            "peak_power", Unit("W", "W"), "largest power of the motor", "smaller", "peak_power_W"
-        ),
-        _number("energy", Unit("J", "J"), "work of the motor over the run", "smaller", "energy_J"),
+        _number("peak_power", Unit("W", "W"), "largest power of the motor", "peak_power_W"),
+        _number("energy", Unit("J", "J"), "work of the motor over the run", "energy_J"),
         _number(
             "speed_ripple",
             _RIPPLE,
             "largest coefficient of fluctuation of the speed",
-            "smaller",
             "speed_ripple_percent",
         ),
         _number(
             "end_speed",
             _SPEED,
             "speed of the drum at the end, averaged over a revolution",
-            "larger",
             None,
+            "larger",
         ),
         _number(
             "caught_speed",
             _SPEED,
             "speed at which the drum is caught; NaN if it is not",
-            "",
             "caught_rpm",
+            "",
         ),
         _number(
             "caught_torque",
             _TORQUE,
             "mean torque of the motor where the drum is caught",
-            "",
             "caught_mean_torque_Nm",
+            "",
         ),
         _of_order_one("torque", "N*m", "torque with cosine and sine of the drum angle"),
         _of_order_one("acceleration", "rad/s^2", "acceleration of the drum with them"),

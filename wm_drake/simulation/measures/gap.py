@@ -6,7 +6,7 @@ import numpy as np
 
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
-from wm_drake.simulation.measures.kind import Measure, Variable, each_run
+from wm_drake.simulation.measures.kind import Measure, Variable, detail, each_run
 from wm_drake.simulation.measures.run import Run
 
 MM = Unit("m", "mm")
@@ -51,38 +51,29 @@ GAP = Measure(
 CONTACTS = Measure(
     "contacts",
     (
-        Variable(
+        detail(
             "nearest_pair",
             (),
             Unit("", ""),
             "nearest pair",
             "number, along pair, of the two shapes with the smallest gap",
             better="",
-            is_response=False,
-            json=None,
-            studio=None,
         ),
-        Variable(
+        detail(
             "gap_speed",
             (),
             Unit("rad/s", "rpm"),
             "speed at the smallest gap",
             "speed of the drum at the time of the smallest gap",
             better="",
-            is_response=False,
-            json=None,
-            studio=None,
         ),
-        Variable(
+        detail(
             "contact_gap",
             ("pair",),
             MM,
             "gap of a pair",
             "smallest distance of each pair of shapes that touches; NaN for the others",
             better="larger",
-            is_response=False,
-            json=None,
-            studio=None,
         ),
     ),
     each_run(_contacts),

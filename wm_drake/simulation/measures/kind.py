@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -90,6 +91,10 @@ class Variable:
         remaining = iter(labels)
         return [part.replace("*", next(remaining)) if "*" in part else part
                 for part in path.split("/")]  # fmt: skip
+
+
+detail = partial(Variable, is_response=False, json=None, studio=None)
+"""Declare a variable that only tables of runs and their files have."""
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import numpy as np
 
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
-from wm_drake.simulation.measures.kind import Measure, Variable, each_run
+from wm_drake.simulation.measures.kind import Measure, detail, each_run
 from wm_drake.simulation.measures.regions import DIMS
 from wm_drake.simulation.measures.run import Run
 from wm_drake.simulation.outputs import point_displacements
@@ -27,16 +27,13 @@ def _radial(run: Run) -> Sequence[FloatArray]:
 RADIAL = Measure(
     "radial displacements",
     (
-        Variable(
+        detail(
             "region_radius",
             DIMS[:2],
             Unit("m", "mm"),
             "radial displacement",
             "largest distance across the drum axis from the point's place at rest, without a "
             "filter, in each region of the spin profile",
-            is_response=False,
-            json=None,
-            studio=None,
         ),
     ),
     each_run(_radial),

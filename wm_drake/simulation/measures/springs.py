@@ -1,7 +1,7 @@
 """Smallest tension of each spring over a run; it is 0 if the spring goes slack."""
 
 from wm_drake.parameters.units import Unit
-from wm_drake.simulation.measures.kind import Measure, Variable, each_run
+from wm_drake.simulation.measures.kind import Measure, Variable, detail, each_run
 
 TENSIONS = Measure(
     "spring tensions",
@@ -18,16 +18,13 @@ TENSIONS = Measure(
             json="smallest_spring_tension_N/*",
             studio=None,
         ),
-        Variable(
+        detail(
             "smallest_spring_elongation",
             ("spring",),
             Unit("m", "mm"),
             "spring elongation",
             "smallest elongation from the free length; negative if the spring goes slack",
             better="larger",
-            is_response=False,
-            json=None,
-            studio=None,
         ),
     ),
     each_run(lambda run: (run.smallest_tensions, run.smallest_elongations)),
