@@ -1,5 +1,6 @@
 """Suspension spring between a point of the tub and a point of the housing."""
 
+import functools
 import math
 from dataclasses import dataclass, replace
 
@@ -68,12 +69,12 @@ class SpringStrutParameters:
         """Return the number of own states."""
         return 0
 
-    @property
+    @functools.cached_property
     def rest_length(self) -> float:
         """Distance of the hooks when T coincides with W. [m]"""
-        return math.dist(self.p_ToA_T, self.p_WH)
+        return math.dist(self.p_ToA_T.tolist(), self.p_WH.tolist())
 
-    @property
+    @functools.cached_property
     def free_length(self) -> float | None:
         """Length without tension; None if it is not between 0 and twice the drawn length. [m]"""
         ends = 0.0, 2.0 * self.rest_length
@@ -86,7 +87,7 @@ class SpringStrutParameters:
 
         return float(brentq(self._tension, *ends, args=(-math.inf,), xtol=1e-12))
 
-    @property
+    @functools.cached_property
     def taut_from(self) -> float:
         """Tension from which it is fully taut; -inf if it pushes. [N]"""
         if self.pushes:

@@ -191,6 +191,7 @@ class Scene:
         except (RuntimeError, SystemExit) as error:  # Drake turns failed assertions into exits
             raise unusable(sdf_path(parameters.model), error) from None
         self._outlines = {shape: self._outline(shape) for pair in self._pairs for shape in pair}
+        self._name_of = {shape: self._name(shape) for shape in self._outlines}
         self._references: dict[tuple[float, ...], list[_Pair]] = {}
         self._names = tuple(f"{self._name(a)}|{self._name(b)}" for a, b in self._pairs)
         outlines = [self._outlines[shape] for shape, _ in self._pairs]
@@ -451,7 +452,7 @@ class Scene:
         distance, point, direction = self._nearest(pose, pair)
         x, y, z = map(float, point)
         return Gap(
-            float(distance), float(time), self._name(pair[0]), self._name(pair[1]), (x, y, z)
+            float(distance), float(time), self._name_of[pair[0]], self._name_of[pair[1]], (x, y, z)
         ), direction
 
     def _at(self, reference: tuple[float, ...]) -> list[_Pair]:
