@@ -96,7 +96,8 @@ def prepare(folder, page, chosen):
     amplitudes = pd.concat(pd.read_csv(path, comment="#") for path in (TABLE_1, TABLE_3))
     amplitudes.to_csv(folder / "measured.csv", index=False)
     amplitudes.to_csv(folder / "mine.csv", index=False)
-    write_laboratory(folder)
+    if re.search(r"\b(bench|fit|held|rubber)/|\b[ratw]\.csv", " ".join(chosen)):
+        write_laboratory(folder)
     files = [block for block in BLOCKS if block.page == page and block.language in ("yaml", "csv")]
     for name, block in zip(FILES.get(page, []), files, strict=True):
         (folder / name).write_text("\n".join(block.lines) + "\n", encoding="utf-8")

@@ -95,7 +95,7 @@ def test_a_machine_without_rings_has_no_balance():
 
 def test_one_ring_has_one_plane_and_leaves_the_couple():
     tree = load_machine("ball_rings").model_dump(exclude_unset=True)
-    tree["elements"] = {"only": tree["elements"]["front_ring"]}
+    tree["elements"] = {"only": tree["elements"]["front_ring"] | {"balls": 1}}  # compiled once
     parameters = MachineParameters.model_validate(tree)
     profile = SpinProfile(time=(0.0, 4.0), speed=(FULL, FULL))
     case = wm.Case("counter", parameters.loads["counter"], profile)
