@@ -1,10 +1,23 @@
-"""Page of the curves of a gasket."""
+"""Show the curves of a gasket: tables, page, and what a machine file gets."""
 
-from wm_drake.report.formatting import MM_PER_M, MPA_PER_PA, number, percent, significant
-from wm_drake.report.page import picture
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from wm_drake.parameters import MachineParameters, machine_yaml
+from wm_drake.parameters.files import machine_tree, yaml_text
+from wm_drake.parameters.gasket_drawing import GasketDrawing
+from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import Unit
+from wm_drake.report.formatting import MM_PER_M, MPA_PER_PA, number, percent, plain, significant
+from wm_drake.report.page import Picture, picture
 from wm_drake.report.sections import Section, SectionedPage
 from wm_drake.report.table import Column, Table, line
-from wm_drake.solid.curves import AXIAL, RADIAL, TILT, TWIST
+from wm_drake.solid.curves import AXIAL, RADIAL, TILT, TWIST, Curve, Mesh, Motion
 from wm_drake.studies.gasket_curves.figures import (
     curves_figure,
     rings_figure,
@@ -12,10 +25,12 @@ from wm_drake.studies.gasket_curves.figures import (
     sections_figure,
 )
 from wm_drake.studies.gasket_curves.machine import coupling
-from wm_drake.studies.gasket_curves.study import CurvesResult
-from wm_drake.studies.gasket_curves.tables import AXES, values_table
+from wm_drake.studies.gasket_curves.study import Checked
 from wm_drake.studies.rig.units import units_of
-from wm_drake.studies.study import Facts
+from wm_drake.studies.study import Facts, Result
+
+if TYPE_CHECKING:
+    from rich.table import Table as TerminalTable
 
 METHOD = (
     "Finite elements of the rubber in large deformation, nearly incompressible. The rim at the "
@@ -28,10 +43,227 @@ METHOD = (
     "2 π f, at the frequency below."
 )
 
+AXES: dict[str, tuple[Motion, str]] = {
+    "x": (RADIAL, ""),
+    "y": (AXIAL, ""),
+    "z": (RADIAL, ""),
+    "about_x": (TILT, "rotational_"),
+    "about_y": (TWIST, "rotational_"),
+    "about_z": (TILT, "rotational_"),
+}
+"""Motion of each axis of a bushing, and the beginning of its keys in a machine file."""
 
-def curves_page(result: CurvesResult, facts: Facts) -> str:
-    """Return the page as text of one self-contained HTML file."""
-    curves = {name: checked.curve for name, checked in result.curves.items()}
+LARGEST_WORK_ERROR = 0.01
+"""Difference of work and strain energy above which a curve has too few points."""
+
+
+@dataclass(frozen=True)
+class CurvesResult(Result):
+    """Curves of a gasket.
+
+    Attributes:
+        name: Name or file of the drawing.
+        curves: Its curves by the names of the motions.
+        frequency: Frequency of the loss factor. [Hz]
+        machine: The machine with this gasket.
+    """
+
+    name: str
+    drawing: GasketDrawing
+    mesh: Mesh
+    curves: dict[str, Checked]
+    frequency: float
+    machine: MachineParameters
+
+    @property
+    def by_motion(self) -> dict[str, Curve]:
+        """The curves without their checks."""
+        return {name: checked.curve for name, checked in self.curves.items()}
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Return the curves, what follows from them, and their checks."""
+        return {
+            "curves": curves_table(self),
+            "values": values_table(self),
+            "checks": checks_table(self),
+        }
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the tables and the coupling for JSON."""
+        rubber = self.drawing.rubber
+        shown = {
+            "gasket": self.name,
+            "elements": [self.mesh.meridian, self.mesh.around],
+            "shear_modulus_Pa": 2.0 * rubber.constants[0],
+            "storage_modulus": rubber.modulus(self.frequency).real,
+            "loss_modulus": rubber.modulus(self.frequency).imag,
+            "frequency_hz": self.frequency,
+            "values": values_table(self).to_dict("records"),
+            "coupling_x_about_z_N": coupling(self.by_motion),
+            "curves": curves_table(self).to_dict("records"),
+            "checks": checks_table(self).replace({np.nan: None}).to_dict("records"),
+        }
+        return plain(shown)
+
+    def terminal(self) -> "Iterable[TerminalTable | str]":
+        """Return stiffness and damping."""
+        return [values_shown(self).terminal(f"Gasket {self.name}"), summary(self)]
+
+    def page(self, facts: Facts) -> str:
+        """Return the page."""
+        drawn, sections, rings = _pictures(self.by_motion)
+        links = (
+            ("gasket.yaml", "section gasket of a machine file"),
+            ("machine.yaml", "machine with this gasket"),
+        )
+        made = [
+            ("Drawing", f"{self.name}: {self.drawing.about}"),
+            ("Rubber", _rubber_text(self)),
+            ("Frequency of the damping", f"{significant(self.frequency)} Hz"),
+            (
+                "Mesh",
+                f"{self.mesh.meridian} by {self.mesh.around} elements of half the ring, "
+                f"{3 * self.mesh.meridian} of the wedge; 27 nodes each",
+            ),
+            *facts.rows(),
+        ]
+        return SectionedPage(
+            f"Curves of gasket {self.name}",
+            summary(self),
+            [
+                Section("curves", "Curves", (drawn,)),
+                Section("cuts", "Cuts through the wall", (sections,)),
+                Section("rings", "Deformed ring", (rings,)),
+                *_rubber_section(self),
+                Section("values", "Stiffness and damping", tables=(values_shown(self),)),
+                Section("checks", "Checks", tables=(_checks_shown(self),)),
+                Section("files", "Files", links=links),
+            ],
+            made,
+            warnings=(*facts.warnings, *self.warnings(), *self.failures()),
+            about="From the drawing and the rubber to the numbers of a machine file.",
+            method=METHOD,
+        ).html()
+
+    def write(self, folder: Path) -> None:
+        """Write the tables, the section `gasket` of a machine file, and the machine with it."""
+        super().write(folder)
+        section = yaml_text({"gasket": machine_tree(self.machine)["gasket"]})
+        (folder / "gasket.yaml").write_text(section, encoding="utf-8")
+        (folder / "machine.yaml").write_text(machine_yaml(self.machine), encoding="utf-8")
+
+    def warnings(self) -> Sequence[str]:
+        """Return where the curves are less than what a real gasket does."""
+        contact = self.drawing.contact
+        return [text for one in self.curves.values() for text in _warnings_of(one, contact)]
+
+    def failures(self) -> Sequence[str]:
+        """Return where a curve ends early; what was computed is kept."""
+        stopped = (checked.curve.stopped for checked in self.curves.values())
+        return [f"{text}; the curve ends there, and its other points are kept" for text in stopped
+                if text]  # fmt: skip
+
+
+def _warnings_of(checked: Checked, has_contact: bool) -> Iterable[str]:
+    name, rotates = checked.curve.motion.name, checked.curve.motion.rotates
+    unit = Unit("rad", "deg") if rotates else Unit("m", "mm")
+
+    def listed(values: FloatArray) -> str:
+        shown = [f"{unit.from_si(value):.3g}" for value in values if np.isfinite(value)]
+        return f"{' and '.join(shown)} {unit.shown}"
+
+    if np.isfinite(checked.touches_at).any() and not has_contact:
+        yield (
+            f"{name}: folds overlap from {listed(checked.touches_at)} on; the drawing has no "
+            "contact between folds, so the real gasket is stiffer there"
+        )
+    if np.isfinite(checked.wrinkles_at).any():
+        yield (
+            f"{name}: the wall wrinkles from {listed(checked.wrinkles_at)} on; wrinkles need "
+            "a fine mesh around (--around)"
+        )
+    if checked.curve.falls:
+        yield f"{name}: the force falls; the table of the machine file stays level there"
+    if checked.curve.work_error() > LARGEST_WORK_ERROR:
+        yield (
+            f"{name}: the work of the rim differs from the strain energy by "
+            f"{100.0 * checked.curve.work_error():.2g} %; use more --points"
+        )
+
+
+def curves_table(result: CurvesResult) -> pd.DataFrame:
+    """Return each point: force on the moved rim along its motion, along the others, energy, work.
+
+    The motions are those of x (radial), y (axial), about y (twist) and about z (tilt).
+    """
+    frames = []
+    for name, checked in result.curves.items():
+        curve = checked.curve
+        unit = units_of(curve.motion.rotates)
+        frame = pd.DataFrame(
+            {
+                "curve": name,
+                "value": unit.factor * curve.values,
+                "unit": unit.unit,
+                "force_x_N": curve.wrench(RADIAL.component),
+                "force_y_N": curve.wrench(AXIAL.component),
+                "moment_y_Nm": curve.wrench(TWIST.component),
+                "moment_z_Nm": curve.wrench(TILT.component),
+                "energy_J": [point.energy for point in curve.points],
+                "work_J": curve.work(),
+            }
+        )
+        frames.append(frame)
+    return pd.concat(frames, ignore_index=True)
+
+
+def values_table(result: CurvesResult) -> pd.DataFrame:
+    """Return stiffness and damping of the six axes, in SI."""
+    rows = []
+    for axis, (motion, kind) in AXES.items():
+        curve = result.curves[motion.name].curve
+        key = f"{kind}damping_{axis[-1]}"
+        rows.append(
+            {
+                "axis": axis,
+                "stiffness_at_rest": curve.slope_at_rest(),
+                "stiffness_first_20_percent": curve.table.nominal_stiffness,
+                "damping": getattr(result.machine.gasket, key),
+                "unit_of_stiffness": "N*m/rad" if motion.rotates else "N/m",
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def checks_table(result: CurvesResult) -> pd.DataFrame:
+    """Return stretch, stress, error of the work, touching folds and wrinkles of each curve."""
+    rows = []
+    for name, checked in result.curves.items():
+        unit = units_of(checked.curve.motion.rotates)
+        rows.append(
+            {
+                "curve": name,
+                "unit": unit.unit,
+                "from": unit.factor * checked.curve.values[0],
+                "to": unit.factor * checked.curve.values[-1],
+                "stretch_at_begin": checked.begin.stretch,
+                "stretch_at_end": checked.end.stretch,
+                "stress_at_begin_MPa": MPA_PER_PA * checked.begin.stress,
+                "stress_at_end_MPa": MPA_PER_PA * checked.end.stress,
+                "work_error": checked.curve.work_error(),
+                "folds_touch_from": unit.factor * checked.touches_at[0],
+                "folds_touch_to": unit.factor * checked.touches_at[1],
+                "largest_overlap_in_thicknesses": checked.depth,
+                "wrinkles_from": unit.factor * checked.wrinkles_at[0],
+                "wrinkles_to": unit.factor * checked.wrinkles_at[1],
+                "stopped": checked.curve.stopped,
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _pictures(curves: dict[str, Curve]) -> tuple[Picture, Picture, Picture]:
+    """Return the curves, the cuts through the wall and the deformed rings."""
     drawn = picture(
         curves_figure(curves),
         "Four panels: axial and radial force over displacement, twist and tilt moment over angle.",
@@ -49,38 +281,7 @@ def curves_page(result: CurvesResult, facts: Facts) -> str:
         "Half of the ring at both ends of each curve, to scale: lines of the mesh, seen from the "
         "side and above.",
     )
-    links = (
-        ("gasket.yaml", "section gasket of a machine file"),
-        ("machine.yaml", "machine with this gasket"),
-    )
-    made = [
-        ("Drawing", f"{result.name}: {result.drawing.about}"),
-        ("Rubber", _rubber_text(result)),
-        ("Frequency of the damping", f"{significant(result.frequency)} Hz"),
-        (
-            "Mesh",
-            f"{result.mesh.meridian} by {result.mesh.around} elements of half the ring, "
-            f"{3 * result.mesh.meridian} of the wedge; 27 nodes each",
-        ),
-        *facts.rows(),
-    ]
-    return SectionedPage(
-        f"Curves of gasket {result.name}",
-        summary(result),
-        [
-            Section("curves", "Curves", (drawn,)),
-            Section("cuts", "Cuts through the wall", (sections,)),
-            Section("rings", "Deformed ring", (rings,)),
-            *_rubber_section(result),
-            Section("values", "Stiffness and damping", tables=(values_shown(result),)),
-            Section("checks", "Checks", tables=(_checks_shown(result),)),
-            Section("files", "Files", links=links),
-        ],
-        made,
-        warnings=(*facts.warnings, *result.warnings(), *result.failures()),
-        about="From the drawing and the rubber to the numbers of a machine file.",
-        method=METHOD,
-    ).html()
+    return drawn, sections, rings
 
 
 def _rubber_section(result: CurvesResult) -> list[Section]:
@@ -102,11 +303,10 @@ def summary(result: CurvesResult) -> str:
     slopes = {
         name: checked.curve.table.nominal_stiffness for name, checked in result.curves.items()
     }
-    curves = {name: checked.curve for name, checked in result.curves.items()}
     largest = max(max(c.begin.stretch, c.end.stretch) for c in result.curves.values())
     worst = max(checked.curve.work_error() for checked in result.curves.values())
     axial, radial = (slopes[motion.name] / MM_PER_M for motion in (AXIAL, RADIAL))
-    both = coupling(curves)
+    both = coupling(result.by_motion)
     return (
         f"Slopes of the first 20 %: radial {significant(radial, 3)} N/mm, axial "
         f"{significant(axial, 3)} N/mm, twist {significant(slopes[TWIST.name], 3)} N m/rad, tilt "

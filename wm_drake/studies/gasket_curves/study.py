@@ -1,20 +1,16 @@
 """Curves of a gasket: ranges of the options, the computation, and what a machine file gets."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from wm_drake.errors import WmDrakeError, input_error
 from wm_drake.model.machine import Machine
-from wm_drake.parameters import MachineParameters, machine_yaml
-from wm_drake.parameters.files import machine_tree, yaml_text
-from wm_drake.parameters.gasket_drawing import GasketDrawing, load_gasket_drawing
+from wm_drake.parameters.gasket_drawing import load_gasket_drawing
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.solid.curves import MOTIONS, Curve, Gasket, Mesh
@@ -28,19 +24,16 @@ from wm_drake.studies.gasket_curves.machine import (
 from wm_drake.studies.gasket_curves.options import CurvesOptions
 from wm_drake.studies.inputs import quantities_of
 from wm_drake.studies.run import Executor
-from wm_drake.studies.study import Facts, Result, Task
+from wm_drake.studies.study import Task
 
 if TYPE_CHECKING:
-    from rich.table import Table
+    from wm_drake.studies.gasket_curves.page import CurvesResult
 
 WRINKLED = 0.03
 """Amplitude of wrinkles that is reported, in parts of the largest displacement."""
 
 NEAR_REST = 0.02
 """First point of a curve, in parts of the last one: the slope at rest is measured there."""
-
-LARGEST_WORK_ERROR = 0.01
-"""Difference of work and strain energy above which a curve has too few points."""
 
 
 @dataclass(frozen=True)
@@ -60,98 +53,6 @@ class Checked:
     touches_at: FloatArray
     depth: float
     wrinkles_at: FloatArray
-
-
-@dataclass(frozen=True)
-class CurvesResult(Result):
-    """Curves of a gasket.
-
-    Attributes:
-        name: Name or file of the drawing.
-        curves: Its curves by the names of the motions.
-        frequency: Frequency of the loss factor. [Hz]
-        machine: The machine with this gasket.
-    """
-
-    name: str
-    drawing: GasketDrawing
-    mesh: Mesh
-    curves: dict[str, Checked]
-    frequency: float
-    machine: MachineParameters
-
-    def tables(self) -> dict[str, pd.DataFrame]:
-        """Return the curves, what follows from them, and their checks."""
-        from wm_drake.studies.gasket_curves.tables import checks_table, curves_table, values_table
-
-        return {
-            "curves": curves_table(self),
-            "values": values_table(self),
-            "checks": checks_table(self),
-        }
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the tables and the coupling for JSON."""
-        from wm_drake.studies.gasket_curves.tables import as_plain_data
-
-        return as_plain_data(self)
-
-    def terminal(self) -> "Iterable[Table | str]":
-        """Return stiffness and damping."""
-        from wm_drake.studies.gasket_curves.page import summary, values_shown
-
-        return [values_shown(self).terminal(f"Gasket {self.name}"), summary(self)]
-
-    def page(self, facts: Facts) -> str:
-        """Return the page."""
-        from wm_drake.studies.gasket_curves.page import curves_page
-
-        return curves_page(self, facts)
-
-    def write(self, folder: Path) -> None:
-        """Write the tables, the section `gasket` of a machine file, and the machine with it."""
-        super().write(folder)
-        section = yaml_text({"gasket": machine_tree(self.machine)["gasket"]})
-        (folder / "gasket.yaml").write_text(section, encoding="utf-8")
-        (folder / "machine.yaml").write_text(machine_yaml(self.machine), encoding="utf-8")
-
-    def warnings(self) -> Sequence[str]:
-        """Return where the curves are less than what a real gasket does."""
-        contact = self.drawing.contact
-        return [text for one in self.curves.values() for text in _warnings_of(one, contact)]
-
-    def failures(self) -> Sequence[str]:
-        """Return where a curve ends early; what was computed is kept."""
-        stopped = (checked.curve.stopped for checked in self.curves.values())
-        return [f"{text}; the curve ends there, and its other points are kept" for text in stopped
-                if text]  # fmt: skip
-
-
-def _warnings_of(checked: Checked, has_contact: bool) -> Iterable[str]:
-    name, rotates = checked.curve.motion.name, checked.curve.motion.rotates
-    unit = Unit("rad", "deg") if rotates else Unit("m", "mm")
-
-    def listed(values: FloatArray) -> str:
-        shown = [f"{unit.from_si(value):.3g}" for value in values if np.isfinite(value)]
-        return f"{' and '.join(shown)} {unit.shown}"
-
-    if np.isfinite(checked.touches_at).any() and not has_contact:
-        yield (
-            f"{name}: folds overlap from {listed(checked.touches_at)} on; the drawing has no "
-            "contact between folds, so the real gasket is stiffer there"
-        )
-    if np.isfinite(checked.wrinkles_at).any():
-        yield (
-            f"{name}: the wall wrinkles from {listed(checked.wrinkles_at)} on; wrinkles need "
-            "a fine mesh around (--around)"
-        )
-    if checked.curve.falls:
-        yield f"{name}: the force falls; the table of the machine file stays level there"
-    if checked.curve.work_error() > LARGEST_WORK_ERROR:
-        yield (
-            f"{name}: the work of the rim differs from the strain energy by "
-            f"{100.0 * checked.curve.work_error():.2g} %; use more --points"
-        )
 
 
 class CurvesTask(Task):
@@ -174,8 +75,10 @@ class CurvesTask(Task):
         self.mesh = Mesh(options.elements, options.around)
         self.gasket = Gasket(self.drawing, self.mesh)
 
-    def run(self, executor: Executor) -> CurvesResult:
+    def run(self, executor: Executor) -> "CurvesResult":
         """Compute all curves."""
+        from wm_drake.studies.gasket_curves.page import CurvesResult
+
         curves = {}
         with executor.fractions([motion.name for motion in MOTIONS]) as progress:
             for number, motion in enumerate(MOTIONS):
