@@ -1,7 +1,7 @@
 """Steady unbalance response of a machine over the speed of its drum."""
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -23,6 +23,29 @@ from wm_drake.studies.threads import on_one_thread
 
 MOST_HARMONICS, MOST_SAMPLES = 40, 1024
 """Largest number of harmonics, and of samples of a period."""
+
+DECLARED = {
+    "amplitude": ("sensor", "m", "largest deviation from the mean of a revolution"),
+    "detergent_displacement": ("axis", "m", "largest displacement nearest the detergent box"),
+    "gasket_force": ("axis", "N", "largest force of the gasket on the housing"),
+    "gasket_moment": ("axis", "N m", "largest moment of the gasket on the housing"),
+    "spring_tension": ("spring", "N", "half the range of the tension in a revolution"),
+    "damper_tension": ("damper", "N", "half the range of the tension in a revolution"),
+    "mount_force_peak": (
+        "mount",
+        "N",
+        "largest size of the force on the cabinet in a revolution",
+    ),
+    "mount_force_rms": ("mount", "N", "RMS of the force on the cabinet in a revolution"),
+    "mount_force_dynamic_rms": (
+        "mount",
+        "N",
+        "RMS without the mean of the force on the cabinet in a revolution",
+    ),
+    "first_harmonic": ("coordinate part", "rad, m", "first harmonic of the pose of the tub"),
+    "damper_spin": ("spinning", "rad/s", "mean rate of a damper about its axis"),
+}
+"""Dimensions along the branch, unit and words of the variables of a response."""
 
 
 def steady_response(
@@ -162,24 +185,25 @@ def _measured(setup: Setup, balance: HarmonicBalance, points: list[Point]) -> xr
         values = variables[name][1]
         return values.reshape(len(points), samples, *values.shape[1:])
 
-    first = np.stack([point.coefficients[1:3, :6].T for point in points])
-    spins = np.stack([point.spins for point in points])
+    displacement, forces = by_point("displacement"), by_point("mount_force")
+    of_mounts = zip(*(force_measures(revolution) for revolution in forces), strict=True)
+    values = {
+        "amplitude": np.abs(displacement - displacement.mean(axis=1, keepdims=True)).max(axis=1),
+        "detergent_displacement": np.abs(by_point("detergent_displacement")).max(axis=1),
+        "gasket_force": _largest_of_gasket(setup, by_point("bushing_force")),
+        "gasket_moment": _largest_of_gasket(setup, by_point("bushing_moment")),
+        "spring_tension": 0.5 * np.ptp(by_point("spring_tension"), axis=1),
+        "damper_tension": 0.5 * np.ptp(by_point("damper_tension"), axis=1),
+        **{f"mount_force_{kind}": np.stack(of) for kind, of in zip(KINDS, of_mounts, strict=True)},
+        "first_harmonic": np.stack([point.coefficients[1:3, :6].T for point in points]),
+        "damper_spin": np.stack([point.spins for point in points]),
+    }
     return xr.Dataset(
         {
-            **_displacements(by_point),
-            **_gasket_forces(by_point, list(setup.bushings)),
-            **_tensions(by_point),
-            **_mount_forces(by_point("mount_force")),
-            "first_harmonic": (
-                ("point", "coordinate", "part"),
-                first,
-                {"units": "rad, m", "long_name": "first harmonic of the pose of the tub"},
-            ),
-            "damper_spin": (
-                ("point", "spinning"),
-                spins,
-                {"units": "rad/s", "long_name": "mean rate of a damper about its axis"},
-            ),
+            **{
+                name: (("point", *dims.split()), values[name], {"units": unit, "long_name": words})
+                for name, (dims, unit, words) in DECLARED.items()
+            },
             "stable": ("point", [point.stable for point in points]),
             "multiplier": ("point", [point.multiplier for point in points]),
             "on_grid": ("point", [point.on_grid for point in points]),
@@ -213,73 +237,14 @@ def _joined(balance: HarmonicBalance, points: list[Point]) -> Trajectory:
     return Trajectory(**parts)
 
 
-Variables: TypeAlias = dict[str, tuple[tuple[str, ...], FloatArray, dict[str, str]]]
-ByPoint: TypeAlias = Callable[[str], FloatArray]
-"""Returns an output of the machine over points and samples. (points, samples, ...)"""
-
-
-def _displacements(by_point: ByPoint) -> Variables:
-    """Return the variables of displacements of the tub."""
-    values = by_point("displacement")
-    return {
-        "amplitude": (
-            ("point", "sensor"),
-            np.abs(values - values.mean(axis=1, keepdims=True)).max(axis=1),
-            {"units": "m", "long_name": "largest deviation from the mean of a revolution"},
-        ),
-        "detergent_displacement": (
-            ("point", "axis"),
-            np.abs(by_point("detergent_displacement")).max(axis=1),
-            {"units": "m", "long_name": "largest displacement nearest the detergent box"},
-        ),
-    }
-
-
-def _gasket_forces(by_point: ByPoint, bushings: list[str]) -> Variables:
-    """Return the variables of the force of the gasket; zeros without one."""
-    variables: Variables = {}
-    for name, unit, source in (
-        ("force", "N", "bushing_force"),
-        ("moment", "N m", "bushing_moment"),
-    ):
-        values = by_point(source)
-        largest = np.zeros((len(values), 3))
-        if "gasket" in bushings:
-            largest = np.abs(values[:, :, bushings.index("gasket")]).max(axis=1)
-        text = f"largest {name} of the gasket on the housing"
-        variables[f"gasket_{name}"] = (
-            ("point", "axis"),
-            largest,
-            {"units": unit, "long_name": text},
-        )
-    return variables
-
-
-def _tensions(by_point: ByPoint) -> Variables:
-    """Return the variables of the tensions of springs and dampers."""
-    return {
-        f"{kind}_tension": (
-            ("point", kind),
-            0.5 * np.ptp(by_point(f"{kind}_tension"), axis=1),
-            {"units": "N", "long_name": "half the range of the tension in a revolution"},
-        )
-        for kind in ("spring", "damper")
-    }
-
-
-def _mount_forces(forces: FloatArray) -> Variables:
-    """Return the variables of the forces of mounts on the cabinet.
+def _largest_of_gasket(setup: Setup, values: FloatArray) -> FloatArray:
+    """Return the largest size of a force or moment of the gasket; zeros without one.
 
     Args:
-        forces: (points, samples, mounts, 3) [N]
+        values: Those of all bushings. (points, samples, bushings, 3)
     """
-    measured = zip(*(force_measures(revolution) for revolution in forces), strict=True)
-    texts = ("largest size", "RMS", "RMS without the mean")
-    return {
-        f"mount_force_{kind}": (
-            ("point", "mount"),
-            np.stack(values),
-            {"units": "N", "long_name": f"{text} of the force on the cabinet in a revolution"},
-        )
-        for kind, text, values in zip(KINDS, texts, measured, strict=True)
-    }
+    bushings = list(setup.bushings)
+    if "gasket" not in bushings:
+        return np.zeros((len(values), 3))
+    largest: FloatArray = np.abs(values[:, :, bushings.index("gasket")]).max(axis=1)
+    return largest
