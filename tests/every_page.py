@@ -73,10 +73,12 @@ KINDS = {
     "gasket": _one(
         "sections.html", "study", "gasket", "--trials", "150", "--check", "C_L=120 %",
         "--load", "middle", "--load", "counter", "--response", "D", "--response", "F",
+        "--profile", "short_cycle.yaml",
     ),
     "gasket_of_one_load": _one(
         "sections.html", "study", "gasket", "--design", "orthogonal", "--trials", "243",
         "--model", "main", "--load", "back", "--response", "mount_force_peak", "--response", "amplitude",
+        "--profile", "short_cycle.yaml",
     ),
     "gasket_curves": _one("sections.html", "gasket", "curves", "folded", "--quick", "--axial", "8 mm"),
     "gasket_geometry": _one("sections.html", "study", "gasket-geometry", "--quick"),
@@ -87,7 +89,7 @@ KINDS = {
             (*["study", "gasket-damping", "--mesh", "20", "--record"], "middle=bench/record_middle.nc"),
         ),
     ),
-    "spin_cycle": _one("sections.html", "study", "spin-cycle", "--case", "2", "--case", "29"),
+    "spin_cycle": _one("sections.html", "study", "spin-cycle", "--case", "2", "--case", "29", "--profile", "eight_regions.yaml"),
     "spin_identify": _one(
         "sections.html", "study", "spin-identify", "--case", "2",
         "--unknown", "gasket.stiffness_y=(1, 4) N/mm", "--profile", "short_cycle.yaml",
@@ -101,9 +103,10 @@ KINDS = {
     "tolerance": _one(
         "sections.html", "study", "tolerance", "laundry", "--samples", "64",
         "--sensitivity", "16", "--subset", "100", "--limits", "limits.yaml",
+        "--profile", "short_cycle.yaml",
     ),
     "verdict": _one("sections.html", "verdict", "short.yaml", "--samples", "16", "--profile", "short_cycle.yaml"),
-    "design": _one("sections.html", "study", "design", "gasket", "--evaluations", "48", "--population", "16"),
+    "design": _one("sections.html", "study", "design", "gasket", "--evaluations", "48", "--population", "16", "--profile", "short_cycle.yaml"),
     "balancer": _one("sections.html", "study", "balancer", "--quick"),
     "drive": _one("sections.html", "study", "drive", "--load", "middle", "--torques", "3", "--unbalances", "2", "--loads", "4"),
 }  # fmt: skip
@@ -167,6 +170,10 @@ def write_inputs_of_studies(folder: Path) -> None:
     (folder / "short_cycle.yaml").write_text(
         "time: (0, 4, 6) s\nspeed: (60, 250, 250) rpm\n"
         "regions: [{name: R1, begin: 0 s, end: 3 s}, {name: R2, begin: 3 s, end: 6 s}]\n"
+    )
+    regions = [f"{{name: R{k + 1}, begin: {k} s, end: {k + 1} s}}" for k in range(8)]
+    (folder / "eight_regions.yaml").write_text(
+        f"time: (0, 8) s\nspeed: (60, 250) rpm\nregions: [{', '.join(regions)}]\n"
     )
     rows = [
         ["middle", "yes", "experiment", 16.0, 5.0, 12.0, 17.0, 5.0, 13.0],

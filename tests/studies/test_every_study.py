@@ -30,7 +30,8 @@ SLOWLY = [
     for name in STUDIES
 ]
 SHORTER["tolerance"] = [(*KINDS["tolerance"].commands[0], "--samples", "32", "--subset", "0")]
-SHORTER["gasket"] = [("study", "gasket", "--response", "D")]
+SHORTER["gasket"] = [("study", "gasket", "--response", "D", "--profile", "short_cycle.yaml")]
+SHORTER["spin-cycle"] = [("study", "spin-cycle", "--profile", "eight_regions.yaml")]
 SHORTER["balancer"] = [(
     "study", "balancer", "--place", "0 mm", "--damping", "100 %",
     "--release", "80 rpm", "--to", "110 rpm", "--rate", "80 rpm/s",
