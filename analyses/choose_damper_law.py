@@ -2,9 +2,10 @@
 
 The script fits the free quantities of reference_free.yaml to the targets of calibrate_reference.py,
 once with each damper law, from the shipped machine on, by the same number of iterations. Friction
-may fall to 5 N. It prints the cost and the errors of each law, and the friction that it finds.
+may fall to 5 N. It prints the cost and the errors of each law, and the friction that it finds. With
+--out, the evaluations of each law are kept beside that file, and a second call goes on with them.
 
-    python analyses/choose_damper_law.py
+    python analyses/choose_damper_law.py --out laws.txt
 """
 
 import argparse
@@ -113,8 +114,8 @@ def row_of(law: str, best: Solution) -> dict[str, Any]:
     names = best.parameter_map.names
     values = dict(zip(names, best.parameter_map.in_units(best.point), strict=True))
     row["friction, N"] = f"{values['damper_friction']:.1f}"
-    others = ((name, values[name]) for name in (*FREE_NUMBERS[law], "damper_damping"))
-    row["others"] = ", ".join(f"{name} {value:.3g}" for name, value in others if name in values)
+    others = [name for name in (*FREE_NUMBERS[law], "damper_damping") if name in values]
+    row["others"] = ", ".join(f"{name} {values[name]:.3g}" for name in others)
     row["at bounds"] = best.verdicts().count("bound")
     return {
         key: f"{value.mean:.1f} / {value.largest:.0f}" if hasattr(value, "largest") else value
@@ -142,7 +143,8 @@ def main() -> None:
                 free = FreeFile(quantities={name: free.quantities[name] for name in few})
                 targets = targets.without("middle", "back", "front")
             identity = identity_of(machine, free, targets, plan)
-            with open_ledger(path.with_suffix(".sqlite"), identity) as ledger:
+            kept = (arguments.out or path).with_name(f"{law}.sqlite")
+            with open_ledger(kept, identity, resume=True) as ledger:
                 found = calibrate(Runner(machine, ledger), free, targets, plan)
             rows.append(row_of(law, found.solutions[0]))
             done(number)
