@@ -17,7 +17,9 @@ FREE = """quantities:
   friction: {bounds: "(10, 60) N", prior: "(30, 10) N", sets: damper_types.friction.friction_force, source: test}
   radius: {bounds: "(230, 250) mm", prior: "(240, 5) mm", sets: loads.middle.unbalances.0.radius, source: test}
 """
-SHORT = "extends: reference\nname: short\n"
+SHORT = (
+    "extends: reference\nname: short\nprofile: {time: '(0, 4, 6) s', speed: '(60, 250, 250) rpm'}\n"
+)
 DAMPER = ("--component", "mstv_damper")
 
 
@@ -81,7 +83,9 @@ KINDS = {
         "--profile", "short_cycle.yaml",
     ),
     "gasket_curves": _one("sections.html", "gasket", "curves", "folded", "--quick", "--axial", "8 mm"),
-    "gasket_geometry": _one("sections.html", "study", "gasket-geometry", "--quick"),
+    "gasket_geometry": _one(
+        "sections.html", "study", "gasket-geometry", "--quick", "--profile", "short_cycle.yaml"
+    ),
     "gasket_damping": Kind(
         "sections.html",
         (

@@ -31,6 +31,7 @@ SLOWLY = [
 ]
 SHORTER["tolerance"] = [(*KINDS["tolerance"].commands[0], "--samples", "32", "--subset", "0")]
 SHORTER["gasket"] = [("study", "gasket", "--response", "D", "--profile", "short_cycle.yaml")]
+SHORTER["gasket-geometry"] = [("study", "gasket-geometry", "--profile", "short_cycle.yaml")]
 SHORTER["spin-cycle"] = [("study", "spin-cycle", "--profile", "eight_regions.yaml")]
 SHORTER["balancer"] = [(
     "study", "balancer", "--place", "0 mm", "--damping", "100 %",
