@@ -138,11 +138,7 @@ def with_new_law(tmp_path_factory):
         text = path.read_text()
         assert text.count(before) == 1 or not before
         path.write_text(text.replace(before, piece + before) if before else text + piece)
-    return root, os.environ | {
-        "PYTHONPATH": str(root),
-        "NUMBA_CACHE_DIR": str(root / "cache"),
-        "COLUMNS": "200",
-    }
+    return root, os.environ | {"PYTHONPATH": str(root), "COLUMNS": "200"}
 
 
 def printed(with_new_law, script):
