@@ -51,7 +51,7 @@ KINDS = {
     "spin": _one("sections.html", "spin"),
     "spin_of_motor": _one("sections.html", "spin", "--machine", "motor", "--load", "middle", "--detail"),
     "spin_of_cabinet": _one("sections.html", "spin", "--machine", "light_cabinet", "--load", "middle"),
-    "spin_of_rings": _one("sections.html", "spin", "--machine", "ball_rings", "--load", "back"),
+    "spin_of_rings": _one("sections.html", "spin", "--machine", "ball_rings", "--load", "back", "--profile", "short_cycle.yaml"),
     "comparison": _one("sections.html", "spin", "--compare-gasket", "--load", "middle", "--load", "front"),
     "rig_damper": _one("sections.html", "rig", "damper", *DAMPER, "-f", "1,10 Hz", "-a", "0.3,1 mm"),
     "rig_gasket": _one("sections.html", "rig", "gasket", "--axis", "axial", "--matrix", "A"),

@@ -32,7 +32,8 @@ def cases_of(reference, count):
 
 
 @pytest.mark.slow
-def test_no_scheduler_at_the_address():
+def test_no_scheduler_at_the_address(monkeypatch):
+    monkeypatch.setattr("wm_drake.batch.cluster.ANSWER_TIME", 0.5)
     with pytest.raises(
         InputError, match=r"--cluster: no scheduler answers at 'tcp://127\.0\.0\.1:9'"
     ):

@@ -42,6 +42,9 @@ WAIT_FOR_WORKERS = 60.0
 POLL = 0.05
 """Time between two looks for finished work items. [s]"""
 
+ANSWER_TIME = 10.0
+"""Time in which a scheduler must answer. [s]"""
+
 CLOSING_TIME = 5.0
 """Longest time for which the end of a command waits for the scheduler. [s]"""
 
@@ -77,7 +80,7 @@ def cluster_client(address: str) -> Iterator[Any]:
         if name.startswith("distributed"):  # its tracebacks would bury our message
             logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
-        client = Client(address, timeout=10, set_as_default=False)
+        client = Client(address, timeout=ANSWER_TIME, set_as_default=False)
     except (OSError, ValueError) as error:
         raise input_error(
             f"no scheduler answers at '{address}' ({type(error).__name__}); "
