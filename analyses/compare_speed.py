@@ -145,7 +145,7 @@ TASKS = {
     ),
     "the same, Drake engine": Task(make=lambda: one_run("reference", "middle", "drake")),
     "one run of `free_stroke`, tubes as bodies, 130 s": Task(
-        make=lambda: one_run("free_stroke", "1", "compiled")
+        make=lambda: one_run("free_stroke", "front", "compiled")
     ),
     "2000 runs of `reference`, D, F, M": Task(make=lambda: batch(2000)),
     "the same, four derivatives a step": Task(make=lambda: batch(2000, integrator="runge_kutta")),
