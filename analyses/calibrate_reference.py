@@ -4,8 +4,8 @@ The script fits the free quantities of reference_free.yaml to half of the printe
 Adams model, measured ones where it has none, and to all of [B] Table 5: means, effects and
 contributions. With --predict it repeats the fit three times, without all tables of the counter
 load, without those of the middle load, and without the amplitudes of back and front, from machines
-drawn from the priors, and says what each fit predicts of what it has not seen. That takes an hour
-and a half.
+drawn from the priors, and says what each fit predicts of what it has not seen. That takes
+about an hour of processor time.
 With `--machine reference_2026_11` it fits those of reference_2026_11_free.yaml to the 36 measured
 amplitudes of [B] Tables 1 and 3 and to the 18 means of Table 5, and predicts held-out loads.
 It prints the errors of the best machine and of the predictions.

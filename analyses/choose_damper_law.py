@@ -15,11 +15,11 @@ from pathlib import Path
 from typing import Any
 
 from analysis_tools import validation_page as page
-from calibrate_reference import ADAMS_PLAN, REFERENCE, adams_targets
+from calibrate_reference import ADAMS_PLAN, EARLIER, REFERENCE, adams_targets
 
 from wm_drake.batch.ledger import open_ledger
 from wm_drake.model.build import build_machine
-from wm_drake.parameters import load_machine
+from wm_drake.parameters import load_machine, machine_path
 from wm_drake.parameters.damper_laws import DAMPER_LAWS
 from wm_drake.parameters.files import read_yaml, yaml_text
 from wm_drake.parameters.free import FreeFile
@@ -28,38 +28,45 @@ from wm_drake.studies.calibration.calibration import calibrate, identity_of
 from wm_drake.studies.calibration.computed import Runner
 from wm_drake.studies.calibration.solutions import Solution, percents_of
 
-FREE = Path(__file__).with_name("reference_free.yaml")
+FREE, EARLIER_FREE = (
+    Path(__file__).with_name(f"{name}_free.yaml") for name in (REFERENCE, EARLIER)
+)
 KEY = "damper_types.friction"
 ITERATIONS = 12
 FRICTION = "(5, 90) N"
 """Bounds of the friction."""
 
-ONLY_HAVSIN = {"full_friction_velocity"}
-SPONGE = {
-    "sponge_stiffness": ("(5, 100) N/mm", "(30, 15) N/mm"),
-    "sponge_damping": ("(0.005, 0.3) N*s/mm", "(0.1, 0.04) N*s/mm"),
-    "slider_damping": ("(0.001, 0.3) N*s/mm", "(0.05, 0.04) N*s/mm"),
+VELOCITY = "full_friction_velocity"
+SPONGE_BOUNDS = {
+    "sponge_stiffness": "(5, 100) N/mm",
+    "sponge_damping": "(0.005, 0.3) N*s/mm",
+    "slider_damping": "(0.001, 0.3) N*s/mm",
 }
-TRANSITION = {"transition_velocity": ("(5, 600) mm/s", "(150, 100) mm/s")}
-FREE_NUMBERS: dict[str, dict[str, tuple[str, str]]] = {
-    "coulomb": {},
-    "stv": TRANSITION,
-    "havsin": {"full_friction_velocity": TRANSITION["transition_velocity"]},
-    "mstv": SPONGE,
-    "stv_sponge": TRANSITION | SPONGE,
-    "free_stroke": {
-        "friction_damping": ("(0.001, 0.3) N*s/mm", "(0.06, 0.04) N*s/mm"),
-        "basic_friction_force": ("(1, 60) N", "(10, 8) N"),
-        "basic_full_friction_velocity": TRANSITION["transition_velocity"],
+"""Bounds of the sponge; its priors are those of the earlier machine."""
+
+OF_FREE_STROKE = {
+    "friction_damping": {
+        "bounds": "(0.001, 0.3) N*s/mm",
+        "prior": "(0.06, 0.04) N*s/mm",
+        "source": "[A] Table 1: 0.06 N s/mm",
+    },
+    "basic_friction_force": {
+        "bounds": "(1, 60) N",
+        "prior": "(10, 8) N",
+        "source": "[A] Table 1: 10.5 N",
     },
 }
-"""Bounds and prior of the numbers that each law has beside friction and dashpot."""
+"""Numbers of the free-stroke damper alone; its sponge is that of the machine `free_stroke`."""
 
-FREE_STROKE = {
-    "displacement": "(-20, -14, -10, -7, -5, -3, 3, 5, 7, 10, 14, 20) mm",
-    "force": "(-160, -75, -38, -18, -7, 0, 0, 7, 18, 38, 75, 160) N",
+NUMBERS: dict[str, tuple[str, ...]] = {
+    "coulomb": (),
+    "stv": ("transition_velocity",),
+    "havsin": (VELOCITY,),
+    "mstv": tuple(SPONGE_BOUNDS),
+    "stv_sponge": ("transition_velocity", *SPONGE_BOUNDS),
+    "free_stroke": (*OF_FREE_STROKE, "basic_full_friction_velocity"),
 }
-"""Sponge of the free-stroke damper, that of the machine `free_stroke`."""
+"""Free numbers of each law beside friction and dashpot."""
 
 DASHPOT = {"coulomb", "stv", "havsin"}
 """Laws with a dashpot beside the friction."""
@@ -67,13 +74,13 @@ DASHPOT = {"coulomb", "stv", "havsin"}
 
 def machine_text(law: str) -> str:
     """Return a machine file that gives the reference machine dampers of another law."""
-    numbers: dict[str, Any] = {"law": law, "friction_force": "34.4 N"}
-    numbers |= {"full_friction_velocity": None, "damping": None}
-    numbers |= {name: prior_mean(prior) for name, (_, prior) in FREE_NUMBERS[law].items()}
-    if law in DASHPOT:
-        numbers["damping"] = "0.052 N*s/mm"
+    numbers: dict[str, Any] = {"law": law, VELOCITY: None}
+    numbers |= {name: prior_mean(quantity_of(name)["prior"]) for name in NUMBERS[law]}
+    if law not in DASHPOT:
+        numbers["damping"] = None
     if law == "free_stroke":
-        numbers["sponge"] = FREE_STROKE
+        types = read_yaml(machine_path("free_stroke"))["damper_types"]
+        numbers["sponge"] = types["free_stroke"]["sponge"]
     return yaml_text(
         {"extends": REFERENCE, "name": f"reference_{law}", "damper_types": {"friction": numbers}}
     )
@@ -85,20 +92,27 @@ def prior_mean(prior: str) -> str:
     return f"{numbers.split(',')[0]}{unit}"
 
 
+def quantity_of(name: str) -> dict[str, Any]:
+    """Return bounds, prior and source of a number of a damper."""
+    if name in OF_FREE_STROKE:
+        entry = OF_FREE_STROKE[name]
+    elif name in SPONGE_BOUNDS:
+        entry = read_yaml(EARLIER_FREE)["quantities"][name] | {"bounds": SPONGE_BOUNDS[name]}
+    else:
+        entry = read_yaml(FREE)["quantities"][VELOCITY]
+    return {key: entry[key] for key in ("bounds", "prior", "source")}
+
+
 def free_of(law: str) -> FreeFile:
     """Return the free quantities of the reference machine with the numbers of a law."""
     tree = read_yaml(FREE)
     quantities = tree["quantities"]
-    for name in ONLY_HAVSIN | (set() if law in DASHPOT else {"damper_damping"}):
-        del quantities[name]
+    del quantities[VELOCITY]
+    if law not in DASHPOT:
+        del quantities["damper_damping"]
     quantities["damper_friction"]["bounds"] = FRICTION
-    for name, (bounds, prior) in FREE_NUMBERS[law].items():
-        quantities[name] = {
-            "bounds": bounds,
-            "prior": prior,
-            "sets": {f"{KEY}.{name}": 1},
-            "source": f"order of the dampers of [A] and [C]; law {law}",
-        }
+    for name in NUMBERS[law]:
+        quantities[name] = quantity_of(name) | {"sets": {f"{KEY}.{name}": 1}}
     return FreeFile.model_validate(tree)
 
 
@@ -114,7 +128,7 @@ def row_of(law: str, best: Solution) -> dict[str, Any]:
     names = best.parameter_map.names
     values = dict(zip(names, best.parameter_map.in_units(best.point), strict=True))
     row["friction, N"] = f"{values['damper_friction']:.1f}"
-    others = [name for name in (*FREE_NUMBERS[law], "damper_damping") if name in values]
+    others = [name for name in (*NUMBERS[law], "damper_damping") if name in values]
     row["others"] = ", ".join(f"{name} {values[name]:.3g}" for name in others)
     row["at bounds"] = best.verdicts().count("bound")
     return {
@@ -129,7 +143,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="one law, three quantities, one step")
     parser.add_argument("--out", type=Path, help="also write the result to this file")
     arguments = parser.parse_args()
-    laws = list(FREE_NUMBERS)[:1] if arguments.quick else list(DAMPER_LAWS)
+    laws = list(NUMBERS)[:1] if arguments.quick else list(DAMPER_LAWS)
     plan = replace(ADAMS_PLAN, iterations=1 if arguments.quick else ITERATIONS)
     rows = []
     with tempfile.TemporaryDirectory() as folder, progress_bar(len(laws), "laws") as done:

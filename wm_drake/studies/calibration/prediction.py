@@ -154,8 +154,8 @@ def _predicted(
 ) -> tuple[FloatArray, FloatArray, float]:
     """Return `amplitude`, `responses` and `scatter` of a prediction.
 
-    Machines are drawn in equal numbers from the normal
-    distributions around all distinct good solutions, because the data cannot tell these apart.
+    Machines are drawn in equal numbers from the normal distributions around all distinct good
+    solutions, because the data cannot tell these apart.
     """
     plan, parameter_map = calibration.plan, calibration.parameter_map
     generator = np.random.default_rng([plan.seed, plan.draws])

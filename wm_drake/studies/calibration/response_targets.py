@@ -74,7 +74,7 @@ class ResponseTarget:
 
     @property
     def of(self) -> str:
-        """What the value belongs to, for tables."""
+        """Return what the value belongs to, for tables."""
         if self.factor:
             return f"{self.factor} at {self.level}" if self.level is not None else self.factor
         return DESIGN if self.of_design else MACHINE
@@ -86,7 +86,7 @@ class ResponseTarget:
 
     @property
     def kind_of_value(self) -> str:
-        """`effects`, `contributions`, `means` over a design, or `responses` of the machine."""
+        """Return `effects`, `contributions`, `means` of a design, or `responses` of the machine."""
         if self.statistic:
             return f"{self.statistic}s"
         return "means" if self.of_design else "responses"
