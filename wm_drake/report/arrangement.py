@@ -10,25 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wm_drake.parameters.types import FloatArray
-from wm_drake.report.figure import (
-    LABEL,
-    TEXT,
-    TITLE,
-    WIDTH,
-    Area,
-    Axis,
-    Bars,
-    Cells,
-    Figure,
-    Line,
-    Mark,
-    Panel,
-    Points,
-    Rule,
-    Scale,
-    Text,
-    round_numbers,
-)
+from wm_drake.report import figure as fig
 
 CHARACTER = 0.56
 """Mean width of a character, as part of the size of the text."""
@@ -75,7 +57,7 @@ class Texts:
     is_upright: bool
     x_label: tuple[str, ...]
     y_label: tuple[str, ...]
-    scale: Scale | None
+    scale: fig.Scale | None
 
 
 @dataclass(frozen=True)
@@ -88,7 +70,7 @@ class Place:
         texts: What stands around them.
     """
 
-    panel: Panel
+    panel: fig.Panel
     left: float
     right: float
     top: float
@@ -134,13 +116,13 @@ def y_count(height: float) -> int:
     return max(3, round(height / 34.0))
 
 
-def key_texts(figure: Figure) -> tuple[str, ...]:
+def key_texts(figure: fig.Figure) -> tuple[str, ...]:
     """Return the entries of the legend."""
     marks = (mark for panel in figure.panels for mark in panel.marks)
     return figure.keys or tuple(dict.fromkeys(mark.key for mark in marks if mark.key))
 
 
-def arrange(figure: Figure) -> Arrangement:
+def arrange(figure: fig.Figure) -> Arrangement:
     """Return the places of the panels of a figure."""
     panels = _with_ranges(figure.panels)
     columns, rows = (
@@ -148,8 +130,8 @@ def arrange(figure: Figure) -> Arrangement:
         max(p.row + p.rows for p in panels),
     )
     ratios = np.array(figure.widths or (1.0,) * columns)
-    outer = LABEL * LINE + 8.0
-    begin, end = 0.0, float(WIDTH)
+    outer = fig.LABEL * LINE + 8.0
+    begin, end = 0.0, float(fig.WIDTH)
     spans = np.full(columns, (end - begin) * 0.85) * ratios / ratios.sum()
     for _ in range(3):  # texts are broken by the width that other texts leave
         rooms = [_room(p, spans[p.column], figure.height * p.rows) for p in panels]
@@ -197,46 +179,53 @@ class _Room:
     texts: Texts
 
 
-def _room(panel: Panel, width: float, height: float) -> _Room:
+def _room(panel: fig.Panel, width: float, height: float) -> _Room:
     """Return the room that the texts around a panel of a size need. [px]"""
     x_ticks, is_upright, x_height = _x_ticks(panel.x, width)
     y_ticks, y_width = _y_ticks(panel.y, height)
-    y_label = wrapped(panel.y.label, LABEL, max(60.0, height)) if panel.y.label else ()
-    left = max(y_width + (len(y_label) * LABEL * LINE + 6.0 if y_label else 0.0), 2.0)
-    x_label = wrapped(panel.x.label, LABEL, max(80.0, width * LABELLED)) if panel.x.label else ()
-    outside = x_height + (len(x_label) * LABEL * LINE + 6.0 if x_label else 0.0)
+    y_label = wrapped(panel.y.label, fig.LABEL, max(60.0, height)) if panel.y.label else ()
+    left = max(y_width + (len(y_label) * fig.LABEL * LINE + 6.0 if y_label else 0.0), 2.0)
+    x_label = (
+        wrapped(panel.x.label, fig.LABEL, max(80.0, width * LABELLED)) if panel.x.label else ()
+    )
+    outside = x_height + (len(x_label) * fig.LABEL * LINE + 6.0 if x_label else 0.0)
     if x_height and not is_upright:
         half = 0.5 * text_width(x_ticks[0] if x_ticks else "000", panel.x.size)
         left = max(left, half if not x_ticks else half - _first_place(panel.x, width))
     above, below = (outside, 4.0) if panel.x.is_far else (4.0, outside + 4.0)
     right = _right(panel, width)
     if panel.second is not None:
-        right += _y_ticks(panel.second, height)[1] + LABEL * LINE + 10.0
+        right += _y_ticks(panel.second, height)[1] + fig.LABEL * LINE + 10.0
     scale = next((s for m in panel.marks if (s := getattr(m, "scale", None)) and s.label), None)
     if scale is not None:
         names = [text for _, text in scale.ticks or ((0.0, "0.001"),)]
-        right += 34.0 + LABEL * LINE + max(text_width(text, TEXT) for text in names)
+        right += 34.0 + fig.LABEL * LINE + max(text_width(text, fig.TEXT) for text in names)
     if panel.top is not None:
-        above += TEXT * LINE + 8.0 + (LABEL * LINE + 4.0 if panel.top.label else 0.0)
+        above += fig.TEXT * LINE + 8.0 + (fig.LABEL * LINE + 4.0 if panel.top.label else 0.0)
     for mark in panel.marks:  # texts above the panel
-        if isinstance(mark, Text) and not mark.in_data[1] and mark.y >= 1.0 and mark.shift[1] > 0:
+        if (
+            isinstance(mark, fig.Text)
+            and not mark.in_data[1]
+            and mark.y >= 1.0
+            and mark.shift[1] > 0
+        ):
             above = max(above, mark.shift[1] + mark.size * LINE)
     most = max(70.0, NARROW * width + GAP)
-    titles = wrapped(panel.title, TITLE, most) if panel.title else ()
-    subtitles = wrapped(panel.subtitle, TEXT, most) if panel.subtitle else ()
-    top = above + LINE * (len(titles) * TITLE + len(subtitles) * TEXT)
+    titles = wrapped(panel.title, fig.TITLE, most) if panel.title else ()
+    subtitles = wrapped(panel.subtitle, fig.TEXT, most) if panel.subtitle else ()
+    top = above + LINE * (len(titles) * fig.TITLE + len(subtitles) * fig.TEXT)
     top += 4.0 if titles or subtitles else 0.0
     texts = Texts(titles, subtitles, above, x_ticks, y_ticks, is_upright, x_label, y_label, scale)
     return _Room(left, right, top, below, texts)
 
 
-def _first_place(axis: Axis, width: float) -> float:
+def _first_place(axis: fig.Axis, width: float) -> float:
     low, high = _numbers(axis)
     assert axis.ticks
     return width * (axis.ticks[0][0] - low) / ((high - low) or 1.0)
 
 
-def _right(panel: Panel, width: float) -> float:
+def _right(panel: fig.Panel, width: float) -> float:
     """Return the room for what reaches over the right end of a panel: a tick, a text."""
     need = 4.0
     low, high = _numbers(panel.x)
@@ -248,14 +237,14 @@ def _right(panel: Panel, width: float) -> float:
             half = 0.5 * min(text_width(text, panel.x.size), 60.0)
             need = max(need, half - width * (high - at) / span)
     for mark in panel.marks:
-        if isinstance(mark, Text) and mark.in_data[0] and mark.across == "left":
+        if isinstance(mark, fig.Text) and mark.in_data[0] and mark.across == "left":
             at = width * (mark.x - low) / span + mark.shift[0]
             if at > 0.6 * width:
                 need = max(need, at + text_width(mark.text, mark.size) - width + 4.0)
     return min(need, 0.4 * width)
 
 
-def _x_ticks(axis: Axis, width: float) -> tuple[tuple[str, ...], bool, float]:
+def _x_ticks(axis: fig.Axis, width: float) -> tuple[tuple[str, ...], bool, float]:
     """Return texts of named ticks, whether they are turned, and the height of all texts."""
     if not axis.has_numbers or axis.ticks == ():
         return (), False, 0.0
@@ -274,7 +263,7 @@ def _x_ticks(axis: Axis, width: float) -> tuple[tuple[str, ...], bool, float]:
     return joined, True, max(text_width(text, axis.size) for text in joined) + 10.0
 
 
-def _y_ticks(axis: Axis, height: float) -> tuple[tuple[str, ...], float]:
+def _y_ticks(axis: fig.Axis, height: float) -> tuple[tuple[str, ...], float]:
     """Return texts of named ticks of a vertical axis, and the width of all texts."""
     if not axis.has_numbers or axis.ticks == ():
         return (), 0.0
@@ -282,7 +271,7 @@ def _y_ticks(axis: Axis, height: float) -> tuple[tuple[str, ...], float]:
     if axis.ticks is None:
         if axis.is_log:
             return (), text_width("10−10", axis.size) + 8.0
-        numbers = round_numbers(min(low, high), max(low, high), y_count(height))
+        numbers = fig.round_numbers(min(low, high), max(low, high), y_count(height))
         step = numbers[1] - numbers[0] if len(numbers) > 1 else 1.0
         decimals = max(0, -int(np.floor(np.log10(abs(step) or 1.0) + 1e-9)))
         longest = max(len(f"{number:.{min(decimals, 8)}f}") for number in numbers[[0, -1]])
@@ -297,10 +286,10 @@ def _y_ticks(axis: Axis, height: float) -> tuple[tuple[str, ...], float]:
     return texts, max(text_width(text, axis.size) for text in texts) + 9.0
 
 
-def _with_ranges(panels: Sequence[Panel]) -> list[Panel]:
+def _with_ranges(panels: Sequence[fig.Panel]) -> list[fig.Panel]:
     """Return panels whose axes have numbers as ranges, equal ones for axes of one scale."""
     ranges: dict[str, list[tuple[float, float]]] = {}
-    shown: list[Panel] = []
+    shown: list[fig.Panel] = []
     for panel in panels:
         axes = {"x": panel.x, "y": panel.y, "second": panel.second}
         for name, axis in axes.items():
@@ -325,14 +314,14 @@ def _with_ranges(panels: Sequence[Panel]) -> list[Panel]:
     return shown
 
 
-def _numbers(axis: Axis) -> tuple[float, float]:
+def _numbers(axis: fig.Axis) -> tuple[float, float]:
     low, high = axis.range
     assert low is not None
     assert high is not None
     return low, high
 
 
-def _range(marks: Iterable[Mark], axis: Axis, side: str) -> tuple[float, float]:
+def _range(marks: Iterable[fig.Mark], axis: fig.Axis, side: str) -> tuple[float, float]:
     """Return the range of an axis: its ends, or those of the data with some room."""
     low, high = axis.range
     if low is not None and high is not None:
@@ -344,7 +333,7 @@ def _range(marks: Iterable[Mark], axis: Axis, side: str) -> tuple[float, float]:
         values = values[values > 0.0]
     if not values.size:
         values = np.array([1.0, 10.0] if axis.is_log else [0.0, 1.0])
-    if any(isinstance(mark, Cells) for mark in marks):
+    if any(isinstance(mark, fig.Cells) for mark in marks):
         first, last = float(values.min()), float(values.max())
     elif axis.is_log:
         logs = np.log10([values.min(), values.max()])
@@ -357,19 +346,19 @@ def _range(marks: Iterable[Mark], axis: Axis, side: str) -> tuple[float, float]:
     return (first if low is None else low), (last if high is None else high)
 
 
-def _extent(mark: Mark, side: str) -> FloatArray:
+def _extent(mark: fig.Mark, side: str) -> FloatArray:
     """Return the numbers of a mark along an axis."""
-    if isinstance(mark, Rule):
+    if isinstance(mark, fig.Rule):
         return np.array([mark.at]) if (mark.along == "x") == (side == "y") else np.empty(0)
-    if isinstance(mark, Bars):
+    if isinstance(mark, fig.Bars):
         at, base = np.asarray(mark.at, dtype=float), np.asarray(mark.base, dtype=float)
         if mark.is_across == (side == "y"):
             return np.concatenate([at - 0.5 * mark.thickness, at + 0.5 * mark.thickness])
         return np.concatenate([base.ravel(), (base + np.asarray(mark.size, dtype=float)).ravel()])
-    if isinstance(mark, Cells):
+    if isinstance(mark, fig.Cells):
         at = np.asarray(getattr(mark, side), dtype=float)
         half = 0.5 * (at[1] - at[0]) if len(at) > 1 else 0.5
         return np.array([at[0] - half, at[-1] + half])
-    if isinstance(mark, (Line, Points, Area)):
+    if isinstance(mark, (fig.Line, fig.Points, fig.Area)):
         return np.asarray(getattr(mark, side), dtype=float)
     return np.empty(0)

@@ -19,6 +19,7 @@ from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
 from matplotlib.ticker import FixedFormatter, FixedLocator, MaxNLocator, NullLocator
 
+from wm_drake.report import figure as fig
 from wm_drake.report.arrangement import (
     LINE,
     Place,
@@ -28,32 +29,11 @@ from wm_drake.report.arrangement import (
     x_count,
     y_count,
 )
-from wm_drake.report.figure import (
-    GRID,
-    LABEL,
-    MARK,
-    QUIET,
-    TEXT,
-    TITLE,
-    WIDTH,
-    Area,
-    Axis,
-    Bars,
-    Cells,
-    Figure,
-    Line,
-    Mark,
-    Points,
-    Rule,
-    Scale,
-    Span,
-    Text,
-)
 
 JOURNAL_WIDTH = 180.0 / 25.4
 """Width of a drawing: two columns of a journal. [in]"""
 
-INCH = WIDTH / JOURNAL_WIDTH
+INCH = fig.WIDTH / JOURNAL_WIDTH
 """Pixels of the picture on a page in an inch of the drawing."""
 
 POINT = 72.0 / INCH
@@ -66,7 +46,7 @@ TICK: dict[str, Any] = {"width": THIN, "pad": POINT * 4.9}
 """Look of ticks. [pt]"""
 
 SIZES: dict[Any, Any] = {
-    "font.size": POINT * TEXT,
+    "font.size": POINT * fig.TEXT,
     "axes.linewidth": THIN,
     "axes.labelpad": POINT * 5.6,
     "lines.linewidth": POINT * 2.1,
@@ -98,16 +78,20 @@ MARKERS = {
 """Symbols of points by their names in Plotly."""
 
 
-def matplotlib_of(figure: Figure) -> Drawing:
+def matplotlib_of(figure: fig.Figure) -> Drawing:
     """Return a figure as a drawing at journal width, with its legend below the panels."""
     arrangement = arrange(figure)
     rows = _key_rows(figure)
     height = arrangement.height + 22.0 * len(rows)
-    drawing = Drawing(figsize=(WIDTH / INCH, height / INCH))
+    drawing = Drawing(figsize=(fig.WIDTH / INCH, height / INCH))
     with rc_context(SIZES):
         for place in arrangement.places:
             _draw_panel(drawing, place, height)
-        common: dict[str, Any] = {"fontsize": POINT * LABEL, "color": MARK, "parse_math": False}
+        common: dict[str, Any] = {
+            "fontsize": POINT * fig.LABEL,
+            "color": fig.MARK,
+            "parse_math": False,
+        }
         if figure.x_label:
             y = (height - arrangement.height) / height
             drawing.text(0.5, y, figure.x_label, ha="center", va="bottom", **common)
@@ -116,20 +100,20 @@ def matplotlib_of(figure: Figure) -> Drawing:
     return drawing
 
 
-def _key_rows(figure: Figure) -> list[list[str]]:
+def _key_rows(figure: fig.Figure) -> list[list[str]]:
     """Return the entries of the legend in rows that are not too long."""
     rows: list[list[str]] = []
     used = 0.0
     for key in key_texts(figure):
-        used += text_width(key, TEXT) + 60.0
-        if not rows or used > WIDTH:
+        used += text_width(key, fig.TEXT) + 60.0
+        if not rows or used > fig.WIDTH:
             rows.append([])
-            used = text_width(key, TEXT) + 60.0
+            used = text_width(key, fig.TEXT) + 60.0
         rows[-1].append(key)
     return rows
 
 
-def _draw_keys(drawing: Drawing, figure: Figure, keys: list[str], bottom: float) -> None:
+def _draw_keys(drawing: Drawing, figure: fig.Figure, keys: list[str], bottom: float) -> None:
     marks = [mark for panel in figure.panels for mark in panel.marks]
     handles = [_sample([mark for mark in marks if mark.key == key]) for key in keys]
     legend = drawing.legend(
@@ -139,7 +123,7 @@ def _draw_keys(drawing: Drawing, figure: Figure, keys: list[str], bottom: float)
         bbox_to_anchor=(0.5, bottom),
         ncols=len(keys),
         frameon=False,
-        fontsize=POINT * TEXT,
+        fontsize=POINT * fig.TEXT,
         borderaxespad=0.1,
         borderpad=0.1,
         handler_map={tuple: HandlerTuple(ndivide=1)},
@@ -148,28 +132,28 @@ def _draw_keys(drawing: Drawing, figure: Figure, keys: list[str], bottom: float)
         text.set_parse_math(False)
 
 
-def _sample(marks: list[Mark]) -> Any:
+def _sample(marks: list[fig.Mark]) -> Any:
     """Return the samples of the kinds of marks of one entry of the legend, over each other."""
-    samples: dict[type[Mark], Any] = {}
+    samples: dict[type[fig.Mark], Any] = {}
     for mark in marks:
         if type(mark) in samples:
             continue
-        if isinstance(mark, (Area, Bars, Span)):
-            color = mark.colors[0] if isinstance(mark, Bars) and mark.colors else mark.color
+        if isinstance(mark, (fig.Area, fig.Bars, fig.Span)):
+            color = mark.colors[0] if isinstance(mark, fig.Bars) and mark.colors else mark.color
             edge = getattr(mark, "edge", "")
             face = to_rgba(color, mark.opacity)
             samples[type(mark)] = Patch(facecolor=face, edgecolor=edge or (0, 0, 0, 0))
-        elif isinstance(mark, (Line, Rule)):
+        elif isinstance(mark, (fig.Line, fig.Rule)):
             samples[type(mark)] = Line2D([], [], **_line_style(mark))
-        elif isinstance(mark, Points):
+        elif isinstance(mark, fig.Points):
             samples[type(mark)] = Line2D([], [], **_point_style(mark))
     return tuple(samples.values())
 
 
 def _draw_panel(drawing: Drawing, place: Place, height: float) -> None:
     panel = place.panel
-    box = (place.left / WIDTH, 1.0 - place.bottom / height)
-    size = ((place.right - place.left) / WIDTH, (place.bottom - place.top) / height)
+    box = (place.left / fig.WIDTH, 1.0 - place.bottom / height)
+    size = ((place.right - place.left) / fig.WIDTH, (place.bottom - place.top) / height)
     axes = drawing.add_axes((*box, *size))
     axes.set_axisbelow(True)
     for side in ("top", "right", "bottom", "left"):
@@ -211,8 +195,8 @@ def _second_axes(axes: Axes, place: Place) -> Axes:
 def _draw_titles(axes: Axes, place: Place) -> None:
     rise = place.texts.above
     for lines, text_size, color, weight in (
-        (place.texts.subtitles, TEXT, QUIET, "normal"),
-        (place.texts.titles, TITLE, MARK, "bold"),
+        (place.texts.subtitles, fig.TEXT, fig.QUIET, "normal"),
+        (place.texts.titles, fig.TITLE, fig.MARK, "bold"),
     ):
         if lines:
             axes.annotate(
@@ -231,7 +215,7 @@ def _draw_titles(axes: Axes, place: Place) -> None:
             rise += len(lines) * text_size * LINE
 
 
-def _style_axis(axes: Axes, side: str, axis: Axis, texts: tuple[str, ...], count: int) -> None:
+def _style_axis(axes: Axes, side: str, axis: fig.Axis, texts: tuple[str, ...], count: int) -> None:
     """Apply range, ticks and label of an axis; `axes` are those of matplotlib."""
     shown = axes.xaxis if side == "x" else axes.yaxis
     if axis.is_log:
@@ -245,15 +229,15 @@ def _style_axis(axes: Axes, side: str, axis: Axis, texts: tuple[str, ...], count
         shown.set_minor_locator(NullLocator())
     elif not axis.is_log:
         shown.set_major_locator(MaxNLocator(count, steps=[1, 2, 5, 10]))
-    shown.set_label_text(axis.label, fontsize=POINT * LABEL, color=axis.color, parse_math=False)
+    shown.set_label_text(axis.label, fontsize=POINT * fig.LABEL, color=axis.color, parse_math=False)
     has_numbers = axis.has_numbers and axis.ticks != ()
     near = {"x": "bottom", "y": "left"}[side]
     has_ticks = has_numbers and axis.has_line
     axes.tick_params(
         axis=side,  # type: ignore[arg-type]
         labelsize=POINT * axis.size,
-        labelcolor=QUIET,
-        color=QUIET,
+        labelcolor=fig.QUIET,
+        color=fig.QUIET,
         length=POINT * 4.2 if has_ticks else 0.0,
         **TICK,
         **{f"label{near}": has_numbers},
@@ -261,49 +245,49 @@ def _style_axis(axes: Axes, side: str, axis: Axis, texts: tuple[str, ...], count
     minor: dict[str, Any] = {"which": "minor", "length": POINT * 2.8, **TICK}
     axes.tick_params(axis=side, **minor)  # type: ignore[arg-type]
     if axis.has_grid:
-        axes.grid(axis=side, color=GRID, linewidth=THIN)  # type: ignore[arg-type]
+        axes.grid(axis=side, color=fig.GRID, linewidth=THIN)  # type: ignore[arg-type]
     axes.spines["top" if axis.is_far else near].set_visible(axis.has_line)
 
 
-def _draw_top(axes: Axes, top: Axis) -> None:
+def _draw_top(axes: Axes, top: fig.Axis) -> None:
     second = axes.secondary_xaxis("top")
     second.xaxis.set_major_locator(FixedLocator([at for at, _ in top.ticks or ()]))
     second.xaxis.set_major_formatter(FixedFormatter([text for _, text in top.ticks or ()]))
-    second.tick_params(labelsize=POINT * TEXT, colors=QUIET, length=POINT * 4.9, **TICK)
-    second.set_xlabel(top.label, fontsize=POINT * LABEL, color=QUIET)
+    second.tick_params(labelsize=POINT * fig.TEXT, colors=fig.QUIET, length=POINT * 4.9, **TICK)
+    second.set_xlabel(top.label, fontsize=POINT * fig.LABEL, color=fig.QUIET)
 
 
-def _colormap(scale: Scale) -> Colormap:
+def _colormap(scale: fig.Scale) -> Colormap:
     return LinearSegmentedColormap.from_list(scale.shades, scale.colors())
 
 
-def _norm(scale: Scale) -> Normalize:
+def _norm(scale: fig.Scale) -> Normalize:
     return Normalize(*scale.ends())
 
 
-def _draw_color_bar(drawing: Drawing, place: Place, scale: Scale, height: float) -> None:
-    box = ((place.right + 8.0) / WIDTH, 1.0 - place.bottom / height)
-    axes = drawing.add_axes((*box, 12.0 / WIDTH, (place.bottom - place.top) / height))
+def _draw_color_bar(drawing: Drawing, place: Place, scale: fig.Scale, height: float) -> None:
+    box = ((place.right + 8.0) / fig.WIDTH, 1.0 - place.bottom / height)
+    axes = drawing.add_axes((*box, 12.0 / fig.WIDTH, (place.bottom - place.top) / height))
     bar = drawing.colorbar(ScalarMappable(_norm(scale), _colormap(scale)), cax=axes)
     ticks = scale.bar_ticks()
     bar.set_ticks(list(scale.place([at for at, _ in ticks])), labels=[text for _, text in ticks])
-    bar.ax.tick_params(labelsize=POINT * TEXT, labelcolor=QUIET, length=POINT * 4.9, **TICK)
-    bar.set_label(scale.label, fontsize=POINT * LABEL)
+    bar.ax.tick_params(labelsize=POINT * fig.TEXT, labelcolor=fig.QUIET, length=POINT * 4.9, **TICK)
+    bar.set_label(scale.label, fontsize=POINT * fig.LABEL)
     bar.outline.set_visible(False)
 
 
-def _line_style(mark: Line | Rule) -> dict[str, Any]:
+def _line_style(mark: fig.Line | fig.Rule) -> dict[str, Any]:
     style = {
         "color": to_rgba(mark.color, mark.opacity),
         "linewidth": POINT * mark.width * 1.15,
         "linestyle": DASHES[mark.dash],
     }
-    if isinstance(mark, Line) and mark.symbol:
+    if isinstance(mark, fig.Line) and mark.symbol:
         style |= {"marker": MARKERS[mark.symbol], "markersize": POINT * mark.size}
     return style
 
 
-def _point_style(mark: Points) -> dict[str, Any]:
+def _point_style(mark: fig.Points) -> dict[str, Any]:
     color = to_rgba(mark.color, mark.opacity)
     is_thin = mark.symbol.endswith(("-thin", "-ns", "-ew"))
     return {
@@ -316,11 +300,11 @@ def _point_style(mark: Points) -> dict[str, Any]:
     }
 
 
-def _line(axes: Axes, mark: Line) -> None:
+def _line(axes: Axes, mark: fig.Line) -> None:
     axes.plot(mark.x, mark.y, **_line_style(mark))
 
 
-def _points(axes: Axes, mark: Points) -> None:
+def _points(axes: Axes, mark: fig.Points) -> None:
     if mark.values is not None and mark.scale is not None:
         axes.scatter(
             mark.x,
@@ -335,7 +319,7 @@ def _points(axes: Axes, mark: Points) -> None:
         axes.plot(mark.x, mark.y, **_point_style(mark), rasterized=len(mark.x) > 500, zorder=3)
 
 
-def _area(axes: Axes, mark: Area) -> None:
+def _area(axes: Axes, mark: fig.Area) -> None:
     corners = np.column_stack([mark.x, mark.y]).astype(float)
     gaps = np.flatnonzero(np.isnan(corners).any(axis=1))
     pieces = [piece[~np.isnan(piece).any(axis=1)] for piece in np.split(corners, gaps)]
@@ -353,7 +337,7 @@ def _area(axes: Axes, mark: Area) -> None:
     )
 
 
-def _bars(axes: Axes, mark: Bars) -> None:
+def _bars(axes: Axes, mark: fig.Bars) -> None:
     look: dict[str, Any] = {
         "color": [to_rgba(c, mark.opacity) for c in mark.colors or (mark.color,)]
     }
@@ -363,7 +347,7 @@ def _bars(axes: Axes, mark: Bars) -> None:
         axes.bar(mark.at, mark.size, mark.thickness, bottom=mark.base, **look)
 
 
-def _cells(axes: Axes, mark: Cells) -> None:
+def _cells(axes: Axes, mark: fig.Cells) -> None:
     edges = []
     for middles in (mark.x, mark.y):
         at = np.asarray(middles, dtype=float)
@@ -381,16 +365,16 @@ def _cells(axes: Axes, mark: Cells) -> None:
     )
 
 
-def _rule(axes: Axes, mark: Rule) -> None:
+def _rule(axes: Axes, mark: fig.Rule) -> None:
     (axes.axhline if mark.along == "x" else axes.axvline)(mark.at, **_line_style(mark))
 
 
-def _span(axes: Axes, mark: Span) -> None:
+def _span(axes: Axes, mark: fig.Span) -> None:
     color = to_rgba(mark.color, mark.opacity)
     axes.axvspan(mark.begin, mark.end, facecolor=color, linewidth=0.0, zorder=0)
 
 
-def _text(axes: Axes, mark: Text) -> None:
+def _text(axes: Axes, mark: fig.Text) -> None:
     x, y = ("data" if inside else "axes fraction" for inside in mark.in_data)
     axes.annotate(
         mark.text,
@@ -410,13 +394,13 @@ def _text(axes: Axes, mark: Text) -> None:
 
 
 _Draw: TypeAlias = Callable[[Axes, Any], None]
-_MARKS: dict[type[Mark], _Draw] = {
-    Line: _line,
-    Points: _points,
-    Area: _area,
-    Bars: _bars,
-    Cells: _cells,
-    Rule: _rule,
-    Span: _span,
-    Text: _text,
+_MARKS: dict[type[fig.Mark], _Draw] = {
+    fig.Line: _line,
+    fig.Points: _points,
+    fig.Area: _area,
+    fig.Bars: _bars,
+    fig.Cells: _cells,
+    fig.Rule: _rule,
+    fig.Span: _span,
+    fig.Text: _text,
 }

@@ -12,6 +12,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from wm_drake.parameters.types import FloatArray
+from wm_drake.report import figure as fig
 from wm_drake.report.arrangement import (
     LINE,
     Arrangement,
@@ -20,28 +21,6 @@ from wm_drake.report.arrangement import (
     key_texts,
     x_count,
     y_count,
-)
-from wm_drake.report.figure import (
-    GRID,
-    LABEL,
-    MARK,
-    QUIET,
-    TEXT,
-    TITLE,
-    WIDTH,
-    Area,
-    Axis,
-    Bars,
-    Cells,
-    Figure,
-    Line,
-    Mark,
-    Panel,
-    Points,
-    Rule,
-    Scale,
-    Span,
-    Text,
 )
 
 Plain: TypeAlias = dict[str, Any]
@@ -57,14 +36,14 @@ LINE_GREY = "#9aa5b1"
 """Colour of the lines of axes."""
 
 
-def plotly_of(figure: Figure) -> Plain:
+def plotly_of(figure: fig.Figure) -> Plain:
     """Return a figure as data and layout of Plotly.
 
     `meta` of the layout has what pictures.js needs: edges of the columns, legend, and panels.
     """
     arrangement = arrange(figure)
     layout: Plain = {
-        "width": WIDTH,
+        "width": fig.WIDTH,
         "height": round(arrangement.height),
         "margin": {"l": 0, "r": 0, "t": 0, "b": 0, "pad": 0},
         "paper_bgcolor": "rgba(0,0,0,0)",
@@ -73,7 +52,7 @@ def plotly_of(figure: Figure) -> Plain:
         "hovermode": "closest",
         "barmode": "overlay",
         "dragmode": "zoom",
-        "font": {"size": TEXT, "color": MARK},
+        "font": {"size": fig.TEXT, "color": fig.MARK},
         "shapes": [],
         "annotations": _outer_labels(figure),
     }
@@ -99,11 +78,11 @@ def plotly_of(figure: Figure) -> Plain:
     return {"data": data, "layout": layout}
 
 
-def _outer_labels(figure: Figure) -> list[Plain]:
+def _outer_labels(figure: fig.Figure) -> list[Plain]:
     if not figure.x_label:
         return []
     place: Plain = {"xref": "paper", "yref": "paper", "x": 0.5, "y": 0.0, "xanchor": "center"}
-    return [_note(figure.x_label, LABEL, MARK, **place, yanchor="bottom")]
+    return [_note(figure.x_label, fig.LABEL, fig.MARK, **place, yanchor="bottom")]
 
 
 def _note(text: str, size: float, color: str, *, is_bold: bool = False, **place: Any) -> Plain:
@@ -129,7 +108,7 @@ def _add_axes(
     panel, height = place.panel, arrangement.height
     x, y = _axis(panel.x), _axis(panel.y)
     x |= {
-        "domain": [place.left / WIDTH, place.right / WIDTH],
+        "domain": [place.left / fig.WIDTH, place.right / fig.WIDTH],
         "anchor": f"y{number}",
         "side": "top" if panel.x.is_far else "bottom",
         "nticks": x_count(place.right - place.left),
@@ -167,12 +146,12 @@ def _add_axes(
         layout[f"yaxis{199 + int(number or 1)}"] = second
 
 
-def _label(axis: Axis, text: str, standoff: int) -> Plain:
-    font = {"size": LABEL, "color": axis.color}
+def _label(axis: fig.Axis, text: str, standoff: int) -> Plain:
+    font = {"size": fig.LABEL, "color": axis.color}
     return {"text": escaped(text), "standoff": standoff, "font": font}
 
 
-def _axis(axis: Axis) -> Plain:
+def _axis(axis: fig.Axis) -> Plain:
     has_numbers = axis.has_numbers and axis.ticks != ()
     ends = np.log10(np.array(axis.range, dtype=float)) if axis.is_log else axis.range
     plain: Plain = {
@@ -180,14 +159,14 @@ def _axis(axis: Axis) -> Plain:
         "range": [float(end) for end in ends if end is not None],
         "zeroline": False,
         "showgrid": axis.has_grid,
-        "gridcolor": GRID,
+        "gridcolor": fig.GRID,
         "showline": axis.has_line,
         "linecolor": LINE_GREY,
         "showticklabels": has_numbers,
         "ticks": "outside" if has_numbers and axis.has_line else "",
         "ticklen": 4,
         "tickcolor": LINE_GREY,
-        "tickfont": {"size": axis.size, "color": QUIET},
+        "tickfont": {"size": axis.size, "color": fig.QUIET},
         "exponentformat": "power",
         "minexponent": 5,
         "hoverformat": ".5~g",
@@ -202,7 +181,10 @@ def _add_titles(place: Place, number: str, layout: Plain) -> None:
     at: Plain = {"x": 0.0, "y": 1.0, "xanchor": "left", "yanchor": "bottom"}
     at |= {"xref": f"x{number} domain", "yref": f"y{number} domain", "align": "left"}
     rise = texts.above
-    for lines, size, color in ((texts.subtitles, TEXT, QUIET), (texts.titles, TITLE, MARK)):
+    for lines, size, color in (
+        (texts.subtitles, fig.TEXT, fig.QUIET),
+        (texts.titles, fig.TITLE, fig.MARK),
+    ):
         if lines:
             is_title = lines is texts.titles
             note = _note("\n".join(lines), size, color, is_bold=is_title, **at, yshift=rise)
@@ -230,21 +212,21 @@ def _top_axis(place: Place, index: int, layout: Plain) -> Plain:
         "ticks": "outside",
         "ticklen": 4,
         "tickcolor": LINE_GREY,
-        "tickfont": {"size": TEXT, "color": QUIET},
+        "tickfont": {"size": fig.TEXT, "color": fig.QUIET},
         "title": {
             "text": escaped(top.label),
             "standoff": 3,
-            "font": {"size": LABEL, "color": QUIET},
+            "font": {"size": fig.LABEL, "color": fig.QUIET},
         },
     }
     axes = {"xaxis": f"x{100 + index}", "yaxis": f"y{number}"}
     return {"type": "scatter", "x": base["range"], "y": [None, None], "hoverinfo": "skip", **axes}
 
 
-def _color_bar(place: Place, scale: Scale, arrangement: Arrangement) -> Plain:
+def _color_bar(place: Place, scale: fig.Scale, arrangement: Arrangement) -> Plain:
     """Return the empty curve that carries the colour bar at the right of a panel."""
     (low, high), ticks = scale.ends(), scale.bar_ticks()
-    right = (place.right + 8.0) / WIDTH
+    right = (place.right + 8.0) / fig.WIDTH
     middle = 1.0 - 0.5 * (place.top + place.bottom) / arrangement.height
     bar = {
         "x": right,
@@ -259,11 +241,11 @@ def _color_bar(place: Place, scale: Scale, arrangement: Arrangement) -> Plain:
         "outlinewidth": 0,
         "tickvals": [float(v) for v in scale.place([at for at, _ in ticks])],
         "ticktext": [escaped(text) for _, text in ticks],
-        "tickfont": {"size": TEXT, "color": QUIET},
+        "tickfont": {"size": fig.TEXT, "color": fig.QUIET},
         "title": {
             "text": escaped(scale.label),
             "side": "right",
-            "font": {"size": LABEL, "color": MARK},
+            "font": {"size": fig.LABEL, "color": fig.MARK},
         },
     }
     marker = {"color": [low], "cmin": low, "cmax": high, "showscale": True, "colorbar": bar}
@@ -271,7 +253,7 @@ def _color_bar(place: Place, scale: Scale, arrangement: Arrangement) -> Plain:
     return {"type": "scatter", "mode": "markers", "x": [None], "y": [None], "marker": marker}
 
 
-def _colorscale(scale: Scale) -> list[list[Any]]:
+def _colorscale(scale: fig.Scale) -> list[list[Any]]:
     colors = scale.colors()
     return [[k / (len(colors) - 1), fixed(color)] for k, color in enumerate(colors)]
 
@@ -320,26 +302,26 @@ def thinned(x: FloatArray, y: FloatArray, most: int) -> tuple[FloatArray, FloatA
 
 
 def _add_mark(
-    mark: Mark, panel: Panel, axes: tuple[str, str], data: list[Plain], layout: Plain
+    mark: fig.Mark, panel: fig.Panel, axes: tuple[str, str], data: list[Plain], layout: Plain
 ) -> None:
     """Add a mark to the curves, shapes or annotations."""
-    if isinstance(mark, (Rule, Span)):
-        shape = _rule(mark, axes) if isinstance(mark, Rule) else _span(mark, axes)
+    if isinstance(mark, (fig.Rule, fig.Span)):
+        shape = _rule(mark, axes) if isinstance(mark, fig.Rule) else _span(mark, axes)
         layout["shapes"].append(shape | ({"legendgroup": mark.key} if mark.key else {}))
-    elif isinstance(mark, Text):
-        is_literal = any(isinstance(other, Cells) for other in panel.marks)
+    elif isinstance(mark, fig.Text):
+        is_literal = any(isinstance(other, fig.Cells) for other in panel.marks)
         layout["annotations"].append(_text(mark, axes, is_literal))
     else:
         curve = _CURVES[type(mark)](mark)
         curve |= {"xaxis": axes[0], "yaxis": axes[1], "meta": {"name": mark.name or mark.key}}
-        if isinstance(mark, Cells):
+        if isinstance(mark, fig.Cells):
             curve["meta"]["kind"] = mark.scale.kind
         if "hoverinfo" not in curve and "hovertemplate" not in curve:
             curve["hovertemplate"] = _hover(mark, panel)
         data.append(curve | ({"legendgroup": mark.key} if mark.key else {}))
 
 
-def _hover(mark: Mark, panel: Panel, value: str = "") -> str:
+def _hover(mark: fig.Mark, panel: fig.Panel, value: str = "") -> str:
     name = mark.name or mark.key
     head = f"<b>{escaped(name)}</b><br>" if name else ""
     y_axis = panel.second if mark.is_second and panel.second else panel.y
@@ -350,7 +332,7 @@ def _hover(mark: Mark, panel: Panel, value: str = "") -> str:
     return f"{head}{x}: %{{x:.5~g}}<br>{y}: %{{y:.5~g}}{value}<extra></extra>"
 
 
-def _rule(mark: Rule, axes: tuple[str, str]) -> Plain:
+def _rule(mark: fig.Rule, axes: tuple[str, str]) -> Plain:
     x, y = axes
     line = {
         "color": faded(mark.color, mark.opacity),
@@ -371,13 +353,13 @@ def _rule(mark: Rule, axes: tuple[str, str]) -> Plain:
     return {"type": "line", "layer": "above", "line": line, **place}
 
 
-def _span(mark: Span, axes: tuple[str, str]) -> Plain:
+def _span(mark: fig.Span, axes: tuple[str, str]) -> Plain:
     place = {"xref": axes[0], "yref": f"{axes[1]} domain", "x0": mark.begin, "x1": mark.end}
     look = {"fillcolor": faded(mark.color, mark.opacity), "line": {"width": 0}}
     return {"type": "rect", "layer": "below", "y0": 0, "y1": 1, **place, **look}
 
 
-def _text(mark: Text, axes: tuple[str, str], is_literal: bool) -> Plain:
+def _text(mark: fig.Text, axes: tuple[str, str], is_literal: bool) -> Plain:
     in_x, in_y = mark.in_data
     color = fixed(mark.color) if is_literal and in_x and in_y else mark.color
     place: Plain = {
@@ -394,7 +376,7 @@ def _text(mark: Text, axes: tuple[str, str], is_literal: bool) -> Plain:
     return _note(mark.text, mark.size, color, is_bold=mark.is_bold, **place)
 
 
-def _line(mark: Line) -> Plain:
+def _line(mark: fig.Line) -> Plain:
     x, y = (np.asarray(values, dtype=float) for values in (mark.x, mark.y))
     x, y = thinned(x, y, MOST_POINTS)
     color = faded(mark.color, mark.opacity)
@@ -410,7 +392,7 @@ def _line(mark: Line) -> Plain:
     return curve
 
 
-def _points(mark: Points) -> Plain:
+def _points(mark: fig.Points) -> Plain:
     is_thin = mark.symbol.endswith(("-thin", "-ns", "-ew"))
     color = faded(mark.color, mark.opacity)
     symbol = mark.symbol + ("-open" if mark.is_open or is_thin else "")
@@ -430,7 +412,7 @@ def _points(mark: Points) -> Plain:
     }
 
 
-def _area(mark: Area) -> Plain:
+def _area(mark: fig.Area) -> Plain:
     curve: Plain = {
         "type": "scatter",
         "mode": "lines",
@@ -444,7 +426,7 @@ def _area(mark: Area) -> Plain:
     return curve | {"line": {"width": 0}, "hoverinfo": "skip"}
 
 
-def _bars(mark: Bars) -> Plain:
+def _bars(mark: fig.Bars) -> Plain:
     at, size = packed(mark.at), packed(mark.size)
     base = np.broadcast_to(np.asarray(mark.base, dtype=float), np.shape(mark.size))
     colors = [faded(color, mark.opacity) for color in mark.colors or (mark.color,)]
@@ -463,7 +445,7 @@ def _bars(mark: Bars) -> Plain:
     }
 
 
-def _cells(mark: Cells) -> Plain:
+def _cells(mark: fig.Cells) -> Plain:
     scale = mark.scale
     low, high = scale.ends()
     value = "z" if scale.kind == "linear" else "customdata"  # pictures.js adds the latter
@@ -489,10 +471,10 @@ def _steps(side: str, middles: Any) -> Plain:
     return {f"{side}0": float(middles[0]), f"d{side}": step}
 
 
-_CURVES: dict[type[Mark], Callable[[Any], Plain]] = {
-    Line: _line,
-    Points: _points,
-    Area: _area,
-    Bars: _bars,
-    Cells: _cells,
+_CURVES: dict[type[fig.Mark], Callable[[Any], Plain]] = {
+    fig.Line: _line,
+    fig.Points: _points,
+    fig.Area: _area,
+    fig.Bars: _bars,
+    fig.Cells: _cells,
 }

@@ -7,20 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from wm_drake.report.figure import (
-    COLOURS,
-    MEASURED,
-    OURS,
-    QUIET,
-    Axis,
-    Dash,
-    Figure,
-    Line,
-    Mark,
-    Panel,
-    Rule,
-    in_grid,
-)
+from wm_drake.report import figure as fig
 from wm_drake.report.formatting import GM_PER_KGM, MM_PER_M, RPM_PER_RAD_S, number, plain
 from wm_drake.report.page import Picture, picture
 from wm_drake.report.sections import Section, SectionedPage
@@ -389,20 +376,22 @@ def _alarms(pairs: Sequence[Pair]) -> list[str]:
 
 def curve_picture(f: Findings) -> Picture:
     """Return amplitude over speed of the load with which rings are varied."""
-    marks: list[Mark] = []
+    marks: list[fig.Mark] = []
     for name, curve, color in (
-        ("free balls", f.base.free, OURS),
-        ("locked balls", f.base.locked, MEASURED),
+        ("free balls", f.base.free, fig.OURS),
+        ("locked balls", f.base.locked, fig.MEASURED),
     ):
         marks.append(_line(curve, color=color, key=name))
-    marks.append(_line(f.plain, color=QUIET, key="without rings", dash="dashed"))
+    marks.append(_line(f.plain, color=fig.QUIET, key="without rings", dash="dashed"))
     if np.isfinite(f.base.pays_from):
         at = RPM_PER_RAD_S * f.base.pays_from
-        marks.append(Rule(at, "y", dash="dotted", color=QUIET, key="free balls pay from here"))
-    panel = Panel(
+        marks.append(
+            fig.Rule(at, "y", dash="dotted", color=fig.QUIET, key="free balls pay from here")
+        )
+    panel = fig.Panel(
         marks=tuple(marks),
-        x=Axis(label="drum speed, rpm"),
-        y=Axis(label="amplitude, mm", is_log=True),
+        x=fig.Axis(label="drum speed, rpm"),
+        y=fig.Axis(label="amplitude, mm", is_log=True),
     )
     caption = (
         f"Largest amplitude of all sensors in ranges of 25 rpm of the run-up, with {_load(f.base)}."
@@ -412,11 +401,11 @@ def curve_picture(f: Findings) -> Picture:
         f"Free balls: largest amplitude {_mm(free.peak)} at {_rpm(free.peak_speed)}; locked "
         f"balls: {_mm(held.peak)} at {_rpm(held.peak_speed)}."
     )
-    return picture(Figure(panels=(panel,), height=340.0), words, caption)
+    return picture(fig.Figure(panels=(panel,), height=340.0), words, caption)
 
 
-def _line(curve: Curve, **style: Any) -> Line:
-    return Line(RPM_PER_RAD_S * curve.speeds, MM_PER_M * curve.amplitudes, **style)
+def _line(curve: Curve, **style: Any) -> fig.Line:
+    return fig.Line(RPM_PER_RAD_S * curve.speeds, MM_PER_M * curve.amplitudes, **style)
 
 
 QUANTITIES: tuple[tuple[str, Callable[[Curve], float]], ...] = (
@@ -430,26 +419,28 @@ def loads_picture(f: Findings) -> Picture:
     """Return both amplitudes over the place of the unbalance, a line for each mass."""
     panels = []
     for label, value in QUANTITIES:
-        marks: list[Mark] = []
+        marks: list[fig.Mark] = []
         for index, mass in enumerate(dict.fromkeys(pair.mass for pair in f.loads)):
             of_mass = [pair for pair in f.loads if pair.mass == mass]
             places = [MM_PER_M * pair.y for pair in of_mass]
-            color = COLOURS[index % len(COLOURS)]
-            styles: tuple[tuple[str, Dash], ...] = (("free", ""), ("locked", "dashed"))
+            color = fig.COLOURS[index % len(fig.COLOURS)]
+            styles: tuple[tuple[str, fig.Dash], ...] = (("free", ""), ("locked", "dashed"))
             for name, dash in styles:
                 sizes = [MM_PER_M * value(getattr(pair, name)) for pair in of_mass]
                 key = f"{mass:g} kg, {name}"
-                marks.append(Line(places, sizes, color=color, dash=dash, symbol="circle", key=key))
-        x = Axis(label="place of the unbalance along the drum, mm")
-        y = Axis(label=label, is_log=label == QUANTITIES[1][0])
-        panels.append(Panel(marks=tuple(marks), x=x, y=y))
+                marks.append(
+                    fig.Line(places, sizes, color=color, dash=dash, symbol="circle", key=key)
+                )
+        x = fig.Axis(label="place of the unbalance along the drum, mm")
+        y = fig.Axis(label=label, is_log=label == QUANTITIES[1][0])
+        panels.append(fig.Panel(marks=tuple(marks), x=x, y=y))
     caption = (
         "Over the place of the unbalance, to the rear from mid-depth of the drum. Where a full "
         "line is above the dashed one of its colour, free balls hurt."
     )
     hurt = sum(pair.free.peak > pair.locked.peak for pair in f.loads)
     words = f"Free balls make the largest amplitude larger with {hurt} of {len(f.loads)} loads."
-    return picture(Figure(panels=in_grid(panels, 2), height=320.0), words, caption)
+    return picture(fig.Figure(panels=fig.in_grid(panels, 2), height=320.0), words, caption)
 
 
 def rings_picture(f: Findings) -> Picture:
@@ -462,19 +453,19 @@ def rings_picture(f: Findings) -> Picture:
     ]
     values.append(("free balls pay from, rpm", lambda pair: RPM_PER_RAD_S * pair.pays_from))
     for label, read in values:
-        marks: list[Mark] = []
+        marks: list[fig.Mark] = []
         for index, mass in enumerate(masses):
             of_mass = [pair for pair in f.rings if pair.ball_mass == mass]
             x = [100.0 * pair.damping for pair in of_mass]
             y = np.array([read(pair) for pair in of_mass])
             y[~np.isfinite(y)] = np.nan
-            color, key = COLOURS[index % len(COLOURS)], f"ball mass {100.0 * mass:g} %"
-            marks.append(Line(x, y, color=color, symbol="circle", key=key))
-        y_axis = Axis(label=label, is_log=label == QUANTITIES[1][0])
-        x_axis = Axis(label="race damping, %", is_log=True)
-        panels.append(Panel(marks=tuple(marks), x=x_axis, y=y_axis))
+            color, key = fig.COLOURS[index % len(fig.COLOURS)], f"ball mass {100.0 * mass:g} %"
+            marks.append(fig.Line(x, y, color=color, symbol="circle", key=key))
+        y_axis = fig.Axis(label=label, is_log=label == QUANTITIES[1][0])
+        x_axis = fig.Axis(label="race damping, %", is_log=True)
+        panels.append(fig.Panel(marks=tuple(marks), x=x_axis, y=y_axis))
     caption = (
         f"With {_load(f.base)}, over the damping of the races and the mass of the balls, in parts "
         "of the machine file. A point is missing where free balls do not pay."
     )
-    return picture(Figure(panels=in_grid(panels, 3), height=300.0), _rings_text(f), caption)
+    return picture(fig.Figure(panels=fig.in_grid(panels, 3), height=300.0), _rings_text(f), caption)

@@ -8,19 +8,7 @@ import pandas as pd
 
 from wm_drake.parameters import MachineParameters, SpinProfile
 from wm_drake.parameters.units import Unit
-from wm_drake.report.figure import (
-    MARK,
-    MEASURED,
-    OURS,
-    QUIET,
-    Axis,
-    Figure,
-    Line,
-    Mark,
-    Panel,
-    Points,
-    Text,
-)
+from wm_drake.report import figure as fig
 from wm_drake.report.formatting import GM_PER_KGM, MISSING, RPM_PER_RAD_S, number, plain
 from wm_drake.report.page import Picture, picture
 from wm_drake.report.sections import Section, SectionedPage
@@ -236,20 +224,24 @@ def map_picture(result: DriveResult) -> Picture:
     good = grid.end_speed >= PASSES * result.profile.speed[-1]
     torque, unbalance = np.meshgrid(ratio * grid.torques, 1e3 * grid.unbalance)
     key = "does not pass; speed at the end, rpm"
-    marks: list[Mark] = [
-        Points(torque[good], unbalance[good], size=9.0, key="passes"),
-        Points(torque[~good], unbalance[~good], symbol="square", color=MEASURED, size=9.0, key=key),
+    marks: list[fig.Mark] = [
+        fig.Points(torque[good], unbalance[good], size=9.0, key="passes"),
+        fig.Points(
+            torque[~good], unbalance[~good], symbol="square", color=fig.MEASURED, size=9.0, key=key
+        ),
     ]
     speeds = RPM_PER_RAD_S * grid.end_speed[~good]
     for x, y, speed in zip(torque[~good], unbalance[~good], speeds, strict=True):
-        above = Text(float(x), float(y), f"{speed:.0f}", color=MEASURED, size=11.0, up="bottom")
+        above = fig.Text(
+            float(x), float(y), f"{speed:.0f}", color=fig.MEASURED, size=11.0, up="bottom"
+        )
         marks.append(replace(above, shift=(0.0, 6.0)))
-    panel = Panel(
+    panel = fig.Panel(
         marks=tuple(marks),
-        x=Axis(label="torque limit at the drum, N\u00a0m"),
-        y=Axis(label="unbalance, sum of mass times radius, g\u00a0m"),
+        x=fig.Axis(label="torque limit at the drum, N\u00a0m"),
+        y=fig.Axis(label="unbalance, sum of mass times radius, g\u00a0m"),
     )
-    figure = Figure(panels=(panel,), height=360.0)
+    figure = fig.Figure(panels=(panel,), height=360.0)
     passed = int(good.sum())
     caption = (
         f"Load {grid.load} with its masses multiplied by {grid.factors[0]:g} to "
@@ -279,20 +271,25 @@ def estimation_picture(result: DriveResult) -> Picture:
     planted = 1e3 * estimation.planted
     top = 1.02 * planted.max()
     ripple, torque = "speed ripple alone, J dw/dt", "torque alone"
-    marks: tuple[Mark, ...] = (
-        Points(planted, 1e3 * estimation.from_speed, symbol="triangle-up", color=QUIET, key=ripple),
-        Points(
+    marks: tuple[fig.Mark, ...] = (
+        fig.Points(
+            planted, 1e3 * estimation.from_speed, symbol="triangle-up", color=fig.QUIET, key=ripple
+        ),
+        fig.Points(
             planted,
             1e3 * estimation.from_torque,
             symbol="triangle-down",
-            color=MEASURED,
+            color=fig.MEASURED,
             key=torque,
         ),
-        Points(planted, 1e3 * estimation.estimated, color=OURS, key="both"),
-        Line([0.0, top], [0.0, top], color=MARK, key="planted"),
+        fig.Points(planted, 1e3 * estimation.estimated, color=fig.OURS, key="both"),
+        fig.Line([0.0, top], [0.0, top], color=fig.MARK, key="planted"),
     )
-    x, y = Axis(label="planted unbalance, g\u00a0m"), Axis(label="estimated unbalance, g\u00a0m")
-    figure = Figure(panels=(Panel(marks=marks, x=x, y=y),), height=340.0)
+    x, y = (
+        fig.Axis(label="planted unbalance, g\u00a0m"),
+        fig.Axis(label="estimated unbalance, g\u00a0m"),
+    )
+    figure = fig.Figure(panels=(fig.Panel(marks=marks, x=x, y=y),), height=340.0)
     caption = (
         "Estimated over planted unbalance. Torque or speed alone see only their share of it, which "
         "depends on the controller."

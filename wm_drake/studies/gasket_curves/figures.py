@@ -7,19 +7,7 @@ import numpy as np
 
 from wm_drake.parameters.gasket_drawing import Rubber, tension_stress
 from wm_drake.parameters.types import FloatArray
-from wm_drake.report.figure import (
-    MEASURED,
-    OURS,
-    QUIET,
-    Axis,
-    Figure,
-    Line,
-    Mark,
-    Panel,
-    Points,
-    Rule,
-    in_grid,
-)
+from wm_drake.report import figure as fig
 from wm_drake.report.formatting import MM_PER_M, MPA_PER_PA
 from wm_drake.solid.curves import Curve, Point
 from wm_drake.solid.mesh import Ring, axes_at
@@ -41,34 +29,36 @@ YAW, ELEVATION = math.radians(35.0), math.radians(30.0)
 """Direction of the view: turned from the front to the side, and from above."""
 
 
-def curves_figure(curves: dict[str, Curve]) -> Figure:
+def curves_figure(curves: dict[str, Curve]) -> fig.Figure:
     """Draw force over displacement and moment over angle, with the slope of the first 20 %."""
     panels = []
     for name, curve in curves.items():
         unit, table = units_of(curve.motion.rotates), curve.table
         finer = np.linspace(curve.values[0], curve.values[-1], 121)
-        slope = Line(
+        slope = fig.Line(
             unit.factor * finer,
             table.nominal_stiffness * finer,
-            color=QUIET,
+            color=fig.QUIET,
             dash="dashed",
             key="slope of the first 20 %",
         )
-        between = Line(unit.factor * finer, table.values(finer), key="table of the machine file")
-        points = Line(
+        between = fig.Line(
+            unit.factor * finer, table.values(finer), key="table of the machine file"
+        )
+        points = fig.Line(
             unit.factor * curve.values,
             curve.wrench(),
             width=0.0,
             symbol="circle",
             key="equilibria",
         )
-        marks: tuple[Mark, ...] = (Rule(0.0, color=QUIET), slope, between, points)
-        x, y = Axis(label=unit.label("displacement")), Axis(label=unit.force_label)
-        panels.append(Panel(title=TITLES[name], marks=marks, x=x, y=y))
-    return Figure(panels=in_grid(panels, 2), height=230.0)
+        marks: tuple[fig.Mark, ...] = (fig.Rule(0.0, color=fig.QUIET), slope, between, points)
+        x, y = fig.Axis(label=unit.label("displacement")), fig.Axis(label=unit.force_label)
+        panels.append(fig.Panel(title=TITLES[name], marks=marks, x=x, y=y))
+    return fig.Figure(panels=fig.in_grid(panels, 2), height=230.0)
 
 
-def rubber_figure(rubber: Rubber) -> Figure | None:
+def rubber_figure(rubber: Rubber) -> fig.Figure | None:
     """Draw the tension test of a rubber and the fitted curve; None without a test."""
     if rubber.test is None:
         return None
@@ -77,60 +67,60 @@ def rubber_figure(rubber: Rubber) -> Figure | None:
     curve = MPA_PER_PA * tension_stress(stretch, rubber.constants)
     stress = MPA_PER_PA * np.array(rubber.test.stress)
     marks = (
-        Line(stretch, curve, color=OURS, key="fit"),
-        Points(measured, stress, color=MEASURED, key="test"),
+        fig.Line(stretch, curve, color=fig.OURS, key="fit"),
+        fig.Points(measured, stress, color=fig.MEASURED, key="test"),
     )
-    panel = Panel(marks=marks, x=Axis(label="stretch"), y=Axis(label="stress, MPa"))
-    return Figure(panels=(panel,), height=240.0, keys=("test", "fit"))
+    panel = fig.Panel(marks=marks, x=fig.Axis(label="stretch"), y=fig.Axis(label="stress, MPa"))
+    return fig.Figure(panels=(panel,), height=240.0, keys=("test", "fit"))
 
 
-def sections_figure(curves: dict[str, Curve]) -> Figure:
+def sections_figure(curves: dict[str, Curve]) -> fig.Figure:
     """Draw cuts through the wall at rest and at both ends, one panel for each side of the axis."""
     panels = []
     for name, curve in curves.items():
         columns = dict.fromkeys((0, curve.ring.grid.shape[1] - 1))
         for column, side in zip(columns, ("x > 0", "x < 0"), strict=False):
-            panel = Panel(
+            panel = fig.Panel(
                 title=TITLES[name],
                 subtitle=side if len(columns) > 1 else "all around",
                 marks=tuple(_cuts(curve, column)),
-                x=Axis(label="across, mm"),
-                y=Axis(label="y, mm"),
+                x=fig.Axis(label="across, mm"),
+                y=fig.Axis(label="y, mm"),
                 is_square=True,
             )
             panels.append(panel)
-    return Figure(panels=in_grid(panels, 3), height=300.0)
+    return fig.Figure(panels=fig.in_grid(panels, 3), height=300.0)
 
 
-def _cuts(curve: Curve, column: int) -> Iterator[Mark]:
+def _cuts(curve: Curve, column: int) -> Iterator[fig.Mark]:
     """Yield the outlines of the wall in a cut: as drawn, and at both ends."""
     rest = curve.points[len(curve.points) // 2]
     for point, color, key in (
-        (rest, QUIET, "as drawn"),
-        (curve.points[0], MEASURED, "at the negative end"),
-        (curve.points[-1], OURS, "at the positive end"),
+        (rest, fig.QUIET, "as drawn"),
+        (curve.points[0], fig.MEASURED, "at the negative end"),
+        (curve.points[-1], fig.OURS, "at the positive end"),
     ):
         outline = MM_PER_M * _outline(curve.ring, point, column)
-        yield Line(*outline.T, color=color, key=key, width=1.2)
+        yield fig.Line(*outline.T, color=color, key=key, width=1.2)
         touching = Faces(curve.ring).touching(point.u).in_column(column)
         radius, y = MM_PER_M * touching.places.T
         side = -1.0 if column else 1.0
         if len(y):
-            yield Points(side * radius, y, color=color, symbol="square", size=4.0)
+            yield fig.Points(side * radius, y, color=color, symbol="square", size=4.0)
 
 
-def rings_figure(curves: dict[str, Curve]) -> Figure:
+def rings_figure(curves: dict[str, Curve]) -> fig.Figure:
     """Draw half of the ring from the side at both ends of each curve, by lines of its mesh."""
     panels = []
     for name, curve in curves.items():
         unit = units_of(curve.motion.rotates)
         for point in (curve.points[0], curve.points[-1]):
             lines = np.concatenate(list(_mesh_lines(_surface(curve.ring, point.u))))
-            mark = Line(*(MM_PER_M * lines).T, color=OURS, width=0.7)
-            blank = Axis(ticks=(), has_grid=False, has_line=False)
+            mark = fig.Line(*(MM_PER_M * lines).T, color=fig.OURS, width=0.7)
+            blank = fig.Axis(ticks=(), has_grid=False, has_line=False)
             title = f"{name}, {unit.text(point.value)}"
-            panels.append(Panel(title=title, marks=(mark,), x=blank, y=blank, is_square=True))
-    return Figure(panels=in_grid(panels, 2), height=210.0)
+            panels.append(fig.Panel(title=title, marks=(mark,), x=blank, y=blank, is_square=True))
+    return fig.Figure(panels=fig.in_grid(panels, 2), height=210.0)
 
 
 def _outline(ring: Ring, point: Point, column: int) -> FloatArray:

@@ -7,25 +7,7 @@ import numpy as np
 
 from wm_drake.model.scene import Outline
 from wm_drake.parameters.types import FloatArray
-from wm_drake.report.figure import (
-    COLOURS,
-    MARK,
-    MEASURED,
-    OURS,
-    QUIET,
-    Axis,
-    Bars,
-    Figure,
-    Line,
-    Mark,
-    Panel,
-    Points,
-    Rule,
-    Scale,
-    Text,
-    in_grid,
-    named,
-)
+from wm_drake.report import figure as fig
 from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number
 from wm_drake.simulation.outputs import point_positions
 from wm_drake.studies.modes.sensitivity import Sensitivity
@@ -58,26 +40,26 @@ ELEMENT_COLOURS = (
 """Colours of elements: ten hues, each dark and light."""
 
 
-def campbell_figure(result: MachineModes) -> Figure:
+def campbell_figure(result: MachineModes) -> fig.Figure:
     """Return the Campbell diagrams: natural frequencies over the speed, coloured by damping."""
     ratios = np.concatenate([d.damping_ratio.ravel() for d in result.diagrams.values()])
-    scale = Scale(low=0.0, high=max(0.05, float(np.nanmax(ratios))), shades="-viridis")
+    scale = fig.Scale(low=0.0, high=max(0.05, float(np.nanmax(ratios))), shades="-viridis")
     top = 1.08 * max(float(np.nanmax(d.frequency_hz)) for d in result.diagrams.values())
     panels = [_campbell(result, name, scale, top) for name in (SLIDING, STUCK)]
     panels[-1] = replace(
         panels[-1], marks=tuple(_with_bar(mark, scale) for mark in panels[-1].marks)
     )
-    return Figure(panels=in_grid(panels, 2, share="y"), height=430.0)
+    return fig.Figure(panels=fig.in_grid(panels, 2, share="y"), height=430.0)
 
 
-def _with_bar(mark: Mark, scale: Scale) -> Mark:
+def _with_bar(mark: fig.Mark, scale: fig.Scale) -> fig.Mark:
     """Return a mark whose colours are explained by a colour bar beside the panel."""
-    if not isinstance(mark, Points) or mark.scale is None:
+    if not isinstance(mark, fig.Points) or mark.scale is None:
         return mark
     return replace(mark, scale=replace(scale, label="damping ratio"))
 
 
-def _campbell(result: MachineModes, name: str, scale: Scale, top: float) -> Panel:
+def _campbell(result: MachineModes, name: str, scale: fig.Scale, top: float) -> fig.Panel:
     """Return the diagram of one linearisation.
 
     Args:
@@ -87,28 +69,30 @@ def _campbell(result: MachineModes, name: str, scale: Scale, top: float) -> Pane
     diagram = result.diagrams[name]
     rpm = RPM_PER_RAD_S * diagram.speed
     last = float(rpm[-1])
-    marks: list[Mark] = []
+    marks: list[fig.Mark] = []
     for mode, column in enumerate(diagram.frequency_hz.T):
-        marks.append(Line(rpm, column, color=QUIET, width=1.1))
+        marks.append(fig.Line(rpm, column, color=fig.QUIET, width=1.1))
         mode_name = result.modes[name][mode].name
-        points = Points(rpm, column, values=diagram.damping_ratio[:, mode], name=mode_name)
+        points = fig.Points(rpm, column, values=diagram.damping_ratio[:, mode], name=mode_name)
         marks.append(replace(points, scale=scale, size=5.0))
     for order in ORDERS:
         key = "order of the drum speed"
-        marks.append(Line(rpm, order * rpm / 60.0, color=MARK, dash="dashed", key=key))
+        marks.append(fig.Line(rpm, order * rpm / 60.0, color=fig.MARK, dash="dashed", key=key))
         at = min(0.93 * last, 0.93 * top * 60.0 / order)
-        text = Text(at, order * at / 60.0, f"{order:g}×", is_bold=True, across="right")
+        text = fig.Text(at, order * at / 60.0, f"{order:g}×", is_bold=True, across="right")
         marks.append(replace(text, up="bottom", shift=(-5.0, 6.0)))
     marks += _critical_marks(result, name, top)
     if result.run_up is not None:
         speeds = RPM_PER_RAD_S * result.run_up.critical_speed.values.ravel()
         speeds = np.unique(np.round(speeds[np.isfinite(speeds)]))
         key = "largest amplitude of a sensor in a run-up"
-        marks.append(Points(speeds, speeds / 60.0, symbol="triangle-down", opacity=0.75, key=key))
+        marks.append(
+            fig.Points(speeds, speeds / 60.0, symbol="triangle-down", opacity=0.75, key=key)
+        )
     marks += _mode_names(result, name, last, top)
-    x = Axis(label="drum speed, rpm", range=(0.0, 1.16 * last))
-    y = Axis(label="natural frequency, Hz", range=(0.0, top))
-    return Panel(title=TITLES[name], marks=tuple(marks), x=x, y=y)
+    x = fig.Axis(label="drum speed, rpm", range=(0.0, 1.16 * last))
+    y = fig.Axis(label="natural frequency, Hz", range=(0.0, top))
+    return fig.Panel(title=TITLES[name], marks=tuple(marks), x=x, y=y)
 
 
 NEAR_LABELS = 0.035
@@ -116,14 +100,16 @@ NEAR_LABELS = 0.035
 label."""
 
 
-def _critical_marks(result: MachineModes, name: str, top: float) -> list[Mark]:
+def _critical_marks(result: MachineModes, name: str, top: float) -> list[fig.Mark]:
     critical = result.critical[name]
     if not critical:
         return []
     rpm = np.array([RPM_PER_RAD_S * one.speed for one in critical])
     hertz = np.array([one.order for one in critical]) * rpm / 60.0
     key = "critical speed"
-    marks: list[Mark] = [Points(rpm, hertz, color=MEASURED, is_open=True, size=10.0, key=key)]
+    marks: list[fig.Mark] = [
+        fig.Points(rpm, hertz, color=fig.MEASURED, is_open=True, size=10.0, key=key)
+    ]
     of_drum = sorted(float(x) for one, x in zip(critical, rpm, strict=True) if one.order == 1.0)
     groups: list[list[float]] = []
     for x in of_drum:
@@ -133,12 +119,12 @@ def _critical_marks(result: MachineModes, name: str, top: float) -> list[Mark]:
             groups.append([x])
     for group in groups:
         words = ", ".join(number(x, 0) for x in group)
-        text = Text(group[-1], group[-1] / 60.0, words, color=MEASURED, size=11.0)
+        text = fig.Text(group[-1], group[-1] / 60.0, words, color=fig.MEASURED, size=11.0)
         marks.append(replace(text, across="left", up="top", shift=(6.0, -4.0)))
     return marks
 
 
-def _mode_names(result: MachineModes, name: str, last_rpm: float, top: float) -> list[Mark]:
+def _mode_names(result: MachineModes, name: str, last_rpm: float, top: float) -> list[fig.Mark]:
     """Return the names of the modes at the right end, apart from each other."""
     ends = result.diagrams[name].frequency_hz[-1]
     order = np.argsort(ends)
@@ -146,28 +132,31 @@ def _mode_names(result: MachineModes, name: str, last_rpm: float, top: float) ->
     for index in range(1, len(places)):
         places[index] = max(places[index], places[index - 1] + 0.042 * top)
     return [
-        Text(1.015 * last_rpm, place, result.modes[name][mode].name, size=12.0, across="left")
+        fig.Text(1.015 * last_rpm, place, result.modes[name][mode].name, size=12.0, across="left")
         for place, mode in zip(places, order, strict=True)
     ]
 
 
-def amplitude_figure(result: MachineModes) -> Figure:
+def amplitude_figure(result: MachineModes) -> fig.Figure:
     """Return frequency and damping ratio of each mode over its amplitude."""
     panels = []
     for label, quantity in (("frequency, Hz", "frequency_hz"), ("damping ratio", "damping_ratio")):
-        marks: list[Mark] = [
-            Line(
+        marks: list[fig.Mark] = [
+            fig.Line(
                 MM_PER_M * mode.amplitude,
                 _without_rounding(getattr(mode, quantity)),
                 color=color,
                 key=mode.name,
             )
-            for color, mode in zip(COLOURS, result.over_amplitude, strict=False)
+            for color, mode in zip(fig.COLOURS, result.over_amplitude, strict=False)
         ]
-        marks.append(Rule(MM_PER_M * result.amplitude, "y", color=MARK, dash="dotted"))
-        x, y = Axis(label="amplitude, mm", is_log=True), Axis(label=label, range=(0.0, None))
-        panels.append(Panel(name=label.split(",")[0], marks=tuple(marks), x=x, y=y))
-    return Figure(panels=in_grid(panels, 2), height=310.0)
+        marks.append(fig.Rule(MM_PER_M * result.amplitude, "y", color=fig.MARK, dash="dotted"))
+        x, y = (
+            fig.Axis(label="amplitude, mm", is_log=True),
+            fig.Axis(label=label, range=(0.0, None)),
+        )
+        panels.append(fig.Panel(name=label.split(",")[0], marks=tuple(marks), x=x, y=y))
+    return fig.Figure(panels=fig.in_grid(panels, 2), height=310.0)
 
 
 def _without_rounding(values: FloatArray) -> FloatArray:
@@ -175,7 +164,7 @@ def _without_rounding(values: FloatArray) -> FloatArray:
     return np.where(np.abs(values) > UNDAMPED, values, 0.0)
 
 
-def shapes_figure(modes: list[Mode], outlines: Mapping[str, Outline]) -> Figure:
+def shapes_figure(modes: list[Mode], outlines: Mapping[str, Outline]) -> fig.Figure:
     """Return the tub in each mode, in three views: at rest, and at both ends of the motion."""
     lines = tub_lines(outlines)
     reach = max(float(np.abs(line).max()) for line in lines)
@@ -184,8 +173,8 @@ def shapes_figure(modes: list[Mode], outlines: Mapping[str, Outline]) -> Figure:
     for row, (view, across, up) in enumerate(VIEWS):
         for column, (mode, poses) in enumerate(zip(modes, ends, strict=True)):
             marks = [
-                Line(pose[:, across], pose[:, up], color=color)
-                for pose, color in zip(poses, (QUIET, OURS, MEASURED), strict=True)
+                fig.Line(pose[:, across], pose[:, up], color=color)
+                for pose, color in zip(poses, (fig.QUIET, fig.OURS, fig.MEASURED), strict=True)
             ]
             label = "" if column else f"{view}: {'xyz'[up]} over {'xyz'[across]}"
             panel = replace(view_panel(tuple(marks), reach), y=view_axis(reach, label))
@@ -194,17 +183,17 @@ def shapes_figure(modes: list[Mode], outlines: Mapping[str, Outline]) -> Figure:
                 damping = f"ζ {ratio}" if abs(mode.damping_ratio) > UNDAMPED else "undamped"
                 panel = replace(panel, title=mode.name, subtitle=f"{hertz} Hz\n{damping}")
             panels.append(panel)
-    return Figure(panels=in_grid(panels, len(modes)), height=900.0 / len(modes))
+    return fig.Figure(panels=fig.in_grid(panels, len(modes)), height=900.0 / len(modes))
 
 
-def view_axis(reach: float, label: str = "") -> Axis:
+def view_axis(reach: float, label: str = "") -> fig.Axis:
     """Return an axis of a view of the tub, without ticks. `reach`: largest coordinate. [m]"""
-    return Axis(label=label, range=(-1.35 * reach, 1.35 * reach), ticks=(), has_grid=False)
+    return fig.Axis(label=label, range=(-1.35 * reach, 1.35 * reach), ticks=(), has_grid=False)
 
 
-def view_panel(marks: tuple[Mark, ...], reach: float) -> Panel:
+def view_panel(marks: tuple[fig.Mark, ...], reach: float) -> fig.Panel:
     """Return a view of the tub."""
-    return Panel(marks=marks, x=view_axis(reach), y=view_axis(reach), is_square=True)
+    return fig.Panel(marks=marks, x=view_axis(reach), y=view_axis(reach), is_square=True)
 
 
 def tub_lines(outlines: Mapping[str, Outline]) -> list[FloatArray]:
@@ -246,28 +235,30 @@ def _ends_of_motion(mode: Mode, lines: list[FloatArray], reach: float) -> list[F
     return [joined(pose, lines) for pose in point_positions(poses, points)]
 
 
-def energy_figure(result: MachineModes) -> Figure:
+def energy_figure(result: MachineModes) -> fig.Figure:
     """Return which elements store the strain energy of each mode, and which dissipate energy."""
     elements = [name.replace("_", " ") for name in result.elements]
     panels = []
     for name in (SLIDING, STUCK):
         modes = result.modes[name]
-        y = Axis(ticks=named(mode.name for mode in modes), has_grid=False)
+        y = fig.Axis(ticks=fig.named(mode.name for mode in modes), has_grid=False)
         y = replace(y, range=(len(modes) - 0.5, -0.5))
         for kind, words in (("strain_energy", "strain energy"), ("dissipation", "dissipation")):
             left, marks = np.zeros(len(modes)), []
             for index, element in enumerate(elements):
                 share = 100.0 * np.array([max(getattr(m, kind)[index], 0.0) for m in modes])
-                bars = Bars(range(len(modes)), share, base=left, is_across=True, key=element)
+                bars = fig.Bars(range(len(modes)), share, base=left, is_across=True, key=element)
                 marks.append(replace(bars, color=ELEMENT_COLOURS[index % len(ELEMENT_COLOURS)]))
                 left = left + share
             title = f"{words}, {TITLES[name]}, %"
-            panels.append(Panel(title=title, marks=tuple(marks), x=Axis(range=(0, 102)), y=y))
-    placed = in_grid(panels, 2, share="y")
-    return Figure(panels=placed, height=30.0 * len(result.modes[SLIDING]) + 30.0)
+            panels.append(
+                fig.Panel(title=title, marks=tuple(marks), x=fig.Axis(range=(0, 102)), y=y)
+            )
+    placed = fig.in_grid(panels, 2, share="y")
+    return fig.Figure(panels=placed, height=30.0 * len(result.modes[SLIDING]) + 30.0)
 
 
-def sensitivity_figure(result: MachineModes, name: str, quantity: str) -> Figure:
+def sensitivity_figure(result: MachineModes, name: str, quantity: str) -> fig.Figure:
     """Return the numbers that move each mode most, as sorted bars.
 
     Args:
@@ -281,18 +272,18 @@ def sensitivity_figure(result: MachineModes, name: str, quantity: str) -> Figure
         chosen = strongest(relative, quantity, index)
         changes = np.array([getattr(entry, quantity)[index] for entry in chosen])
         values = [factor * float(change) for change in _without_rounding(changes)]
-        colors = tuple(OURS if value >= 0.0 else MEASURED for value in values)
-        bars = Bars(range(len(chosen)), values, colors=colors, is_across=True)
-        names = named(_short(entry.key) for entry in chosen)
-        y = Axis(ticks=names, range=(len(chosen) - 0.5, -0.5), has_grid=False, size=11.0)
-        marks = (bars, Rule(0.0, "y", color=MARK))
-        panels.append(Panel(title=mode.name, marks=marks, y=y))
+        colors = tuple(fig.OURS if value >= 0.0 else fig.MEASURED for value in values)
+        bars = fig.Bars(range(len(chosen)), values, colors=colors, is_across=True)
+        names = fig.named(_short(entry.key) for entry in chosen)
+        y = fig.Axis(ticks=names, range=(len(chosen) - 0.5, -0.5), has_grid=False, size=11.0)
+        marks = (bars, fig.Rule(0.0, "y", color=fig.MARK))
+        panels.append(fig.Panel(title=mode.name, marks=marks, y=y))
     text = (
         "change of the frequency in % for 1 % more"
         if quantity == "frequency"
         else "change of the damping ratio in 0.001 for 1 % more"
     )
-    return Figure(panels=in_grid(panels, 2), height=150.0, x_label=text)
+    return fig.Figure(panels=fig.in_grid(panels, 2), height=150.0, x_label=text)
 
 
 def strongest(entries: list[Sensitivity], quantity: str, mode: int) -> list[Sensitivity]:

@@ -4,19 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from wm_drake.report.figure import (
-    MARK,
-    MEASURED,
-    Axis,
-    Cells,
-    Figure,
-    Line,
-    Mark,
-    Panel,
-    Scale,
-    band,
-    in_grid,
-)
+from wm_drake.report import figure as fig
 from wm_drake.report.formatting import RPM_PER_RAD_S, number
 from wm_drake.report.page import picture
 from wm_drake.report.sections import Section, SectionedPage
@@ -87,32 +75,32 @@ def _table(result: Orders) -> Table:
     return Table(caption, ("order", "", *columns), tuple(groups), text_columns=2)
 
 
-def signal_figure(result: Orders, index: int) -> Figure:
+def signal_figure(result: Orders, index: int) -> fig.Figure:
     """Return waterfall and order map of a signal."""
-    return Figure(
-        panels=in_grid([_waterfall(result, index), _order_map(result, index)], 2), height=350.0
+    return fig.Figure(
+        panels=fig.in_grid([_waterfall(result, index), _order_map(result, index)], 2), height=350.0
     )
 
 
-def _order_map(result: Orders, index: int) -> Panel:
+def _order_map(result: Orders, index: int) -> fig.Panel:
     """Return the amplitude of each order over the drum speed, at even speeds."""
     rpm = RPM_PER_RAD_S * np.abs(result.orders.speed.values)
     at = np.argsort(rpm, kind="stable")
     even = np.linspace(rpm[at[0]], rpm[at[-1]], min(len(rpm), MAP_COLUMNS))
     nearest = at[np.clip(np.searchsorted(rpm[at], even), 0, len(at) - 1)]
     values = result.orders.values[nearest, :, index].T
-    scale = Scale(low=0.0, high=float(np.nanmax(values)) or 1.0, shades="Blues")
+    scale = fig.Scale(low=0.0, high=float(np.nanmax(values)) or 1.0, shades="Blues")
     scale = replace(scale, label=f"amplitude, {result.signals.unit}")
-    cells = Cells(values, even, result.orders.order.values, scale=scale)
-    return Panel(
+    cells = fig.Cells(values, even, result.orders.order.values, scale=scale)
+    return fig.Panel(
         name="orders",
         marks=(cells,),
-        x=Axis(label="drum speed, rpm", has_grid=False),
-        y=Axis(label="order", has_grid=False),
+        x=fig.Axis(label="drum speed, rpm", has_grid=False),
+        y=fig.Axis(label="order", has_grid=False),
     )
 
 
-def _waterfall(result: Orders, index: int) -> Panel:
+def _waterfall(result: Orders, index: int) -> fig.Panel:
     """Return spectra above each other, at the height of their drum speed."""
     signals = result.signals
     speed = np.gradient(signals.angle, signals.time)
@@ -126,13 +114,15 @@ def _waterfall(result: Orders, index: int) -> Panel:
     rows = np.unique([int(np.argmin(np.abs(rpm - level))) for level in levels])
     height = 5.0 * max(float(np.ptp(rpm)), 1.0) / max(len(rows), 1)
     scale = height / max(float(np.nanmax(values[rows])), 1e-300)
-    marks: list[Mark] = []
+    marks: list[fig.Mark] = []
     for row in sorted(rows, key=lambda row: -rpm[row]):
         line, level = rpm[row] + scale * values[row], np.full(len(frequency), rpm[row])
-        marks.append(band(frequency, level, line, color="#ffffff", opacity=1.0))
-        marks.append(Line(frequency, line, color=MARK, width=1.0))
+        marks.append(fig.band(frequency, level, line, color="#ffffff", opacity=1.0))
+        marks.append(fig.Line(frequency, line, color=fig.MARK, width=1.0))
     ends = np.array([rpm.min(), rpm.max()])
-    marks += [Line(k * ends / 60.0, ends, color=MEASURED, dash="dashed") for k in (1.0, 2.0)]
-    x = Axis(label="frequency, Hz", range=(0.0, top))
-    y = Axis(label="drum speed, rpm", has_grid=False)
-    return Panel(name="waterfall", marks=tuple(marks), x=x, y=y)
+    marks += [
+        fig.Line(k * ends / 60.0, ends, color=fig.MEASURED, dash="dashed") for k in (1.0, 2.0)
+    ]
+    x = fig.Axis(label="frequency, Hz", range=(0.0, top))
+    y = fig.Axis(label="drum speed, rpm", has_grid=False)
+    return fig.Panel(name="waterfall", marks=tuple(marks), x=x, y=y)

@@ -6,20 +6,7 @@ import numpy as np
 import pandas as pd
 
 from wm_drake.parameters.types import FloatArray
-from wm_drake.report.figure import (
-    COLOURS,
-    MARK,
-    MEASURED,
-    Axis,
-    Figure,
-    Line,
-    Mark,
-    Panel,
-    Points,
-    Rule,
-    in_grid,
-    named,
-)
+from wm_drake.report import figure as fig
 from wm_drake.report.formatting import GM_PER_KGM, RPM_PER_RAD_S, listed, number, plain, shape_name
 from wm_drake.report.page import Picture, picture
 from wm_drake.report.sections import Section
@@ -185,37 +172,37 @@ def _picture(case: CaseResult, balance: Balance) -> Picture:
     return picture(balance_figure(case, balance), alternative, caption)
 
 
-def balance_figure(case: CaseResult, balance: Balance) -> Figure:
+def balance_figure(case: CaseResult, balance: Balance) -> fig.Figure:
     """Return the angles of the balls and the unbalance in the plane of the rings over time."""
-    x = Axis(label="time, s", range=(float(balance.time[0]), float(balance.time[-1])))
-    turns = Axis(
+    x = fig.Axis(label="time, s", range=(float(balance.time[0]), float(balance.time[-1])))
+    turns = fig.Axis(
         label="angle, degrees",
         range=(-180.0, 180.0),
-        ticks=named(("−180", "−90", "0", "90", "180"), (-180.0, -90.0, 0.0, 90.0, 180.0)),
+        ticks=fig.named(("−180", "−90", "0", "90", "180"), (-180.0, -90.0, 0.0, 90.0, 180.0)),
     )
-    sizes = Axis(label="unbalance, g\u00a0m", is_log=True)
+    sizes = fig.Axis(label="unbalance, g\u00a0m", is_log=True)
     panels = [
-        Panel(title=shape_name(ring), marks=marks, x=x, y=turns, top=speed_axis(case.record))
+        fig.Panel(title=shape_name(ring), marks=marks, x=x, y=turns, top=speed_axis(case.record))
         for p, ring in enumerate(balance.rings)
         for marks in [_angles(case, balance, p)]
     ]
     panels += [
-        Panel(name=f"unbalance, {shape_name(ring)}", marks=_sizes(balance, p), x=x, y=sizes)
+        fig.Panel(name=f"unbalance, {shape_name(ring)}", marks=_sizes(balance, p), x=x, y=sizes)
         for p, ring in enumerate(balance.rings)
     ]
-    grid = in_grid(panels, len(balance.rings), share="x and rows")
-    return Figure(panels=grid, height=230.0)
+    grid = fig.in_grid(panels, len(balance.rings), share="x and rows")
+    return fig.Figure(panels=grid, height=230.0)
 
 
-def _angles(case: CaseResult, balance: Balance, plane: int) -> tuple[Mark, ...]:
+def _angles(case: CaseResult, balance: Balance, plane: int) -> tuple[fig.Mark, ...]:
     """Return the angles of the balls of the ring in a plane as dots."""
     length = float(balance.time[-1] - balance.time[0])
     rows = _sampled(balance, max(WINDOW, length / MOST_DOTS))
-    marks: list[Mark] = [
-        Points(
+    marks: list[fig.Mark] = [
+        fig.Points(
             balance.time[rows],
             values[rows],
-            color=COLOURS[ball % len(COLOURS)],
+            color=fig.COLOURS[ball % len(fig.COLOURS)],
             size=2.5,
             name=f"ball {ball + 1}",
         )
@@ -224,16 +211,18 @@ def _angles(case: CaseResult, balance: Balance, plane: int) -> tuple[Mark, ...]:
     x, z = -balance.load[plane]
     if balance.load_size[plane] > SMALLEST / GM_PER_KGM:
         at = float(np.rad2deg(np.arctan2(x, z)))
-        marks.append(Rule(at, color=MARK, dash="dashed", key="opposite the load"))
+        marks.append(fig.Rule(at, color=fig.MARK, dash="dashed", key="opposite the load"))
     return tuple(marks)
 
 
-def _sizes(balance: Balance, plane: int) -> tuple[Mark, ...]:
+def _sizes(balance: Balance, plane: int) -> tuple[fig.Mark, ...]:
     """Return the unbalance in a plane over time, and that of the load alone."""
     rows = _sampled(balance, WINDOW)
     largest = GM_PER_KGM * np.maximum.reduceat(balance.size[:, plane], rows)
     of_load = GM_PER_KGM * balance.load_size[plane]
-    marks: list[Mark] = [Line(balance.time[rows], np.maximum(largest, SMALLEST), key="with balls")]
+    marks: list[fig.Mark] = [
+        fig.Line(balance.time[rows], np.maximum(largest, SMALLEST), key="with balls")
+    ]
     if of_load > SMALLEST:
-        marks.append(Rule(of_load, color=MEASURED, dash="dashed", key="load alone"))
+        marks.append(fig.Rule(of_load, color=fig.MEASURED, dash="dashed", key="load alone"))
     return tuple(marks)

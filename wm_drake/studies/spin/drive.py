@@ -5,20 +5,7 @@ import numpy as np
 from wm_drake.elements.motor import evaluate_motor, packed_limit
 from wm_drake.parameters.drive import motor_of
 from wm_drake.parameters.types import FloatArray
-from wm_drake.report.figure import (
-    MARK,
-    MEASURED,
-    QUIET,
-    Axis,
-    Figure,
-    Line,
-    Mark,
-    Panel,
-    Span,
-    Text,
-    band,
-    in_grid,
-)
+from wm_drake.report import figure as fig
 from wm_drake.report.formatting import MISSING, RPM_PER_RAD_S, number
 from wm_drake.report.page import Picture, picture
 from wm_drake.report.sections import Section
@@ -122,38 +109,38 @@ def _picture(result: SpinResult, case: CaseResult) -> Picture:
     return picture(drive_figure(result, case), alternative, caption)
 
 
-def drive_figure(result: SpinResult, case: CaseResult) -> Figure:
+def drive_figure(result: SpinResult, case: CaseResult) -> fig.Figure:
     """Return speed and torque of a drive with a motor over time."""
     record, time = case.record, case.record.time.values
     torque, speed = record.motor_torque.values, record.drum_speed.values
     starts = revolution_starts(record)
     target = RPM_PER_RAD_S * np.asarray(profile_of(record).speed_at(time))
-    above: list[Mark] = [
-        Line(time, RPM_PER_RAD_S * speed, width=1.4, key="speed of the drum"),
-        Line(time, target, color=MARK, width=1.4, dash="dashed", key="wanted"),
+    above: list[fig.Mark] = [
+        fig.Line(time, RPM_PER_RAD_S * speed, width=1.4, key="speed of the drum"),
+        fig.Line(time, target, color=fig.MARK, width=1.4, dash="dashed", key="wanted"),
     ]
     if caught := case.measures.drive.capture:
-        above.insert(0, Span(caught.begin, caught.end, color=MEASURED, opacity=0.12))
+        above.insert(0, fig.Span(caught.begin, caught.end, color=fig.MEASURED, opacity=0.12))
         x, y = 0.5 * (caught.begin + caught.end), RPM_PER_RAD_S * caught.speed
         text = f"caught at {number(y, 0)} rpm"
-        above.append(Text(x, y, text, color=MEASURED, up="top", shift=(0.0, -8.0)))
+        above.append(fig.Text(x, y, text, color=fig.MEASURED, up="top", shift=(0.0, -8.0)))
     low, high = (side.reduceat(torque, starts) for side in (np.minimum, np.maximum))
     mean = over_revolutions(time, record.drum_angle.values, torque)
     key = "torque, average over a revolution"
-    below: list[Mark] = [
-        band(time[starts], low, high, opacity=0.25),
-        Line(time, mean, key=key),
+    below: list[fig.Mark] = [
+        fig.band(time[starts], low, high, opacity=0.25),
+        fig.Line(time, mean, key=key),
     ]
     limit = _limit(result, speed[starts])
     if np.abs(limit).min() < 4.0 * np.abs(torque).max():  # else it would hide the torque
-        below.append(Line(time[starts], limit, color=QUIET, dash="dashed", key="limit"))
-    x_axis = Axis(label="time, s", range=(0.0, float(time[-1])))
+        below.append(fig.Line(time[starts], limit, color=fig.QUIET, dash="dashed", key="limit"))
+    x_axis = fig.Axis(label="time, s", range=(0.0, float(time[-1])))
     labels = {"speed, rpm": above, "torque at the drum, N\u00a0m": below}
     panels = [
-        Panel(name=label.split(",")[0], marks=tuple(marks), x=x_axis, y=Axis(label=label))
+        fig.Panel(name=label.split(",")[0], marks=tuple(marks), x=x_axis, y=fig.Axis(label=label))
         for label, marks in labels.items()
     ]
-    return Figure(panels=in_grid(panels, 1, share="x"), height=200.0)
+    return fig.Figure(panels=fig.in_grid(panels, 1, share="x"), height=200.0)
 
 
 def _limit(result: SpinResult, speed: FloatArray) -> FloatArray:

@@ -6,22 +6,7 @@ from typing import TypeAlias
 import numpy as np
 
 from wm_drake.parameters.types import FloatArray
-from wm_drake.report.figure import (
-    MARK,
-    MEASURED,
-    OURS,
-    QUIET,
-    Axis,
-    Figure,
-    Line,
-    Mark,
-    Panel,
-    Points,
-    Rule,
-    Text,
-    in_grid,
-    named,
-)
+from wm_drake.report import figure as fig
 from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number, shape_name
 from wm_drake.simulation.displacements import axis_motion, envelopes, moment_of_largest_amplitude
 from wm_drake.simulation.outputs import point_positions
@@ -50,7 +35,7 @@ LONGEST_ORBIT = 8.0
 """Longest time that an orbit shows; it matters for a drum that hardly turns. [s]"""
 
 
-def envelopes_figure(record: Record, measured_mm: Mapping[str, float] | None = None) -> Figure:
+def envelopes_figure(record: Record, measured_mm: Mapping[str, float] | None = None) -> fig.Figure:
     """Return the envelopes of the filtered displacement over time, one panel per sensor.
 
     The drum speed is given along the top.
@@ -66,7 +51,7 @@ def envelopes_figure(record: Record, measured_mm: Mapping[str, float] | None = N
     for name in map(str, record.sensor.values):
         lower, upper = band.lower.sel(sensor=name).values, band.upper.sel(sensor=name).values
         sides = record.time.values, lower, upper
-        marks: list[Mark] = [time_band(sides, limits[1], "wm_drake, lower to upper envelope")]
+        marks: list[fig.Mark] = [time_band(sides, limits[1], "wm_drake, lower to upper envelope")]
         if measured_mm is not None:
             marks += experiment_rules(measured_mm[name])
         farther = np.where(np.abs(lower) > np.abs(upper), lower, upper)
@@ -75,14 +60,14 @@ def envelopes_figure(record: Record, measured_mm: Mapping[str, float] | None = N
     return time_figure(panels)
 
 
-def experiment_rules(amplitude_mm: float, color: str = MEASURED) -> list[Mark]:
+def experiment_rules(amplitude_mm: float, color: str = fig.MEASURED) -> list[fig.Mark]:
     """Return lines at both sides of zero at a measured amplitude. [mm]"""
     key = "experiment, ± amplitude"
     at = (-amplitude_mm, amplitude_mm)
-    return [Rule(side, color=color, width=1.6, dash="dashed", key=key) for side in at]
+    return [fig.Rule(side, color=color, width=1.6, dash="dashed", key=key) for side in at]
 
 
-def gasket_figure(record: Record) -> Figure:
+def gasket_figure(record: Record) -> fig.Figure:
     """Return force (upper row) and moment (lower row) of the gasket on the housing over time.
 
     A band shows the smallest to the largest value in each drum revolution.
@@ -106,7 +91,7 @@ def gasket_figure(record: Record) -> Figure:
     return time_figure(panels)
 
 
-def orbits_figure(record: Record, y_front: float, y_rear: float) -> Figure:
+def orbits_figure(record: Record, y_front: float, y_rear: float) -> fig.Figure:
     """Return the paths of two points of the drum axis in the x-z plane, seen from the front.
 
     The paths cover the drum revolutions around the largest amplitude of all sensors. Points less
@@ -123,21 +108,23 @@ def orbits_figure(record: Record, y_front: float, y_rear: float) -> Figure:
     moments, angle = record.time.values, record.drum_angle.values
     windows = [orbit_window(moments, angle, largest, turns) for turns in (ORBIT_REVOLUTIONS, 1.0)]
     x_limit, z_limit = orbit_limits([path[windows[0]] for path in paths])
-    x = Axis(label="x, to the right, mm", range=(-x_limit, x_limit))
-    z = Axis(label="z, up, mm", range=(-z_limit, z_limit))
+    x = fig.Axis(label="x, to the right, mm", range=(-x_limit, x_limit))
+    z = fig.Axis(label="z, up, mm", range=(-z_limit, z_limit))
     speed = record.drum_speed.values[largest] * RPM_PER_RAD_S
     moment = f"largest amplitude: {moments[largest]:.2f} s, {number(speed, 0)} rpm"
     time = moments[windows[0]]
     keys = (f"{time[0]:.1f} s to {time[-1]:.1f} s", "revolution around it", moment)
     panels = [
-        Panel(title=title, marks=_orbit(path, windows, largest, keys), x=x, y=z, is_square=True)
+        fig.Panel(title=title, marks=_orbit(path, windows, largest, keys), x=x, y=z, is_square=True)
         for path, title in zip(paths, titles, strict=True)
     ]
     keys_shown = (*keys[::-1], "rest position")
-    return Figure(panels=in_grid(panels, 2), height=455.0 * z_limit / x_limit, keys=keys_shown)
+    return fig.Figure(
+        panels=fig.in_grid(panels, 2), height=455.0 * z_limit / x_limit, keys=keys_shown
+    )
 
 
-def gaps_figure(results: Sequence[CaseResult]) -> Figure:
+def gaps_figure(results: Sequence[CaseResult]) -> fig.Figure:
     """Return the smallest gap between tub and housing, one line per case.
 
     The text at each line gives the two parts and the drum speed at which the gap occurs.
@@ -146,26 +133,26 @@ def gaps_figure(results: Sequence[CaseResult]) -> Figure:
     distances = [MM_PER_M * gap.distance for gap in gaps]
     low, high = min(0.0, *distances), max(0.0, *distances)
     span = (high - low) or 1.0
-    marks: list[Mark] = []
+    marks: list[fig.Mark] = []
     for place, (result, gap, distance) in enumerate(zip(results, gaps, distances, strict=True)):
-        color = MEASURED if distance <= 0.0 else OURS
-        marks.append(Line([0.0, distance], [place, place], color=color, width=4.0))
-        marks.append(Points([distance], [place], color=color, size=10.0))
+        color = fig.MEASURED if distance <= 0.0 else fig.OURS
+        marks.append(fig.Line([0.0, distance], [place, place], color=color, width=4.0))
+        marks.append(fig.Points([distance], [place], color=color, size=10.0))
         speed = number(speed_rpm(result, gap.time), 0)
         parts = f"{shape_name(gap.moving)} to {shape_name(gap.fixed)}"
         text = f"{number(distance)} mm at {speed} rpm\n{parts}"
-        marks.append(Text(max(distance, 0.0), place, text, across="left", shift=(14.0, 0.0)))
-    marks.append(Rule(0.0, "y", color=MARK))
-    x = Axis(
+        marks.append(fig.Text(max(distance, 0.0), place, text, across="left", shift=(14.0, 0.0)))
+    marks.append(fig.Rule(0.0, "y", color=fig.MARK))
+    x = fig.Axis(
         label="smallest gap, mm (0: the parts touch)", range=(low - 0.02 * span, high + 1.1 * span)
     )
-    y = Axis(
-        ticks=named(map(case_title, results)),
+    y = fig.Axis(
+        ticks=fig.named(map(case_title, results)),
         range=(len(results) - 0.4, -0.6),
         has_grid=False,
         has_line=False,
     )
-    return Figure(panels=(Panel(marks=tuple(marks), x=x, y=y),), height=50.0 * len(results))
+    return fig.Figure(panels=(fig.Panel(marks=tuple(marks), x=x, y=y),), height=50.0 * len(results))
 
 
 def axis_path_mm(record: Record, y: float) -> FloatArray:
@@ -217,14 +204,16 @@ def _depths(y_front: float, y_rear: float) -> list[str]:
 
 def _orbit(
     path: FloatArray, windows: Sequence[BoolArray], largest: int, keys: tuple[str, str, str]
-) -> tuple[Mark, ...]:
+) -> tuple[fig.Mark, ...]:
     """Return the path in a long and a short window, the rest position and the largest amplitude."""
     x, _, z = path.T
     long, short = windows
     at = slice(largest, largest + 1)
     return (
-        Line(x[long], z[long], opacity=0.4, width=1.2, key=keys[0]),
-        Line(x[short], z[short], width=2.6, key=keys[1]),
-        Points([0.0], [0.0], symbol="cross-thin", color=QUIET, size=12.0, key="rest position"),
-        Points(x[at], z[at], color=MARK, key=keys[2]),
+        fig.Line(x[long], z[long], opacity=0.4, width=1.2, key=keys[0]),
+        fig.Line(x[short], z[short], width=2.6, key=keys[1]),
+        fig.Points(
+            [0.0], [0.0], symbol="cross-thin", color=fig.QUIET, size=12.0, key="rest position"
+        ),
+        fig.Points(x[at], z[at], color=fig.MARK, key=keys[2]),
     )

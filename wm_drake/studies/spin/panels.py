@@ -7,24 +7,7 @@ from typing import TypeAlias
 import numpy as np
 
 from wm_drake.parameters.types import FloatArray
-from wm_drake.report.figure import (
-    MARK,
-    OURS,
-    QUIET,
-    TITLE,
-    Area,
-    Axis,
-    Figure,
-    Mark,
-    Panel,
-    Points,
-    Rule,
-    Text,
-    band,
-    in_grid,
-    named,
-    round_numbers,
-)
+from wm_drake.report import figure as fig
 from wm_drake.report.formatting import RPM_PER_RAD_S, number
 from wm_drake.simulation.records import Record
 
@@ -80,14 +63,14 @@ def simplified_indices(x: FloatArray, y: FloatArray, tolerance: float) -> IndexA
     return np.array(sorted(kept))
 
 
-def time_figure(panels: Sequence[Panel | None]) -> Figure:
+def time_figure(panels: Sequence[fig.Panel | None]) -> fig.Figure:
     """Return a figure of panels over time, three in a row."""
-    return Figure(panels=in_grid(panels, COLUMNS, share="x and rows"), height=180.0)
+    return fig.Figure(panels=fig.in_grid(panels, COLUMNS, share="x and rows"), height=180.0)
 
 
 def time_panel(
-    record: Record, name: str, marks: Sequence[Mark], label: str, limits: tuple[float, float]
-) -> Panel:
+    record: Record, name: str, marks: Sequence[fig.Mark], label: str, limits: tuple[float, float]
+) -> fig.Panel:
     """Return a panel over time, with the drum speed along the top.
 
     Args:
@@ -98,36 +81,36 @@ def time_panel(
     end = float(record.time[-1])
     marks = _lowered(name, marks)
     at = {"in_data": (False, False), "across": "left", "up": "top", "is_bold": True}
-    title = Text(0.02, 0.975, name, size=TITLE, **at)  # type: ignore[arg-type]
-    return Panel(
+    title = fig.Text(0.02, 0.975, name, size=fig.TITLE, **at)  # type: ignore[arg-type]
+    return fig.Panel(
         name=name,
-        marks=(Rule(0.0, color=QUIET, width=0.8), *marks, title),
-        x=Axis(label="time, s", range=(0.0, end)),
-        y=Axis(label=label, range=limits),
+        marks=(fig.Rule(0.0, color=fig.QUIET, width=0.8), *marks, title),
+        x=fig.Axis(label="time, s", range=(0.0, end)),
+        y=fig.Axis(label=label, range=limits),
         top=speed_axis(record),
     )
 
 
-def _lowered(name: str, marks: Sequence[Mark]) -> list[Mark]:
+def _lowered(name: str, marks: Sequence[fig.Mark]) -> list[fig.Mark]:
     """Return marks with the texts at the top right lower if the name reaches to them."""
-    longest = max((len(mark.text) for mark in marks if isinstance(mark, Text)), default=0)
+    longest = max((len(mark.text) for mark in marks if isinstance(mark, fig.Text)), default=0)
     if not longest or len(name) + longest < LONGEST_LINE:
         return list(marks)
     down = -15.0
     return [
         replace(mark, shift=(mark.shift[0], mark.shift[1] + down))
-        if isinstance(mark, Text)
+        if isinstance(mark, fig.Text)
         else mark
         for mark in marks
     ]
 
 
-def speed_axis(record: Record) -> Axis:
+def speed_axis(record: Record) -> fig.Axis:
     """Return an axis that gives the drum speed at round times, for any spin profile."""
-    times = round_numbers(0.0, float(record.time[-1]), 7)
+    times = fig.round_numbers(0.0, float(record.time[-1]), 7)
     speeds = np.interp(times, record.time.values, record.drum_speed.values) * RPM_PER_RAD_S
-    ticks = named((number(speed, 0) for speed in speeds), times)
-    return Axis(label="drum speed, rpm", ticks=ticks)
+    ticks = fig.named((number(speed, 0) for speed in speeds), times)
+    return fig.Axis(label="drum speed, rpm", ticks=ticks)
 
 
 def symmetric_limits(largest: float, lines: int = 1) -> tuple[float, float]:
@@ -137,8 +120,8 @@ def symmetric_limits(largest: float, lines: int = 1) -> tuple[float, float]:
 
 
 def time_band(
-    sides: tuple[FloatArray, FloatArray, FloatArray], limit: float, key: str, color: str = OURS
-) -> Area:
+    sides: tuple[FloatArray, FloatArray, FloatArray], limit: float, key: str, color: str = fig.OURS
+) -> fig.Area:
     """Return the area between two lines over time, with as few points as are needed.
 
     Args:
@@ -148,7 +131,7 @@ def time_band(
     time, *lines = sides
     kept = [simplified_indices(time, line, 1e-3 * limit) for line in lines]
     both = np.union1d(*kept)
-    return band(time[both], lines[0][both], lines[1][both], color=color, edge=color, key=key)
+    return fig.band(time[both], lines[0][both], lines[1][both], color=color, edge=color, key=key)
 
 
 def revolution_band(
@@ -172,8 +155,8 @@ def revolution_band(
 
 
 def largest_marks(
-    record: Record, values: FloatArray, unit: str, color: str = MARK, line: int = 0
-) -> list[Mark]:
+    record: Record, values: FloatArray, unit: str, color: str = fig.MARK, line: int = 0
+) -> list[fig.Mark]:
     """Return a dot at the largest absolute value, and that value with its drum speed at the top.
 
     Args:
@@ -184,8 +167,8 @@ def largest_marks(
     speed = record.drum_speed.values[index] * RPM_PER_RAD_S
     text = f"{number(abs(values[index]))} {unit} at {number(speed, 0)} rpm"
     at = {"in_data": (False, False), "across": "right", "up": "top"}
-    dot = Points(record.time.values[index : index + 1], values[index : index + 1], color=color)
+    dot = fig.Points(record.time.values[index : index + 1], values[index : index + 1], color=color)
     return [
         replace(dot, key=LARGEST, size=6.5),
-        Text(0.985, 0.965, text, color=color, shift=(0.0, -15.0 * line), **at),  # type: ignore[arg-type]
+        fig.Text(0.985, 0.965, text, color=color, shift=(0.0, -15.0 * line), **at),  # type: ignore[arg-type]
     ]

@@ -7,22 +7,7 @@ import numpy as np
 
 from wm_drake.model.scene import Outline
 from wm_drake.parameters.types import FloatArray
-from wm_drake.report.figure import (
-    COLOURS,
-    MARK,
-    MEASURED,
-    OURS,
-    QUIET,
-    Axis,
-    Dash,
-    Figure,
-    Line,
-    Mark,
-    Panel,
-    Rule,
-    in_grid,
-    named,
-)
+from wm_drake.report import figure as fig
 from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number
 from wm_drake.simulation.outputs import point_positions
 from wm_drake.studies.modes.figures import VIEWS, joined, tub_lines, view_axis, view_panel
@@ -35,54 +20,56 @@ SHOWN_MOTION = 0.2
 """Largest displacement of a drawn deflection shape, as part of the tub's radius."""
 
 
-def response_figure(cases: list[SteadyCase]) -> Figure:
+def response_figure(cases: list[SteadyCase]) -> fig.Figure:
     """Return the amplitudes of a load at the sensors over the speed, with the run-up beside them.
 
     Args:
         cases: The same load with and without gasket, or one of them.
     """
-    x, y = Axis(label="drum speed, rpm"), Axis(label="amplitude, mm", range=(0.0, None))
+    x, y = fig.Axis(label="drum speed, rpm"), fig.Axis(label="amplitude, mm", range=(0.0, None))
     panels = []
     for sensor in map(str, cases[0].response.sensor.values):
-        marks: list[Mark] = []
+        marks: list[fig.Mark] = []
         for case in cases:
-            color = OURS if case.gasket else MEASURED
+            color = fig.OURS if case.gasket else fig.MEASURED
             marks += _run_up(case, sensor, color)
             amplitude = MM_PER_M * case.response.amplitude.sel(sensor=sensor).values
             marks += _branch(case, amplitude, color)
-        panels.append(Panel(title=sensor, marks=tuple(marks), x=x, y=y))
-    return Figure(panels=in_grid(panels, COLUMNS, share="both"), height=160.0)
+        panels.append(fig.Panel(title=sensor, marks=tuple(marks), x=x, y=y))
+    return fig.Figure(panels=fig.in_grid(panels, COLUMNS, share="both"), height=160.0)
 
 
-def _branch(case: SteadyCase, values: FloatArray, color: str) -> list[Mark]:
+def _branch(case: SteadyCase, values: FloatArray, color: str) -> list[fig.Mark]:
     """Return a quantity along the branch: a line where it is stable, dots where it is not."""
     rpm = RPM_PER_RAD_S * case.response.speed.values
     stable = case.response.stable.values.astype(bool)
     key = f"steady, {'with' if case.gasket else 'without'} gasket"
-    marks: list[Mark] = [
-        Line(rpm, np.where(stable, values, np.nan), color=color, width=2.4, key=key)
+    marks: list[fig.Mark] = [
+        fig.Line(rpm, np.where(stable, values, np.nan), color=color, width=2.4, key=key)
     ]
     if not stable.all():
         shown = ~stable
         shown[:-1] |= ~stable[1:]
         shown[1:] |= ~stable[:-1]
-        line = Line(rpm, np.where(shown, values, np.nan), color=color, width=2.0, key="unstable")
+        line = fig.Line(
+            rpm, np.where(shown, values, np.nan), color=color, width=2.0, key="unstable"
+        )
         marks.append(replace(line, dash="dotted"))
     return marks
 
 
-def _run_up(case: SteadyCase, sensor: str, color: str) -> list[Mark]:
+def _run_up(case: SteadyCase, sensor: str, color: str) -> list[fig.Mark]:
     if case.run_up is None:
         return []
     run = case.run_up.sel(sensor=sensor)
     size = np.maximum(np.abs(run.upper.values), np.abs(run.lower.values))
     rising = np.append(np.diff(run.speed.values) > 0.0, False)
     rpm = RPM_PER_RAD_S * run.speed.values[rising][::5]
-    line = Line(rpm, MM_PER_M * size[rising][::5], color=color, opacity=0.45, dash="long")
+    line = fig.Line(rpm, MM_PER_M * size[rising][::5], color=color, opacity=0.45, dash="long")
     return [replace(line, key="spin profile of the machine")]
 
 
-def forces_figure(cases: list[SteadyCase]) -> Figure:
+def forces_figure(cases: list[SteadyCase]) -> fig.Figure:
     """Return displacement of the box and forces of the gasket over the speed, one line a load."""
     quantities = (
         ("detergent_displacement", MM_PER_M, "detergent box, mm"),
@@ -93,10 +80,10 @@ def forces_figure(cases: list[SteadyCase]) -> Figure:
     for name, factor, title in quantities:
         lines = [(case, factor * case.response[name].values.max(axis=1)) for case in cases]
         panels.append(_force_panel(title, lines, []))
-    return Figure(panels=in_grid(panels, COLUMNS, share="x"), height=210.0)
+    return fig.Figure(panels=fig.in_grid(panels, COLUMNS, share="x"), height=210.0)
 
 
-def mounts_figure(cases: list[SteadyCase]) -> Figure:
+def mounts_figure(cases: list[SteadyCase]) -> fig.Figure:
     """Return the force of each mount on the cabinet over the speed, one colour a load.
 
     The peak is a line, the RMS without the mean is dashed.
@@ -110,34 +97,34 @@ def mounts_figure(cases: list[SteadyCase]) -> Figure:
         dynamic = [(case, force.mount_force_dynamic_rms.values) for case, force in of_mount]
         panel = _force_panel(mount, peaks, dynamic)
         panels.append(replace(panel, y=replace(panel.y, label="force, N")))
-    return Figure(panels=in_grid(panels, COLUMNS, share="x"), height=160.0)
+    return fig.Figure(panels=fig.in_grid(panels, COLUMNS, share="x"), height=160.0)
 
 
 def _force_panel(
     title: str,
     peaks: list[tuple[SteadyCase, FloatArray]],
     dynamic: list[tuple[SteadyCase, FloatArray]],
-) -> Panel:
+) -> fig.Panel:
     """Return values over the speed of cases, one colour a load; those of `dynamic` are dashed."""
     colors = colors_of_loads([case.load for case, _ in peaks])
     marks = []
-    kinds: tuple[tuple[Dash, list[tuple[SteadyCase, FloatArray]]], ...] = (
+    kinds: tuple[tuple[fig.Dash, list[tuple[SteadyCase, FloatArray]]], ...] = (
         ("", peaks),
         ("dashed", dynamic),
     )
     for dash, lines in kinds:
         for case, values in lines:
             rpm = RPM_PER_RAD_S * case.response.speed.values
-            line = Line(rpm, values, color=colors[case.load], width=2.0, key=case.load)
+            line = fig.Line(rpm, values, color=colors[case.load], width=2.0, key=case.load)
             marks.append(replace(line, dash=dash))
-    y = Axis(range=(0.0, None))
-    return Panel(title=title, marks=tuple(marks), x=Axis(label="drum speed, rpm"), y=y)
+    y = fig.Axis(range=(0.0, None))
+    return fig.Panel(title=title, marks=tuple(marks), x=fig.Axis(label="drum speed, rpm"), y=y)
 
 
 def colors_of_loads(loads: list[str]) -> dict[str, str]:
     """Return a colour for each load, in order of appearance."""
     names = dict.fromkeys(loads)
-    return {name: COLOURS[index % len(COLOURS)] for index, name in enumerate(names)}
+    return {name: fig.COLOURS[index % len(fig.COLOURS)] for index, name in enumerate(names)}
 
 
 def peaks_of(case: SteadyCase, most: int = 3) -> list[int]:
@@ -148,7 +135,7 @@ def peaks_of(case: SteadyCase, most: int = 3) -> list[int]:
     return sorted(int(index) for index in largest)
 
 
-def deflection_figure(case: SteadyCase, outlines: Mapping[str, Outline]) -> Figure | None:
+def deflection_figure(case: SteadyCase, outlines: Mapping[str, Outline]) -> fig.Figure | None:
     """Return the operating deflection shapes at the peaks of a load; None without a peak."""
     points = peaks_of(case)
     if not points:
@@ -161,10 +148,10 @@ def deflection_figure(case: SteadyCase, outlines: Mapping[str, Outline]) -> Figu
         largest = MM_PER_M * float(case.response.amplitude.values[index].max())
         title = f"{number(rpm, 0)} rpm, {number(largest, 1)} mm"
         panels += [replace(row[0], title=title), *row[1:]]
-    return Figure(panels=in_grid(panels, len(VIEWS)), height=260.0)
+    return fig.Figure(panels=fig.in_grid(panels, len(VIEWS)), height=260.0)
 
 
-def _deflection(harmonic: FloatArray, lines: list[FloatArray]) -> list[Panel]:
+def _deflection(harmonic: FloatArray, lines: list[FloatArray]) -> list[fig.Panel]:
     """Return the tub at rest, and its two ends at eight angles of the drum, in each view.
 
     Args:
@@ -181,23 +168,25 @@ def _deflection(harmonic: FloatArray, lines: list[FloatArray]) -> list[Panel]:
     still = joined(rest, lines)
     panels = []
     for view, across, up in VIEWS:
-        marks: list[Mark] = [Line(still[:, across], still[:, up], color=QUIET, width=1.0)]
+        marks: list[fig.Mark] = [
+            fig.Line(still[:, across], still[:, up], color=fig.QUIET, width=1.0)
+        ]
         for opacity, pose in zip(np.linspace(0.9, 0.25, len(turn)), shown, strict=True):
-            line = Line(pose[:, across], pose[:, up], opacity=float(opacity))
+            line = fig.Line(pose[:, across], pose[:, up], opacity=float(opacity))
             marks.append(line)
         label = f"{view}: {'xyz'[up]} over {'xyz'[across]}"
         panels.append(replace(view_panel(tuple(marks), reach), x=view_axis(reach, label)))
     return panels
 
 
-def sweep_figure(study: SteadyStudy) -> Figure:
+def sweep_figure(study: SteadyStudy) -> fig.Figure:
     """Return how sweeps shift and lower the peak of each load, at its largest sensor."""
     assert study.sweeps is not None
     colors = colors_of_loads([case.load for case in study.cases])
     rate = RPM_PER_RAD_S * study.sweeps.rate.values
-    shifts: list[Mark] = [Rule(0.0, color=MARK)]
-    heights: list[Mark] = [Rule(100.0, color=MARK)]
-    directions: tuple[tuple[str, Dash, str], ...] = (
+    shifts: list[fig.Mark] = [fig.Rule(0.0, color=fig.MARK)]
+    heights: list[fig.Mark] = [fig.Rule(100.0, color=fig.MARK)]
+    directions: tuple[tuple[str, fig.Dash, str], ...] = (
         ("up", "", "triangle-up"),
         ("down", "dashed", "triangle-down"),
     )
@@ -213,13 +202,13 @@ def sweep_figure(study: SteadyStudy) -> Figure:
             shift = RPM_PER_RAD_S * one.speed.values - speed
             height = 100.0 * one.amplitude.values / values.max()
             for marks, y in ((shifts, shift), (heights, height)):
-                line = Line(rate, y, color=color, dash=dash, symbol=symbol)
+                line = fig.Line(rate, y, color=color, dash=dash, symbol=symbol)
                 marks.append(replace(line, key=f"{load}, {sensor}, {direction}"))
-    ticks = named((f"{value:g}" for value in np.round(rate, 3)), rate)
-    x = Axis(label="sweep rate, rpm/s", is_log=True, ticks=ticks)
+    ticks = fig.named((f"{value:g}" for value in np.round(rate, 3)), rate)
+    x = fig.Axis(label="sweep rate, rpm/s", is_log=True, ticks=ticks)
     titles = ("speed of the peak less that of the steady peak, rpm", "peak in % of the steady peak")
     panels = [
-        Panel(subtitle=title, name=title, marks=tuple(marks), x=x)
+        fig.Panel(subtitle=title, name=title, marks=tuple(marks), x=x)
         for title, marks in zip(titles, (shifts, heights), strict=True)
     ]
-    return Figure(panels=in_grid(panels, 2), height=300.0)
+    return fig.Figure(panels=fig.in_grid(panels, 2), height=300.0)

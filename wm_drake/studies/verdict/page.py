@@ -7,21 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from wm_drake.report.figure import (
-    MARK,
-    MEASURED,
-    OURS,
-    QUIET,
-    Axis,
-    Figure,
-    Mark,
-    Panel,
-    Points,
-    Rule,
-    Text,
-    named,
-    segments,
-)
+from wm_drake.report import figure as fig
 from wm_drake.report.formatting import (
     MM_PER_M,
     RPM_PER_RAD_S,
@@ -355,28 +341,30 @@ def _largest(response: Any, outcome: Outcome) -> float:
 def gaps_picture(findings: Findings) -> Picture:
     """Return the gaps of the loads and of the laundry, before and after the best change."""
     f, best = findings, findings.best
-    sets = [(f.base, f.laundry, OURS, "as it is", 0.13)]
+    sets = [(f.base, f.laundry, fig.OURS, "as it is", 0.13)]
     if best and f.laundry_changed:
-        sets.append((best, f.laundry_changed, QUIET, "after the best change", -0.13))
+        sets.append((best, f.laundry_changed, fig.QUIET, "after the best change", -0.13))
     names = [*f.loads, "random laundry"]
     largest = MM_PER_M * f.clearance
-    marks: list[Mark] = [Rule(0.0, "y", color=MARK)]
+    marks: list[fig.Mark] = [fig.Rule(0.0, "y", color=fig.MARK)]
     if f.clearance:
-        marks.append(Rule(largest, "y", color=MEASURED, dash="dashed"))
+        marks.append(fig.Rule(largest, "y", color=fig.MEASURED, dash="dashed"))
     for outcome, laundry, color, key, shift in sets:
         gaps = MM_PER_M * np.array([*outcome.gaps, laundry.gaps.min()])
         at = np.arange(len(gaps), dtype=float)[::-1] + shift
         shown = np.isfinite(gaps)
         ends = (np.zeros(shown.sum()), at[shown]), (gaps[shown], at[shown])
-        marks.append(segments(*ends, color=color, width=4.0))
-        marks.append(Points(gaps[shown], at[shown], color=color, size=9.0, key=key))
+        marks.append(fig.segments(*ends, color=color, width=4.0))
+        marks.append(fig.Points(gaps[shown], at[shown], color=color, size=9.0, key=key))
         for gap, place in zip(gaps[shown], at[shown], strict=True):
             end, text = max(float(gap), 0.0), f"{number(float(gap))} mm"
-            marks.append(Text(end, float(place), text, across="left", shift=(10.0, 0.0)))
+            marks.append(fig.Text(end, float(place), text, across="left", shift=(10.0, 0.0)))
             largest = max(largest, end)
-    y = Axis(ticks=named(names, np.arange(len(names))[::-1]), has_grid=False, has_line=False)
-    x = Axis(label="smallest gap, mm (0: the parts touch)", range=(None, 1.12 * largest))
-    figure = Figure(panels=(Panel(marks=tuple(marks), x=x, y=y),), height=46.0 * len(names))
+    y = fig.Axis(
+        ticks=fig.named(names, np.arange(len(names))[::-1]), has_grid=False, has_line=False
+    )
+    x = fig.Axis(label="smallest gap, mm (0: the parts touch)", range=(None, 1.12 * largest))
+    figure = fig.Figure(panels=(fig.Panel(marks=tuple(marks), x=x, y=y),), height=46.0 * len(names))
     caption = (
         "Smallest gap of each load of the machine, and of all samples of random laundry. Dashed: "
         "the clearance wanted."
@@ -393,14 +381,14 @@ def influences_picture(findings: Findings) -> Picture:
         for end in ("less", "more")
     )
     marks = (
-        Rule(MM_PER_M * findings.base.gap, "y", color=MARK),
-        segments((less, at), (more, at), color=QUIET, width=3.0),
-        Points(less, at, color=MEASURED, size=9.0, key=f"{findings.change:g} % less"),
-        Points(more, at, color=OURS, size=9.0, key=f"{findings.change:g} % more"),
+        fig.Rule(MM_PER_M * findings.base.gap, "y", color=fig.MARK),
+        fig.segments((less, at), (more, at), color=fig.QUIET, width=3.0),
+        fig.Points(less, at, color=fig.MEASURED, size=9.0, key=f"{findings.change:g} % less"),
+        fig.Points(more, at, color=fig.OURS, size=9.0, key=f"{findings.change:g} % more"),
     )
-    y = Axis(ticks=named([words_of(i.key) for i in drawn], at), has_grid=False)
-    panel = Panel(marks=marks, x=Axis(label="smallest gap of all loads, mm"), y=y)
-    figure = Figure(panels=(panel,), height=28.0 * len(drawn) + 30.0)
+    y = fig.Axis(ticks=fig.named([words_of(i.key) for i in drawn], at), has_grid=False)
+    panel = fig.Panel(marks=marks, x=fig.Axis(label="smallest gap of all loads, mm"), y=y)
+    figure = fig.Figure(panels=(panel,), height=28.0 * len(drawn) + 30.0)
     caption = (
         f"Smallest gap of all loads if one number of a part is {findings.change:g} % smaller or "
         "larger; line: the machine as it is. Springs, dampers, bushings, gasket and "
