@@ -59,6 +59,11 @@ class Gap:
     fixed: str
     point: tuple[float, float, float]
 
+    @property
+    def parts(self) -> str:
+        """Return the two parts in words."""
+        return f"{self.moving} and {self.fixed}".replace("_", " ")
+
 
 @dataclass(frozen=True)
 class Outline:

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from wm_drake.model.build import build_machine
-from wm_drake.report.formatting import MM_PER_M, number, percent, shape_name
+from wm_drake.report.formatting import MM_PER_M, number, percent
 from wm_drake.report.page import Picture, picture, versions_of
 from wm_drake.report.sections import Section, SectionedPage
 from wm_drake.report.table import Column, Group, Row, Table, line
@@ -26,9 +26,8 @@ from wm_drake.studies.calibration.tables import (
 )
 from wm_drake.studies.description.modal import Modes, natural_modes
 from wm_drake.studies.spin import tables
-from wm_drake.studies.spin.cases import band_text, case_title
 from wm_drake.studies.spin.figures import envelopes_figure
-from wm_drake.studies.spin.study import Comparison, SpinResult, run_spin
+from wm_drake.studies.spin.study import Comparison, SpinResult, band_text, run_spin
 from wm_drake.studies.study import Facts
 
 
@@ -197,7 +196,7 @@ def warnings_of(best: SpinResult) -> list[str]:
     """Return a warning for each load with which tub and housing overlap."""
     gaps = [(case, case.measures.smallest_gap) for case in best.results]
     return [
-        f"Load {case_title(case)}: {shape_name(gap.moving)} and {shape_name(gap.fixed)} overlap by "
+        f"Load {case.title}: {gap.parts} overlap by "
         f"{number(-MM_PER_M * gap.distance)} mm. The model has no contact forces. If the measured "
         "machine did not collide there, it moves less or its housing is wider than in the model."
         for case, gap in gaps
@@ -357,7 +356,7 @@ def _errors_picture(best: SpinResult, table: pd.DataFrame, others: Sequence[str]
         if ours is not None:
             rows.append(
                 (
-                    case_title(case),
+                    case.title,
                     ours,
                     next((e for o in others if (e := errors(case, o)) is not None), None),
                 )
@@ -397,12 +396,12 @@ def _modes_picture(modes: Sequence[tuple[str, Modes]]) -> Picture:
 def _envelopes_picture(best: SpinResult, table: pd.DataFrame, index: int) -> Picture:
     case = best.results[index]
     caption = (
-        f"Load {case_title(case)}: displacement in the band {band_text(case)}. The shaded area "
+        f"Load {case.title}: displacement in the band {band_text(case)}. The shaded area "
         "extends from the lower to the upper envelope. Dashed lines: measured amplitude."
     )
     return picture(
         envelopes_figure(case.record, tables.experiment_mm(table, case)),
-        f"Envelopes, load {case_title(case)}.",
+        f"Envelopes, load {case.title}.",
         caption,
     )
 

@@ -12,7 +12,6 @@ from wm_drake.report.page import Picture, picture
 from wm_drake.report.sections import Section
 from wm_drake.report.table import Column, Table, table_of
 from wm_drake.simulation.balance import Balance, balance_of
-from wm_drake.studies.spin.cases import case_title
 from wm_drake.studies.spin.panels import speed_axis
 from wm_drake.studies.spin.study import CaseResult, SpinResult
 
@@ -160,13 +159,13 @@ def _picture(case: CaseResult, balance: Balance) -> Picture:
         ]
     )
     caption = (
-        f"Load {case_title(case)}. Upper row: angle of each ball, seen from the drum. A ball that "
+        f"Load {case.title}. Upper row: angle of each ball, seen from the drum. A ball that "
         "the drum does not carry yet runs round. Dashed: opposite the unbalance of the load in "
         f"this plane. Lower row: unbalance of load and balls in the plane, largest in {WINDOW:g} "
         "s. Dashed: the load alone; above it the balls make it worse."
     )
     alternative = (
-        f"Angles of the balls and remaining unbalance over time, load {case_title(case)}. At the "
+        f"Angles of the balls and remaining unbalance over time, load {case.title}. At the "
         f"end: {end}."
     )
     return picture(balance_figure(case, balance), alternative, caption)

@@ -8,13 +8,12 @@ import pandas as pd
 
 from wm_drake.parameters import quantities
 from wm_drake.report.figure import MEASURED, OURS, Figure, Mark
-from wm_drake.report.formatting import MISSING, MM_PER_M, number, percent, shape_name
+from wm_drake.report.formatting import MISSING, MM_PER_M, number, percent
 from wm_drake.report.page import Picture, picture, versions_of
 from wm_drake.report.sections import Section, SectionedPage
 from wm_drake.report.table import Group, Row, Table, line, readable
 from wm_drake.simulation.displacements import envelopes
 from wm_drake.studies.spin import effect_page, tables
-from wm_drake.studies.spin.cases import band_text, speed_rpm
 from wm_drake.studies.spin.comparison import ComparisonResult, Variant, common_sensors, remarks
 from wm_drake.studies.spin.figures import experiment_rules
 from wm_drake.studies.spin.page import warnings_of
@@ -25,7 +24,7 @@ from wm_drake.studies.spin.panels import (
     time_figure,
     time_panel,
 )
-from wm_drake.studies.spin.study import CaseResult, SpinResult
+from wm_drake.studies.spin.study import CaseResult, SpinResult, band_text
 from wm_drake.studies.study import Facts
 
 COLOURS = (OURS, MEASURED, "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
@@ -335,16 +334,11 @@ def _of_variant(variant: Variant) -> str:
 
 def _gap_facts(variants: Sequence[Variant], index: int) -> str:
     """Return the smallest gaps of the case with an index, as one sentence; empty without gaps."""
-    texts = []
-    for variant in variants:
-        case = variant.result.results[index]
-        gap = case.measures.smallest_gap
-        if gap is not None:
-            texts.append(
-                f"{variant.name} {number(MM_PER_M * gap.distance)} mm between "
-                f"{shape_name(gap.moving)} and {shape_name(gap.fixed)}, at "
-                f"{number(speed_rpm(case, gap.time), 0)} rpm"
-            )
+    texts = [
+        f"{variant.name} {text}"
+        for variant in variants
+        if (text := variant.result.results[index].gap_text)
+    ]
     return f"Smallest gap to the housing: {'; '.join(texts)}." if texts else ""
 
 

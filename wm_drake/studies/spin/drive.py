@@ -12,7 +12,6 @@ from wm_drake.report.sections import Section
 from wm_drake.report.table import Group, Row, Table
 from wm_drake.simulation.drive import CAPTURE_LAG, CAPTURE_TIME, over_revolutions
 from wm_drake.simulation.records import profile_of
-from wm_drake.studies.spin.cases import case_title
 from wm_drake.studies.spin.panels import revolution_starts
 from wm_drake.studies.spin.study import CaseResult, SpinResult
 
@@ -47,7 +46,7 @@ def drive_in_short(result: SpinResult) -> str:
 def capture_warnings(result: SpinResult) -> list[str]:
     """Return a warning for each case in which the drum is caught below the wanted speed."""
     return [
-        f"Load {case_title(case)}: caught at {number(RPM_PER_RAD_S * caught.speed, 0)} rpm "
+        f"Load {case.title}: caught at {number(RPM_PER_RAD_S * caught.speed, 0)} rpm "
         f"from {number(caught.begin)} s to {number(caught.end)} s with a mean torque of "
         f"{number(caught.torque, 2)} N m. The drive is too weak to pass (Sommerfeld effect), or to "
         "lift the unbalance."
@@ -74,7 +73,7 @@ def drive_table(result: SpinResult) -> Table:
             else MISSING,
         )
         row = Row(cells, "alarm" if caught else "")
-        groups.append(Group(case_title(case), (row,)))
+        groups.append(Group(case.title, (row,)))
     caption = (
         "Torque of the motor on the drum: largest value, and largest average over a revolution "
         "with its speed; largest power; work over the run. Ripple: largest difference between "
@@ -98,13 +97,12 @@ def drive_table(result: SpinResult) -> Table:
 def _picture(result: SpinResult, case: CaseResult) -> Picture:
     drive = case.measures.drive
     caption = (
-        f"Load {case_title(case)}. Upper panel: speed of the drum, and the wanted one (dashed). "
+        f"Load {case.title}. Upper panel: speed of the drum, and the wanted one (dashed). "
         "Lower panel: torque of the motor on the drum, from the smallest to the largest in each "
         "revolution, its average over a revolution (line), and the limit (dashed)."
     )
     alternative = (
-        f"Speed and torque over time, load {case_title(case)}: up to "
-        f"{number(drive.peak_torque)} N m."
+        f"Speed and torque over time, load {case.title}: up to {number(drive.peak_torque)} N m."
     )
     return picture(drive_figure(result, case), alternative, caption)
 

@@ -11,9 +11,8 @@ from wm_drake.report.formatting import MM_PER_M, number, percent
 from wm_drake.report.page import Picture, picture
 from wm_drake.report.table import Column, Columns, Group, Row, Table, table_of
 from wm_drake.simulation.displacements import envelopes, filtered_displacement
-from wm_drake.studies.spin.cases import band_text
 from wm_drake.studies.spin.gasket_effect import LARGE_STEADY, SMALL_STEADY, steady_window
-from wm_drake.studies.spin.study import CaseResult
+from wm_drake.studies.spin.study import CaseResult, band_text
 
 if TYPE_CHECKING:
     from rich.table import Table as TerminalTable

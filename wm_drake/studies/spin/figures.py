@@ -11,7 +11,6 @@ from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number, shape_na
 from wm_drake.simulation.displacements import axis_motion, envelopes, moment_of_largest_amplitude
 from wm_drake.simulation.outputs import point_positions
 from wm_drake.simulation.records import Record
-from wm_drake.studies.spin.cases import case_title, speed_rpm
 from wm_drake.studies.spin.panels import (
     IN_REVOLUTIONS,
     largest_marks,
@@ -138,7 +137,7 @@ def gaps_figure(results: Sequence[CaseResult]) -> fig.Figure:
         color = fig.MEASURED if distance <= 0.0 else fig.OURS
         marks.append(fig.Line([0.0, distance], [place, place], color=color, width=4.0))
         marks.append(fig.Points([distance], [place], color=color, size=10.0))
-        speed = number(speed_rpm(result, gap.time), 0)
+        speed = number(result.speed_rpm(gap.time), 0)
         parts = f"{shape_name(gap.moving)} to {shape_name(gap.fixed)}"
         text = f"{number(distance)} mm at {speed} rpm\n{parts}"
         marks.append(fig.Text(max(distance, 0.0), place, text, across="left", shift=(14.0, 0.0)))
@@ -147,7 +146,7 @@ def gaps_figure(results: Sequence[CaseResult]) -> fig.Figure:
         label="smallest gap, mm (0: the parts touch)", range=(low - 0.02 * span, high + 1.1 * span)
     )
     y = fig.Axis(
-        ticks=fig.named(map(case_title, results)),
+        ticks=fig.named(result.title for result in results),
         range=(len(results) - 0.4, -0.6),
         has_grid=False,
         has_line=False,

@@ -11,7 +11,6 @@ from wm_drake.report.table import Group, Row, Table
 from wm_drake.simulation.feet import MARGINS
 from wm_drake.simulation.measures.record import foot_loads_of
 from wm_drake.simulation.mounts import POINT
-from wm_drake.studies.spin.cases import case_title
 from wm_drake.studies.spin.study import CaseResult, SpinResult
 from wm_drake.studies.spin.walk import WALKING, walk_pictures, walk_table, walk_warning
 
@@ -70,7 +69,7 @@ def floor_warnings(result: SpinResult) -> list[str]:
         if verbs:
             text = " and ".join([", ".join(verbs[:-1]), verbs[-1]] if verbs[1:] else verbs)
             warnings.append(
-                f"Load {case_title(case)}: the cabinet {text}. The model keeps it in its place."
+                f"Load {case.title}: the cabinet {text}. The model keeps it in its place."
             )
     return warnings
 
@@ -87,7 +86,7 @@ def resultant_table(result: SpinResult) -> Table:
             ]
             cells = [number(float(value), decimals) for value in np.concatenate(values)]
             rows.append(Row((text, *cells)))
-        groups.append(Group(case_title(case), tuple(rows)))
+        groups.append(Group(case.title, tuple(rows)))
     header = (
         "load",
         "on the cabinet",
@@ -111,7 +110,7 @@ def margins_table(cases: list[CaseResult]) -> Table:
         for index, region in enumerate(feet.region.values):
             values = [float(feet[f"region_{name}"][index]) for name in MARGINS]
             rows.append(_margins_row(str(region), values))
-        groups.append(Group(case_title(case), tuple(rows)))
+        groups.append(Group(case.title, tuple(rows)))
     caption = (
         "Feet: smallest normal load of any foot, and smallest margins. Sliding: horizontal force "
         "that friction can still take. Turning: vertical moment that friction can still take "
@@ -136,7 +135,7 @@ def feet_table(cases: list[CaseResult]) -> Table:
             names = ("normal_smallest", "normal_largest", "tangential_largest")
             cells = [number(float(feet[f"foot_{name}"][index]), 0) for name in names]
             rows.append(Row((str(foot).replace("_", " "), *cells)))
-        groups.append(Group(case_title(case), tuple(rows)))
+        groups.append(Group(case.title, tuple(rows)))
     caption = "Loads of each foot over the run."
     if not any(case.measures.walk for case in cases):
         caption += (
@@ -157,7 +156,7 @@ def _pictures(cases: list[CaseResult]) -> tuple[Picture, ...]:
         "moves."
     )
     smallest = "; ".join(
-        f"{case_title(case)}: {number(float(case.measures.feet['turn_margin']))} N m"
+        f"{case.title}: {number(float(case.measures.feet['turn_margin']))} N m"
         for case in shown
         if case.measures.feet is not None
     )
@@ -176,7 +175,7 @@ def floor_figure(cases: list[CaseResult]) -> Figure:
         time, smallest = windows(case.record.time.values, foot_loads_of(case.record).margins)
         color = COLOURS[index % len(COLOURS)]
         for of_panel, column in zip(marks, smallest.T, strict=False):
-            of_panel.append(Line(time, column, color=color, key=case_title(case)))
+            of_panel.append(Line(time, column, color=color, key=case.title))
     x = Axis(label="time, s", range=(0.0, max(float(case.record.time[-1]) for case in cases)))
     panels = [
         Panel(name=head.split(",")[0], marks=tuple(of_panel), x=x, y=Axis(label=head))

@@ -6,9 +6,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from wm_drake.model.scene import Gap
 from wm_drake.parameters.plausibility import unusual_numbers
-from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number, percent, shape_name
+from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number, percent
 from wm_drake.report.page import Picture, picture, versions_of
 from wm_drake.report.sections import Section, SectionedPage
 from wm_drake.report.springs import slack_warning
@@ -16,7 +15,6 @@ from wm_drake.simulation.spring_tension import slack_springs
 from wm_drake.studies.modes.page import natural_modes_table
 from wm_drake.studies.spin import tables
 from wm_drake.studies.spin.balance import balance_section
-from wm_drake.studies.spin.cases import band_text, case_title, has_gasket, speed_rpm
 from wm_drake.studies.spin.drive import capture_warnings, drive_in_short, drive_section
 from wm_drake.studies.spin.figures import (
     envelopes_figure,
@@ -26,7 +24,7 @@ from wm_drake.studies.spin.figures import (
     orbits_figure,
 )
 from wm_drake.studies.spin.floor import floor_section, floor_warnings
-from wm_drake.studies.spin.study import CaseResult, Comparison, SpinResult
+from wm_drake.studies.spin.study import CaseResult, Comparison, SpinResult, band_text
 from wm_drake.studies.spin.tables import amplitude_table
 from wm_drake.studies.spin.vibration import vibration_pictures
 from wm_drake.studies.study import Facts
@@ -107,7 +105,7 @@ def _case_sections(result: SpinResult, table: pd.DataFrame) -> list[Section]:
     """Return a section for each case; that with the largest amplitude has its vibration too."""
     main, sections = max(result.results, key=lambda case: _peak(case)[0]), []
     for index, case in enumerate(result.results, start=1):
-        title, file = case_title(case), result.replay_of(case)
+        title, file = case.title, result.replay_of(case)
         words = f"3D replay of load {title} around its largest amplitude"
         text = _case_facts(case)
         pictures = [_envelopes_picture(case, table), _orbits_picture(case), _gasket_picture(case)]
@@ -149,7 +147,7 @@ def _largest_amplitude_sentence(cases: list[CaseResult]) -> str:
     case = max(cases, key=lambda case: _peak(case)[0])
     size, sensor, speed = _peak(case)
     return (
-        f"The largest amplitude occurs with load {case_title(case)}: {number(size)} mm at sensor "
+        f"The largest amplitude occurs with load {case.title}: {number(size)} mm at sensor "
         f"{sensor}, at {number(speed, 0)} rpm."
     )
 
@@ -175,21 +173,16 @@ def _contact_sentence(cases: list[CaseResult]) -> str:
     if not gaps:
         return "The SDF has no shapes on both tub and housing, so contact cannot be judged."
     gap, case = min(gaps, key=lambda pair: pair[0].distance)
-    parts = f"between {shape_name(gap.moving)} and {shape_name(gap.fixed)}"
-    place = f"{parts}, with load {case_title(case)} at {number(speed_rpm(case, gap.time), 0)} rpm"
+    place = (
+        f"between {gap.parts}, with load {case.title} at {number(case.speed_rpm(gap.time), 0)} rpm"
+    )
     size = f"smallest gap {number(MM_PER_M * gap.distance)} mm"
     does = "does not touch"
     if gap.distance <= 0.0:
         size, does = f"overlap of {number(-MM_PER_M * gap.distance)} mm", "touches"
-    loads = [f"{case_title(c)} {number(MM_PER_M * g.distance)} mm" for g, c in gaps]
+    loads = [f"{c.title} {number(MM_PER_M * g.distance)} mm" for g, c in gaps]
     per_load = f" Smallest gap per load: {', '.join(loads)}." if len(gaps) > 1 else ""
     return f"The tub {does} the housing: {size}, {place}.{per_load}"
-
-
-def _gap_text(case: CaseResult, gap: Gap) -> str:
-    speed = number(speed_rpm(case, gap.time), 0)
-    parts = f"{shape_name(gap.moving)} and {shape_name(gap.fixed)}"
-    return f"{number(MM_PER_M * gap.distance)} mm between {parts}, at {speed} rpm"
 
 
 def _case_facts(case: CaseResult) -> str:
@@ -199,8 +192,8 @@ def _case_facts(case: CaseResult) -> str:
         facts = (
             f"Largest amplitude: {number(size)} mm at sensor {sensor}, at {number(speed, 0)} rpm."
         )
-    gap = case.measures.smallest_gap
-    return f"{facts} Smallest gap to the housing: {_gap_text(case, gap)}." if gap else facts
+    gap = case.gap_text
+    return f"{facts} Smallest gap to the housing: {gap}." if gap else facts
 
 
 def _agreement_sentence(result: SpinResult, cases: list[CaseResult], table: pd.DataFrame) -> str:
@@ -243,16 +236,15 @@ def warnings_of(result: SpinResult) -> list[str]:
         f"{problem.key}: {problem.message}." for problem in unusual_numbers(result.parameters)
     ]
     for case in result.results:
-        gap, title = case.measures.smallest_gap, case_title(case)
+        gap, title = case.measures.smallest_gap, case.title
         if case.record.attrs["diverged"]:
             warnings.append(
                 f"Load {title}: {case.record.attrs['diverged']}. The results below cover the time "
                 "before that."
             )
         if gap is not None and gap.distance <= 0.0:
-            parts = f"{shape_name(gap.moving)} and {shape_name(gap.fixed)}"
             warnings.append(
-                f"Load {title}: {parts} overlap by {number(-MM_PER_M * gap.distance)} mm. The "
+                f"Load {title}: {gap.parts} overlap by {number(-MM_PER_M * gap.distance)} mm. The "
                 "model has no contact forces. In the real machine these parts would collide, and "
                 "the motion after that is not valid."
             )
@@ -264,14 +256,14 @@ def warnings_of(result: SpinResult) -> list[str]:
 def slack_springs_warning(result: SpinResult) -> list[str]:
     """Return a warning of the springs that go slack, or none."""
     return slack_warning(
-        {case_title(c): slack_springs(c.measures.smallest_tension) for c in result.results}, "load"
+        {c.title: slack_springs(c.measures.smallest_tension) for c in result.results}, "load"
     )
 
 
 def facts_of_run(result: SpinResult, made: Facts) -> list[tuple[str, str]]:
     """Return what was run and with which software, as pairs of heading and text."""
     attrs = result.results[0].record.attrs
-    times = [f"{case_title(case)} {number(case.wall_s)} s" for case in result.results]
+    times = [f"{case.title} {number(case.wall_s)} s" for case in result.results]
     return [
         ("Machine", result.parameters.name),
         ("SDF model", Path(result.parameters.model).name),
@@ -302,9 +294,7 @@ def _envelopes_picture(case: CaseResult, table: pd.DataFrame) -> Picture | None:
     )
     if measured is not None:
         caption += " Dashed lines: measured amplitude, on both sides of zero."
-    alternative = (
-        f"Envelopes of the displacement over time, load {case_title(case)}. Largest: {largest}."
-    )
+    alternative = f"Envelopes of the displacement over time, load {case.title}. Largest: {largest}."
     return picture(envelopes_figure(case.record, measured), alternative, caption)
 
 
@@ -321,12 +311,12 @@ def _orbits_picture(case: CaseResult) -> Picture | None:
         "it. Pale line: the revolutions before and after."
     )
     orbits = "Orbit of the drum axis" if is_one else "Orbits of the drum axis, front and rear"
-    alternative = f"{orbits}, around the largest amplitude, load {case_title(case)}."
+    alternative = f"{orbits}, around the largest amplitude, load {case.title}."
     return picture(orbits_figure(case.record, *ends), alternative, caption)
 
 
 def _gasket_picture(case: CaseResult) -> Picture | None:
-    if not has_gasket(case) or case.record.sizes["time"] < 2:
+    if not case.has_gasket or case.record.sizes["time"] < 2:
         return None
     force, moment = (
         np.asarray(values) for values in (case.measures.gasket_force, case.measures.gasket_moment)
@@ -337,7 +327,7 @@ def _gasket_picture(case: CaseResult) -> Picture | None:
         "revolution. The dot marks the largest absolute value."
     )
     alternative = (
-        f"Gasket force and moment over time, load {case_title(case)}. Largest force "
+        f"Gasket force and moment over time, load {case.title}. Largest force "
         f"{number(float(force.max()))} N, largest moment {number(float(moment.max()), 2)} N m."
     )
     return picture(gasket_figure(case.record), alternative, caption)

@@ -7,7 +7,6 @@ import numpy as np
 from wm_drake.model.replay import Motion, replay_page
 from wm_drake.parameters import MachineParameters
 from wm_drake.simulation.displacements import largest_motion
-from wm_drake.studies.spin.cases import has_gasket
 from wm_drake.studies.spin.study import CaseResult
 
 
@@ -20,7 +19,7 @@ def case_replay(parameters: MachineParameters, case: CaseResult) -> str:
     cabinet = None
     if "cabinet_angle" in shown:
         cabinet = np.hstack([shown.cabinet_angle.values, shown.cabinet_position.values])
-    gasket = has_gasket(case)
+    gasket = case.has_gasket
     words = "" if gasket or parameters.gasket is None else ", without gasket"
     return replay_page(
         parameters,

@@ -10,13 +10,16 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+import numpy as np
+
 from wm_drake.errors import InputError
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
 from wm_drake.model.scene import Scene
-from wm_drake.parameters import MachineParameters
+from wm_drake.parameters import MachineParameters, Sensor
 from wm_drake.parameters.measured import measured_notes
 from wm_drake.parameters.units import Unit
+from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number
 from wm_drake.simulation.balance import balance_of, rings_of
 from wm_drake.simulation.cases import Case, is_as_measured
 from wm_drake.simulation.displacements import band_of
@@ -50,6 +53,36 @@ class CaseResult:
     record: Record
     measures: Measures
     wall_s: float
+
+    @property
+    def has_gasket(self) -> bool:
+        """Whether the case was run with the gasket."""
+        return bool(self.record.attrs["gasket"] == "yes")
+
+    @property
+    def title(self) -> str:
+        """Title: the load, with or without gasket."""
+        return f"{self.case.name} ({'with' if self.has_gasket else 'without'} gasket)"
+
+    @property
+    def gap_text(self) -> str:
+        """Smallest gap, its parts and the drum speed there; "" without one."""
+        gap = self.measures.smallest_gap
+        if gap is None:
+            return ""
+        size, speed = number(MM_PER_M * gap.distance), number(self.speed_rpm(gap.time), 0)
+        return f"{size} mm between {gap.parts}, at {speed} rpm"
+
+    def speed_rpm(self, time: float) -> float:
+        """Return the drum speed at a time. [rpm]"""
+        speed = np.interp(time, self.record.time.values, self.record.drum_speed.values)
+        return float(speed) * RPM_PER_RAD_S
+
+
+def band_text(*cases: CaseResult) -> str:
+    """Return the pass band of the displacements of cases as text; of different ones, all."""
+    bands = dict.fromkeys(band_of(case.record) for case in cases)
+    return ", ".join(f"{low:g}–{high:.3g} Hz" for low, high in bands)
 
 
 class Comparison(Enum):
@@ -115,6 +148,10 @@ class SpinResult(Result):
         if self.comparison is not Comparison.AS_MEASURED:
             return self.comparison is Comparison.ALL
         return is_as_measured(self.parameters, result.case)
+
+    def sensors_of(self, case: CaseResult) -> dict[str, Sensor]:
+        """Return the displacement sensors of the machine that a case was run with."""
+        return (case.case.parameters or self.parameters).sensors
 
     def replay_of(self, case: CaseResult) -> str:
         """Return the name of the file with the 3D replay of a case; "" if there is none."""
@@ -203,7 +240,7 @@ def case_as_json(case: CaseResult) -> dict[str, Any]:
     walk = measures.walk
     return {
         "load": case.case.name,
-        "gasket": case.record.attrs["gasket"] == "yes",
+        "gasket": case.has_gasket,
         **tree,
         "walk": walk
         and {

@@ -35,8 +35,7 @@ from wm_drake.simulation.measures.registry import tabulated
 from wm_drake.simulation.mount_forces import MountForce, mount_forces, rms_table, speed_ranges
 from wm_drake.simulation.spring_tension import slack_springs
 from wm_drake.simulation.vibration import sensor_accelerations
-from wm_drake.studies.spin.cases import band_text, case_title, has_gasket, sensors_of, speed_rpm
-from wm_drake.studies.spin.study import CaseResult, SpinResult
+from wm_drake.studies.spin.study import CaseResult, SpinResult, band_text
 
 OURS = "wm_drake"
 """Name of this program in the column `source` of an amplitude table."""
@@ -121,7 +120,7 @@ def differences(table: pd.DataFrame, case: CaseResult, source: str = OURS) -> li
     change = percent_difference(
         value, xr.DataArray(list(reference.values()), {"sensor": sensors}, ["sensor"])
     )
-    return [Difference(case_title(case), name, float(change.sel(sensor=name))) for name in sensors]
+    return [Difference(case.title, name, float(change.sel(sensor=name))) for name in sensors]
 
 
 def comparison(result: SpinResult, table: pd.DataFrame) -> Table:
@@ -135,7 +134,7 @@ def comparison(result: SpinResult, table: pd.DataFrame) -> Table:
         ]
         for source in dict.fromkeys([*others, OURS]):
             rows += _difference_rows(differences(table, case, source), source)
-        groups.append(Group(case_title(case), tuple(rows)))
+        groups.append(Group(case.title, tuple(rows)))
     caption = (
         "Amplitude of the displacement at each sensor: the largest absolute value of its envelopes "
         f"in the band {band_text(*result.results)}. The last rows of each load are differences: "
@@ -186,7 +185,7 @@ def variable_table(result: SpinResult, variable: Variable, decimals: int | None 
         numbers = labelled_values(case.measures.table, variable)
         names = [" ".join(labels) or variable.kind for labels, _ in numbers]
         columns = [Column(name, variable.unit_text, decimals) for name in names]
-        groups.append(line(case_title(case), [value for _, value in numbers]))
+        groups.append(line(case.title, [value for _, value in numbers]))
     caption = f"{variable.about[0].upper()}{variable.about[1:]}."
     return Table(caption, ("load", *columns), tuple(groups))
 
@@ -212,14 +211,14 @@ def largest_values(result: SpinResult) -> Table:
     return Table(
         caption,
         header,
-        tuple(line(case_title(case), _largest_cells(case)) for case in result.results),
+        tuple(line(case.title, _largest_cells(case)) for case in result.results),
     )
 
 
 def _largest_cells(case: CaseResult) -> list[float]:
     measures = case.measures
     gasket = np.concatenate([measures.gasket_force.values, measures.gasket_moment.values])
-    if not has_gasket(case):
+    if not case.has_gasket:
         gasket = np.full(len(gasket), np.nan)
     return [*(MM_PER_M * measures.detergent_displacement.values), *gasket]
 
@@ -230,10 +229,10 @@ def accelerations(result: SpinResult) -> Table:
     for case in result.results:
         if not case.record.sizes["time"]:
             continue
-        values = sensor_accelerations(case.record, sensors_of(result, case)).values
+        values = sensor_accelerations(case.record, result.sensors_of(case)).values
         shown = {"largest": np.abs(values).max(axis=0), "RMS": np.sqrt(np.mean(values**2, axis=0))}
         rows = (Row((name, *sizes)) for name, sizes in shown.items())
-        groups.append(Group(case_title(case), tuple(rows)))
+        groups.append(Group(case.title, tuple(rows)))
     caption = (
         "Acceleration of the tub at each sensor, along its axis: the largest absolute value and "
         "the RMS over the whole run. Gravity is not included, and nothing is filtered."
@@ -263,7 +262,7 @@ def mount_force_tables(result: SpinResult) -> list[Table]:
         )
         if rows:
             names = tuple(part.name for part in ranges)
-            by_ranges.setdefault(names, []).append(Group(case_title(case), rows))
+            by_ranges.setdefault(names, []).append(Group(case.title, rows))
     start: Columns = ("load", "mount", Column("at rest", "N", 1), Column("largest", "N", 1))
     speed = Column("at", "rpm", 0)
     return [
@@ -278,7 +277,7 @@ def mount_force_tables(result: SpinResult) -> list[Table]:
 
 
 def _mount_row(case: CaseResult, force: MountForce, rms: FloatArray) -> Row:
-    speed = speed_rpm(case, float(case.record.time[force.peak_index]))
+    speed = case.speed_rpm(float(case.record.time[force.peak_index]))
     return Row((force.name.replace("_", " "), force.at_rest, force.peak, speed, *map(float, rms)))
 
 
@@ -304,16 +303,16 @@ def smallest_gaps(result: SpinResult) -> Table:
 def _gap(case: CaseResult) -> Group:
     gap = case.measures.smallest_gap
     if gap is None:
-        return line(case_title(case), ["not computed", *[None] * 7])
+        return line(case.title, ["not computed", *[None] * 7])
     cells: list[Value] = [
         shape_name(gap.moving),
         shape_name(gap.fixed),
         MM_PER_M * gap.distance,
-        speed_rpm(case, gap.time),
+        case.speed_rpm(gap.time),
         gap.time,
         *(MM_PER_M * float(value) for value in gap.point),
     ]
-    return line(case_title(case), cells, "alarm" if gap.distance <= 0.0 else "")
+    return line(case.title, cells, "alarm" if gap.distance <= 0.0 else "")
 
 
 def smallest_tensions(result: SpinResult) -> Table:
@@ -325,9 +324,7 @@ def smallest_tensions(result: SpinResult) -> Table:
     groups = []
     for case in result.results:
         smallest = case.measures.smallest_tension
-        groups.append(
-            line(case_title(case), smallest.values, "alarm" if slack_springs(smallest) else "")
-        )
+        groups.append(line(case.title, smallest.values, "alarm" if slack_springs(smallest) else ""))
     names = result.results[0].measures.smallest_tension.spring.values
     return Table(caption, ("load", *(Column(str(name), "N", 1) for name in names)), tuple(groups))
 
@@ -345,7 +342,7 @@ def loads(result: SpinResult) -> Table:
         Column("y", "mm", 1),
         Column("phase", "deg", 1),
     )
-    groups = (Group(case_title(case), _masses(case.case.load)) for case in result.results)
+    groups = (Group(case.title, _masses(case.case.load)) for case in result.results)
     return Table(caption, header, tuple(groups))
 
 
@@ -361,9 +358,7 @@ def profiles(result: SpinResult) -> Table:
     """Return the corner points of the spin profile of each case."""
     cases: dict[tuple[tuple[float, ...], tuple[float, ...]], list[str]] = {}
     for case in result.results:
-        cases.setdefault((case.case.profile.time, case.case.profile.speed), []).append(
-            case_title(case)
-        )
+        cases.setdefault((case.case.profile.time, case.case.profile.speed), []).append(case.title)
     groups = (
         Group("all loads" if len(cases) == 1 else "; ".join(names), _points(*points))
         for points, names in cases.items()
@@ -394,7 +389,7 @@ def changed_parameters(result: SpinResult, case: CaseResult) -> Table | None:
         if common.get(key) != value
     )
     return Table(
-        f"Parameters of load {case_title(case)} that differ from those of the machine.",
+        f"Parameters of load {case.title} that differ from those of the machine.",
         ("key", "value"),
         groups,
         text_columns=2,

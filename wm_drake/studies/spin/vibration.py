@@ -14,7 +14,6 @@ from wm_drake.simulation.mount_forces import MountForce, mount_forces
 from wm_drake.simulation.orders import PERIOD, REVOLUTIONS, WINDOW, frequency_map, order_map
 from wm_drake.simulation.records import Record
 from wm_drake.simulation.vibration import sensor_accelerations
-from wm_drake.studies.spin.cases import case_title, sensors_of
 from wm_drake.studies.spin.panels import (
     COLUMNS,
     IN_REVOLUTIONS,
@@ -48,7 +47,7 @@ def vibration_pictures(result: SpinResult, case: CaseResult) -> list[Picture | N
     Args:
         case: A case with at least two samples.
     """
-    accelerations = sensor_accelerations(case.record, sensors_of(result, case))
+    accelerations = sensor_accelerations(case.record, result.sensors_of(case))
     return [
         _mounts_picture(case),
         _accelerations_picture(case, accelerations),
@@ -68,7 +67,7 @@ def _mounts_picture(case: CaseResult) -> Picture | None:
     )
     largest = max(forces, key=lambda force: force.peak)
     alternative = (
-        f"Mount forces over time, load {case_title(case)}. Largest: {largest.name} "
+        f"Mount forces over time, load {case.title}. Largest: {largest.name} "
         f"{number(largest.peak)} N."
     )
     return picture(mounts_figure(case.record, forces), alternative, caption)
@@ -81,7 +80,7 @@ def _accelerations_picture(case: CaseResult, accelerations: xr.DataArray) -> Pic
         "drum revolution."
     )
     alternative = (
-        f"Accelerations at the sensors over time, load {case_title(case)}. Largest: "
+        f"Accelerations at the sensors over time, load {case.title}. Largest: "
         f"{number(float(abs(accelerations).max()))} m/s²."
     )
     return picture(accelerations_figure(case.record, accelerations), alternative, caption)
@@ -108,7 +107,7 @@ def _spectra_picture(case: CaseResult, accelerations: xr.DataArray) -> Picture |
     )
     alternative = (
         f"Spectrum, frequency map and order map of displacement and acceleration at sensor "
-        f"{sensor}, load {case_title(case)}."
+        f"{sensor}, load {case.title}."
     )
     return picture(figure, alternative, caption)
 

@@ -12,7 +12,6 @@ from wm_drake.report.page import Picture, picture
 from wm_drake.report.table import Group, Row, Table
 from wm_drake.simulation.cabinet import walk
 from wm_drake.simulation.records import cabinet_in
-from wm_drake.studies.spin.cases import case_title
 from wm_drake.studies.spin.study import CaseResult
 
 WALKING = (
@@ -41,7 +40,7 @@ def walk_warning(case: CaseResult) -> list[str]:
     if walked is None or (walked.distance < LEAST_WALK and abs(walked.turn) < LEAST_TURN):
         return []
     return [
-        f"Load {case_title(case)}: the cabinet walks {number(MM.from_si(walked.distance))} mm and "
+        f"Load {case.title}: the cabinet walks {number(MM.from_si(walked.distance))} mm and "
         f"turns by {number(DEGREE.from_si(walked.turn))} degrees."
     ]
 
@@ -57,7 +56,7 @@ def walk_table(cases: list[CaseResult]) -> Table:
         cells = [number(MM.from_si(float(value)), 2) for value in moved]
         kind = "alarm" if walk_warning(case) else ""
         turn = number(DEGREE.from_si(walked.turn), 2)
-        groups.append(Group(case_title(case), (Row((*cells, turn), kind),)))
+        groups.append(Group(case.title, (Row((*cells, turn), kind),)))
     caption = (
         "Where the cabinet stands after the run: shift of the middle of its feet on the floor, and "
         "turn about the vertical axis, counterclockwise from above."
@@ -74,12 +73,12 @@ def walk_pictures(cases: list[CaseResult]) -> tuple[Picture, ...]:
     distances = [case.measures.walk.distance for case in shown if case.measures.walk]
     farthest = shown[int(np.argmax(distances))]
     caption = (
-        f"Left: the floor from above with load {case_title(farthest)}, which moves the cabinet "
+        f"Left: the floor from above with load {farthest.title}, which moves the cabinet "
         "most; feet before the run (open) and after it (filled), with their paths. The front of "
         "the machine is below. Right: distance and turn over time for each load."
     )
     walked = "; ".join(
-        f"{case_title(case)}: {number(MM.from_si(distance))} mm"
+        f"{case.title}: {number(MM.from_si(distance))} mm"
         for case, distance in zip(shown, distances, strict=True)
     )
     return (picture(walk_figure(shown, farthest), f"Distance walked. {walked}.", caption),)
@@ -101,7 +100,7 @@ def walk_figure(cases: list[CaseResult], farthest: CaseResult) -> Figure:
             time, path = _sampled(case)
             color = COLOURS[index % len(COLOURS)]
             values = unit.from_si(1.0) * path[:, row]
-            marks.append(Line(time, values, color=color, key=case_title(case)))
+            marks.append(Line(time, values, color=color, key=case.title))
         x = Axis(label="time, s" if row else "", range=(0.0, last), scale="time")
         x = replace(x, has_numbers=bool(row))
         y = Axis(label=text)
