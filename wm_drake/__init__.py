@@ -34,7 +34,7 @@ _HOMES = {
     "load_record": "simulation.records",
     "measure": "simulation.measures",
     "modes": "studies.modes.study",
-    "natural_modes": "studies.description.modal",
+    "natural_modes": "studies.description.description",
     "progress_bar": "report.progress",
     "register_element": "elements.kind",
     "register_study": "studies.study",

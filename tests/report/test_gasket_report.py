@@ -14,7 +14,6 @@ from wm_drake.simulation.cases import Case
 from wm_drake.studies.doe import make_design
 from wm_drake.studies.gasket import figures
 from wm_drake.studies.gasket.advice import advice
-from wm_drake.studies.gasket.compared import NOT_COMPARED
 from wm_drake.studies.gasket.findings import (
     about_residual,
     load_findings,
@@ -22,10 +21,10 @@ from wm_drake.studies.gasket.findings import (
     warnings,
 )
 from wm_drake.studies.gasket.page import GasketResult
-from wm_drake.studies.gasket.screening import Meaning, Responses, run_screening
+from wm_drake.studies.gasket.proposal import NOT_COMPARED
+from wm_drake.studies.gasket.screening import Meaning, Responses, Words, run_screening
 from wm_drake.studies.gasket.study import GasketTrials
 from wm_drake.studies.gasket.tables import as_plain_data, digits, factors, runs_frame
-from wm_drake.studies.gasket.words import Words
 from wm_drake.studies.study import Facts
 
 NAMES = ("C_L", "C_T", "K_Lx", "K_Ly")

@@ -10,9 +10,8 @@ from wm_drake.model.build import build_machine
 from wm_drake.parameters import load_machine
 from wm_drake.studies.modes.linearisation import Linearisation, drake_spectrum
 from wm_drake.studies.steady.balance import ANGLE_ARM, HarmonicBalance
-from wm_drake.studies.steady.response import branch_of, trajectory_of_period
+from wm_drake.studies.steady.response import branch_of, settled_trajectory, trajectory_of_period
 from wm_drake.studies.steady.series import Series
-from wm_drake.studies.steady.settled import settled_trajectory
 
 pytestmark = pytest.mark.slow
 REFERENCE = load_machine("reference")

@@ -9,9 +9,8 @@ import pytest
 import uvicorn
 from starlette.responses import PlainTextResponse
 
-from wm_drake.studio import connection, guard
-from wm_drake.studio.connection import TimedConnection
-from wm_drake.studio.guard import Guard
+from wm_drake.studio import guard
+from wm_drake.studio.guard import Guard, TimedConnection
 
 TOKEN, SECONDS = "token", 0.3
 
@@ -19,7 +18,7 @@ TOKEN, SECONDS = "token", 0.3
 @pytest.fixture
 def served(monkeypatch):
     """Yield the port of a guarded server, and the bodies that reached what it guards."""
-    monkeypatch.setattr(connection, "HEAD_TIMEOUT", SECONDS)
+    monkeypatch.setattr(guard, "HEAD_TIMEOUT", SECONDS)
     monkeypatch.setattr(guard, "BODY_TIMEOUT", SECONDS)
     bodies = []
 

@@ -5,7 +5,7 @@ from concurrent.futures import CancelledError, ThreadPoolExecutor
 
 import pytest
 
-from wm_drake.studio.shared_values import SharedValues
+from wm_drake.studio.turns import SharedValues
 
 
 def failing(error):

@@ -45,7 +45,7 @@ def studio(
     import uvicorn
 
     from wm_drake.parameters import machine_path, shipped_machines
-    from wm_drake.studio.connection import TimedConnection
+    from wm_drake.studio.guard import TimedConnection
     from wm_drake.studio.server import Studio, application
 
     given = machine if machine in shipped_machines() else str(machine_path(machine).resolve())

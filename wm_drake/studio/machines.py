@@ -29,8 +29,8 @@ from wm_drake.simulation.mounts import mount_names
 from wm_drake.simulation.steps import checked_integrator, checked_step
 from wm_drake.studio.numbers import Slider, sliders_of
 from wm_drake.studio.parts import CALCULATION, PART_ORDER, places_of
-from wm_drake.studio.shared_values import SharedValues
 from wm_drake.studio.state import DESCRIBED, State
+from wm_drake.studio.turns import SharedValues
 
 GIVEN = "given"
 """Identifier of the machine of the command line, if it is a file."""

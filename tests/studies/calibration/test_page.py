@@ -15,7 +15,7 @@ from wm_drake.studies.calibration.prediction import Prediction
 from wm_drake.studies.calibration.solutions import Solution
 from wm_drake.studies.calibration.study import CalibrateResult
 from wm_drake.studies.calibration.targets import Targets
-from wm_drake.studies.description.modal import natural_modes
+from wm_drake.studies.description.description import natural_modes
 from wm_drake.studies.fitting.posterior import Posterior
 from wm_drake.studies.spin.study import run_spin
 from wm_drake.studies.study import Facts

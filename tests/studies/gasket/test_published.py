@@ -19,15 +19,14 @@ from wm_drake.parameters import (
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.doe import make_design
 from wm_drake.studies.gasket import tables as texts
-from wm_drake.studies.gasket.compared import Compared
 from wm_drake.studies.gasket.findings import level_zero_text, summary
 from wm_drake.studies.gasket.level_zero import run_level_zero
 from wm_drake.studies.gasket.page import GasketResult
+from wm_drake.studies.gasket.proposal import Compared
 from wm_drake.studies.gasket.published import NOT_PUBLISHED, published_for
-from wm_drake.studies.gasket.screening import Responses, run_screening
+from wm_drake.studies.gasket.screening import Responses, Words, run_screening
 from wm_drake.studies.gasket.study import GasketTrials
 from wm_drake.studies.gasket.tables import as_plain_data
-from wm_drake.studies.gasket.words import Words
 
 NAMES = ("C_L", "K_Lx", "K_Ly")
 

@@ -11,8 +11,7 @@ import wm_drake as wm
 from wm_drake.errors import InputError
 from wm_drake.parameters.gasket_drawing import load_gasket_drawing
 from wm_drake.studies.gasket_geometry.drawings import changed, factors_of, with_folds
-from wm_drake.studies.gasket_geometry.study import GAP, excess, ranked
-from wm_drake.studies.gasket_geometry.surface import fit
+from wm_drake.studies.gasket_geometry.study import GAP, excess, fit, ranked
 
 SAMPLE = 2.0 * LatinHypercube(4, rng=3).random(4096) - 1.0
 """Even levels, over which variances are taken."""

@@ -26,7 +26,7 @@ from wm_drake.report.figure import (
 )
 from wm_drake.report.formatting import number
 from wm_drake.studies.calibration.calibration import Calibration
-from wm_drake.studies.description.modal import Modes
+from wm_drake.studies.description.description import Modes
 
 OTHER = "#8a8f98"
 """Colour of the errors of another model."""

@@ -24,7 +24,7 @@ from wm_drake.studies.calibration.tables import (
     quantities_shown,
     responses_shown,
 )
-from wm_drake.studies.description.modal import Modes, natural_modes
+from wm_drake.studies.description.description import Modes, natural_modes
 from wm_drake.studies.spin import tables
 from wm_drake.studies.spin.figures import envelopes_figure
 from wm_drake.studies.spin.study import Comparison, SpinResult, band_text, run_spin

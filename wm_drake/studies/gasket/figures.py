@@ -13,14 +13,15 @@ from wm_drake.studies.doe.anova import AnovaTable, Term
 from wm_drake.studies.gasket.screening import (
     LEADING_INTERACTION_PERCENT,
     LEADING_MAIN_PERCENT,
+    LEVELS,
     Label,
     Screening,
+    Words,
     contributions,
     main_effects,
     mean_at,
 )
 from wm_drake.studies.gasket.surface import Surfaces
-from wm_drake.studies.gasket.words import LEVELS, Words
 
 LEVEL_COLOURS = (fig.OURS, fig.QUIET, fig.MEASURED)
 """Colours of the levels -1, 0 and 1."""

@@ -4,25 +4,25 @@ from collections import Counter
 
 import numpy as np
 
-from wm_drake.report.formatting import listed, number, percent
-from wm_drake.report.springs import CONSEQUENCE
+from wm_drake.report.formatting import CONSEQUENCE, listed, number, percent
 from wm_drake.simulation.measures.responses import GAP
 from wm_drake.studies.doe.anova import Term
 from wm_drake.studies.gasket.check import Check
-from wm_drake.studies.gasket.compared import NOT_COMPARED, Compared
 from wm_drake.studies.gasket.level_zero import LevelZero
+from wm_drake.studies.gasket.proposal import NOT_COMPARED, Compared
 from wm_drake.studies.gasket.published import FAR, Published
 from wm_drake.studies.gasket.screening import (
     LEADING_INTERACTION_PERCENT,
     LEADING_MAIN_PERCENT,
     LEAST_PREDICTED_R2,
+    LEVELS,
     Label,
     Screening,
+    Words,
     leading_terms,
     main_effects,
 )
 from wm_drake.studies.gasket.tables import digits, r2_text
-from wm_drake.studies.gasket.words import LEVELS, Words
 
 MOST_NAMED = 6
 """Largest number of results that a sentence names."""

@@ -7,7 +7,7 @@ responses of a number from 0 at the worst to 1 at the best value that any run ha
 Factors that hardly matter then go back to level 0, so that few parts change.
 
 The models only choose. What is said about the setting is what its runs gave, with all loads of the
-machine.
+machine. `Compared` is all that a page shows next to a screening.
 """
 
 from collections.abc import Mapping
@@ -25,6 +25,8 @@ from wm_drake.parameters.variation import number_at
 from wm_drake.report.formatting import significant
 from wm_drake.simulation.measures.responses import GAP
 from wm_drake.studies.gasket.check import Check, Setting
+from wm_drake.studies.gasket.level_zero import LevelZero
+from wm_drake.studies.gasket.published import NOT_PUBLISHED, Published
 from wm_drake.studies.gasket.screening import Screening
 from wm_drake.studies.gasket.surface import Surfaces, model_rows
 
@@ -299,3 +301,25 @@ def is_level_zero(machine: MachineParameters, factors: tuple[FactorLevels, ...])
             if not np.isclose(middle, number_at(machine, key).nominal or 0.0, rtol=1e-6):
                 return False
     return True
+
+
+@dataclass(frozen=True)
+class Compared:
+    """Results that are shown next to those of a screening.
+
+    Attributes:
+        published: Published results; empty if nothing is compared.
+        level_zero: Responses of the machine and of level 0 with each treatment of tables; None if
+            no factor has a table.
+        check: Runs of chosen settings next to the fitted model; None if there are none.
+        proposal: Setting that is proposed, with its runs; None if none was sought.
+    """
+
+    published: Published = NOT_PUBLISHED
+    level_zero: LevelZero | None = None
+    check: Check | None = None
+    proposal: Proposal | None = None
+
+
+NOT_COMPARED = Compared()
+"""A screening that is compared with nothing."""

@@ -13,18 +13,19 @@ from wm_drake.report.table import Column, Group, Row, Table, line, table_of
 from wm_drake.studies.doe import MODELS, Design
 from wm_drake.studies.doe.anova import AnovaTable, Term
 from wm_drake.studies.gasket.check import Check
-from wm_drake.studies.gasket.compared import NOT_COMPARED, Compared
 from wm_drake.studies.gasket.level_zero import LevelZero
+from wm_drake.studies.gasket.proposal import NOT_COMPARED, Compared
 from wm_drake.studies.gasket.published import FAR, NOT_PUBLISHED, Published
 from wm_drake.studies.gasket.screening import (
     LEADING_INTERACTION_PERCENT,
     LEADING_MAIN_PERCENT,
+    LEVELS,
     Label,
     Screening,
+    Words,
     contributions,
     leading_terms,
 )
-from wm_drake.studies.gasket.words import LEVELS, Words
 
 OTHER_SIGN = "sign differs"
 """Mark of a term whose effects have another sign than the published ones."""

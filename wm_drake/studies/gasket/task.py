@@ -26,13 +26,13 @@ from wm_drake.parameters import (
 from wm_drake.simulation.cases import Case, is_as_measured
 from wm_drake.studies.doe import DESIGNS, MODELS, Design, make_design, read_design
 from wm_drake.studies.gasket.check import Check, Setting, run_check
-from wm_drake.studies.gasket.compared import Compared
 from wm_drake.studies.gasket.level_zero import run_level_zero
 from wm_drake.studies.gasket.options import GasketOptions
 from wm_drake.studies.gasket.page import GasketResult
 from wm_drake.studies.gasket.proposal import (
     Aim,
     Change,
+    Compared,
     Proposal,
     best_places,
     change_of,

@@ -18,8 +18,7 @@ from wm_drake.report.page import Picture, picture
 from wm_drake.report.sections import Section, SectionedPage
 from wm_drake.report.table import Column, Table, line
 from wm_drake.studies.gasket_geometry.drawings import Factor
-from wm_drake.studies.gasket_geometry.study import GAP, RESPONSES, excess, ranked
-from wm_drake.studies.gasket_geometry.surface import Surface
+from wm_drake.studies.gasket_geometry.study import GAP, RESPONSES, Surface, excess, ranked
 from wm_drake.studies.study import Facts, Result
 
 if TYPE_CHECKING:

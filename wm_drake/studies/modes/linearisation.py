@@ -18,7 +18,9 @@ from pydrake.systems.primitives import Linearize
 from wm_drake.elements.rubber import FRICTION, MAXWELL
 from wm_drake.engines.compiled.mechanics import DRUM_ANGLE, DRUM_RATE
 from wm_drake.engines.compiled.slopes import SlopedDerivative
+from wm_drake.errors import input_error
 from wm_drake.model.machine import Machine, Setup
+from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
 
 SLOWEST = 2.0 * np.pi * 0.01
@@ -174,3 +176,13 @@ def drake_spectrum(setup: Setup) -> Spectrum:
         machine.diagram, setup.context, InputPortSelection.kNoInput, OutputPortSelection.kNoOutput
     )
     return spectrum_of(system.A())
+
+
+def check_fixed_cabinet(parameters: MachineParameters) -> None:
+    """Raise InputError if the cabinet of a machine moves."""
+    if parameters.cabinet_moves:
+        raise input_error(
+            f"the cabinet of machine '{parameters.name}' moves; modes and steady states are those "
+            "of a machine on a fixed cabinet: set it to false",
+            key="cabinet.moves",
+        )

@@ -16,8 +16,7 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import case_of
 from wm_drake.studies.modes.amplitude import AmplitudeMode, amplitude_modes
 from wm_drake.studies.modes.campbell import Campbell, CriticalSpeed, campbell, critical_speeds
-from wm_drake.studies.modes.fixed_cabinet import check_fixed_cabinet
-from wm_drake.studies.modes.linearisation import MODES, Linearisation, Spectrum
+from wm_drake.studies.modes.linearisation import MODES, Linearisation, Spectrum, check_fixed_cabinet
 from wm_drake.studies.modes.sensitivity import Sensitivity, numbers_of, sensitivities
 from wm_drake.studies.modes.shapes import Mode, modes_of
 from wm_drake.studies.threads import on_one_thread

@@ -1,13 +1,17 @@
-"""The task of the study of modes."""
+"""The task of the study of modes, and the motion of a mode for a replay in 3D."""
 
 import logging
 
+import numpy as np
+
 from wm_drake.model.machine import Machine
+from wm_drake.model.replay import Motion
+from wm_drake.model.scene import REPLAY_RATE
 from wm_drake.parameters.units import Unit
 from wm_drake.studies.inputs import quantities_of
-from wm_drake.studies.modes.animation import mode_motion
 from wm_drake.studies.modes.options import ModesOptions
 from wm_drake.studies.modes.page import ModesResult
+from wm_drake.studies.modes.shapes import ANGLE_ARM, Mode
 from wm_drake.studies.modes.study import SLIDING, MachineModes, modes
 from wm_drake.studies.run import Executor
 from wm_drake.studies.study import Task
@@ -45,3 +49,21 @@ def _replays(result: MachineModes) -> dict[str, str]:
         mode.name: replay_page(result.parameters, mode_motion(mode), title=mode.name)
         for mode in result.modes[SLIDING]
     }
+
+
+SHOWN_AMPLITUDE = 0.03
+"""Largest displacement of a shown mode, with angles times 0.25 m. [m]"""
+
+PERIOD, PERIODS = 1.5, 2
+"""Time of a shown cycle, slower than it is, and number of cycles. [s]"""
+
+
+def mode_motion(mode: Mode) -> Motion:
+    """Return the motion of a mode that neither grows nor decays; the drum stands still."""
+    time = np.arange(0.0, PERIODS * PERIOD, 1.0 / REPLAY_RATE)
+    turns = np.exp(2j * np.pi * time / PERIOD)
+    weight = np.repeat([ANGLE_ARM, 1.0], 3)
+    shape = mode.shape * (SHOWN_AMPLITUDE / np.max(np.abs(mode.shape * weight)))
+    motion = np.real(np.outer(turns, shape))
+    still = np.zeros(len(time))
+    return Motion(time, np.column_stack([motion, still]), still)

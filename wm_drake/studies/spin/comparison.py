@@ -115,7 +115,7 @@ class ComparisonResult(Result):
     def terminal(self) -> "list[Table | str]":
         """Return the amplitudes, the effect of the gasket, and the smallest gaps."""
         from wm_drake.studies.spin.effect_page import effect_summary, terminal_table
-        from wm_drake.studies.spin.terminal import amplitude_lines, gap_text
+        from wm_drake.studies.spin.tables import amplitude_lines, gap_text
 
         amplitudes = self.tables()["amplitudes"]
         gaps = [

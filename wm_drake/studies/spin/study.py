@@ -183,7 +183,7 @@ class SpinResult(Result):
 
     def terminal(self) -> "list[Table | str]":
         """Return the amplitudes, and lines with the other measures of each case."""
-        from wm_drake.studies.spin.terminal import amplitude_lines, case_lines
+        from wm_drake.studies.spin.tables import amplitude_lines, case_lines
 
         title = f"Displacement amplitudes of machine '{self.parameters.name}', in mm"
         lines = [line for case in self.results for line in case_lines(self.parameters, case)]

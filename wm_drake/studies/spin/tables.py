@@ -1,15 +1,17 @@
-"""Results of a spin run as tables: numbers for files, text for a page."""
+"""Results of a spin run as tables: numbers for files, text for a page, lines for the terminal."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 
-from wm_drake.parameters import Load, measured_amplitudes, quantities
+from wm_drake.parameters import MachineParameters, measured_amplitudes, quantities
 from wm_drake.parameters.measured import BAND
-from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import (
     MM_PER_M,
     RPM_PER_RAD_S,
@@ -27,15 +29,21 @@ from wm_drake.report.table import (
     Value,
     line,
     readable,
+    table_of,
 )
+from wm_drake.simulation.balance import balance_of
 from wm_drake.simulation.displacements import percent_difference
-from wm_drake.simulation.measures import MEASURES, Variable
-from wm_drake.simulation.measures.as_json import labelled_values
+from wm_drake.simulation.measures import MEASURES, Measures, Variable
+from wm_drake.simulation.measures.as_json import as_json, labelled_values
 from wm_drake.simulation.measures.registry import tabulated
-from wm_drake.simulation.mount_forces import MountForce, mount_forces, rms_table, speed_ranges
+from wm_drake.simulation.mount_forces import mount_forces, rms_table, speed_ranges
 from wm_drake.simulation.spring_tension import slack_springs
 from wm_drake.simulation.vibration import sensor_accelerations
+from wm_drake.studies.spin.balance import balance_line
 from wm_drake.studies.spin.study import CaseResult, SpinResult, band_text
+
+if TYPE_CHECKING:
+    from rich.table import Table as TerminalTable
 
 OURS = "wm_drake"
 """Name of this program in the column `source` of an amplitude table."""
@@ -87,6 +95,19 @@ def banded_amplitudes(result: SpinResult) -> pd.DataFrame:
     return table.fillna({BAND: ""})
 
 
+def by_case(
+    cases: Iterable[CaseResult],
+    caption: str,
+    columns: Iterable[Column | str],
+    rows_of: Callable[[CaseResult], Iterable[Row]],
+    text_columns: int = 1,
+) -> Table:
+    """Return a table with a group of rows for each case; a case without rows is left out."""
+    rows = ((case.title, tuple(rows_of(case))) for case in cases)
+    groups = tuple(Group(title, of_case) for title, of_case in rows if of_case)
+    return Table(caption, ("load", *columns), groups, text_columns)
+
+
 def rows_of(table: pd.DataFrame, case: CaseResult) -> pd.DataFrame:
     """Return the rows of an amplitude table that belong to a case."""
     return table[
@@ -126,28 +147,24 @@ def differences(table: pd.DataFrame, case: CaseResult, source: str = OURS) -> li
 def comparison(result: SpinResult, table: pd.DataFrame) -> Table:
     """Return the amplitudes with their percent differences from the experiment."""
     sensors = list(result.parameters.sensors)
-    groups = []
-    for case in result.results:
-        rows = [_amplitude_row(row, sensors) for _, row in rows_of(table, case).iterrows()]
-        others = [
-            source for source in rows_of(table, case)["source"] if source not in (EXPERIMENT, OURS)
-        ]
+
+    def rows(case: CaseResult) -> Iterator[Row]:
+        of_case = rows_of(table, case)
+        for _, row in of_case.iterrows():
+            sizes = (number(float(row[name])) for name in sensors)
+            yield Row((row["source"], *sizes, ""), "ours" if row["source"] == OURS else "measured")
+        others = [source for source in of_case["source"] if source not in (EXPERIMENT, OURS)]
         for source in dict.fromkeys([*others, OURS]):
-            rows += _difference_rows(differences(table, case, source), source)
-        groups.append(Group(case.title, tuple(rows)))
+            yield from _difference_rows(differences(table, case, source), source)
+
     caption = (
         "Amplitude of the displacement at each sensor: the largest absolute value of its envelopes "
         f"in the band {band_text(*result.results)}. The last rows of each load are differences: "
         "100 % × (value − experiment) / experiment, [B] Eq. (1)."
     )
     caption = " ".join([caption, *result.measured_notes()])
-    header = ("load", "source", *(f"{name}, mm" for name in sensors), "mean absolute difference, %")
-    return Table(caption, header, tuple(groups), text_columns=2)
-
-
-def _amplitude_row(row: pd.Series, sensors: list[str]) -> Row:
-    kind = "ours" if row["source"] == OURS else "measured"
-    return Row((str(row["source"]), *(number(float(row[name])) for name in sensors), ""), kind)
+    columns = ("source", *(f"{name}, mm" for name in sensors), "mean absolute difference, %")
+    return by_case(result.results, caption, columns, rows, text_columns=2)
 
 
 def _difference_rows(changes: list[Difference], source: str) -> list[Row]:
@@ -180,13 +197,14 @@ def variable_table(result: SpinResult, variable: Variable, decimals: int | None 
     Args:
         decimals: Number of decimals; None for significant digits.
     """
-    groups, columns = [], list[Column]()
-    for case in result.results:
-        numbers = labelled_values(case.measures.table, variable)
-        names = [" ".join(labels) or variable.kind for labels, _ in numbers]
-        columns = [Column(name, variable.unit_text, decimals) for name in names]
-        groups.append(line(case.title, [value for _, value in numbers]))
+
+    def numbers(case: CaseResult) -> list[tuple[tuple[str, ...], float | None]]:
+        return labelled_values(case.measures.table, variable)
+
+    names = [" ".join(labels) or variable.kind for labels, _ in numbers(result.results[-1])]
+    columns = [Column(name, variable.unit_text, decimals) for name in names]
     caption = f"{variable.about[0].upper()}{variable.about[1:]}."
+    groups = (line(case.title, [v for _, v in numbers(case)]) for case in result.results)
     return Table(caption, ("load", *columns), tuple(groups))
 
 
@@ -200,49 +218,36 @@ def largest_values(result: SpinResult) -> Table:
         "of the gasket on the housing. All are the largest absolute values over the whole run, "
         "for each axis."
     )
-    header: Columns = (
-        "load",
-        *(
-            Column(f"{name}{axis}", unit, decimals)
-            for name, unit, decimals in (("D", "mm", 1), ("F", "N", 1), ("M", "N m", 2))
-            for axis in "xyz"
-        ),
-    )
-    return Table(
-        caption,
-        header,
-        tuple(line(case.title, _largest_cells(case)) for case in result.results),
-    )
+    columns = [
+        Column(f"{name}{axis}", unit, decimals)
+        for name, unit, decimals in (("D", "mm", 1), ("F", "N", 1), ("M", "N m", 2))
+        for axis in "xyz"
+    ]
 
+    def rows(case: CaseResult) -> list[Row]:
+        measures = case.measures
+        gasket = np.concatenate([measures.gasket_force.values, measures.gasket_moment.values])
+        gasket = np.where(case.has_gasket, gasket, np.nan)
+        return [Row((*(MM_PER_M * measures.detergent_displacement.values), *gasket))]
 
-def _largest_cells(case: CaseResult) -> list[float]:
-    measures = case.measures
-    gasket = np.concatenate([measures.gasket_force.values, measures.gasket_moment.values])
-    if not case.has_gasket:
-        gasket = np.full(len(gasket), np.nan)
-    return [*(MM_PER_M * measures.detergent_displacement.values), *gasket]
+    return by_case(result.results, caption, columns, rows)
 
 
 def accelerations(result: SpinResult) -> Table:
     """Return the largest acceleration at each sensor, and the RMS over the run."""
-    groups = []
-    for case in result.results:
-        if not case.record.sizes["time"]:
-            continue
+
+    def rows(case: CaseResult) -> list[Row]:
         values = sensor_accelerations(case.record, result.sensors_of(case)).values
-        shown = {"largest": np.abs(values).max(axis=0), "RMS": np.sqrt(np.mean(values**2, axis=0))}
-        rows = (Row((name, *sizes)) for name, sizes in shown.items())
-        groups.append(Group(case.title, tuple(rows)))
+        rms = np.sqrt(np.mean(values**2, axis=0))
+        return [Row(("largest", *np.abs(values).max(axis=0))), Row(("RMS", *rms))]
+
     caption = (
         "Acceleration of the tub at each sensor, along its axis: the largest absolute value and "
         "the RMS over the whole run. Gravity is not included, and nothing is filtered."
     )
-    header: Columns = (
-        "load",
-        "value",
-        *(Column(name, "m/s²", 2) for name in result.parameters.sensors),
-    )
-    return Table(caption, header, tuple(groups), text_columns=2)
+    columns: Columns = ("value", *(Column(n, "m/s²", 2) for n in result.parameters.sensors))
+    cases = [case for case in result.results if case.record.sizes["time"]]
+    return by_case(cases, caption, columns, rows, text_columns=2)
 
 
 def mount_force_tables(result: SpinResult) -> list[Table]:
@@ -251,34 +256,32 @@ def mount_force_tables(result: SpinResult) -> list[Table]:
         "Size of the force of each mount on the cabinet: at rest, largest with its drum speed, and "
         "RMS without the mean in ranges of drum speed or in the regions of the profile."
     )
-    by_ranges: dict[tuple[str, ...], list[Group]] = {}
+    by_ranges: dict[tuple[str, ...], list[CaseResult]] = {}
     for case in result.results:
-        forces, ranges = mount_forces(case.record), speed_ranges(case.record, case.case.profile)
-        rms = rms_table(forces, ranges)
-        rows = tuple(
-            _mount_row(case, force, rms[i])
-            for i, force in enumerate(forces)
-            if force.peak > 0.0  # rings of balls act on the drum
-        )
-        if rows:
-            names = tuple(part.name for part in ranges)
-            by_ranges.setdefault(names, []).append(Group(case.title, rows))
-    start: Columns = ("load", "mount", Column("at rest", "N", 1), Column("largest", "N", 1))
-    speed = Column("at", "rpm", 0)
-    return [
-        Table(
+        names = tuple(part.name for part in speed_ranges(case.record, case.case.profile))
+        by_ranges.setdefault(names, []).append(case)
+    start = ("mount", Column("at rest", "N", 1), Column("largest", "N", 1), Column("at", "rpm", 0))
+    tables = (
+        by_case(
+            cases,
             caption,
-            (*start, speed, *(Column(f"RMS {name}", "N", 1) for name in names)),
-            tuple(groups),
+            (*start, *(Column(f"RMS {name}", "N", 1) for name in names)),
+            _mount_rows,
             text_columns=2,
         )
-        for names, groups in by_ranges.items()
-    ]
+        for names, cases in by_ranges.items()
+    )
+    return [table for table in tables if table.groups]
 
 
-def _mount_row(case: CaseResult, force: MountForce, rms: FloatArray) -> Row:
-    speed = case.speed_rpm(float(case.record.time[force.peak_index]))
-    return Row((force.name.replace("_", " "), force.at_rest, force.peak, speed, *map(float, rms)))
+def _mount_rows(case: CaseResult) -> Iterator[Row]:
+    forces = mount_forces(case.record)
+    every = rms_table(forces, speed_ranges(case.record, case.case.profile))
+    for force, rms in zip(forces, every, strict=True):
+        if force.peak > 0.0:  # rings of balls act on the drum
+            speed = case.speed_rpm(float(case.record.time[force.peak_index]))
+            name = force.name.replace("_", " ")
+            yield Row((name, force.at_rest, force.peak, speed, *map(float, rms)))
 
 
 def smallest_gaps(result: SpinResult) -> Table:
@@ -288,8 +291,7 @@ def smallest_gaps(result: SpinResult) -> Table:
         "A negative gap means that the parts overlap. x (to the right), y (to the rear), z (up): "
         "position of the nearest point of the moving part, from drum mid-depth at rest."
     )
-    header: Columns = (
-        "load",
+    columns: Columns = (
         "moving part",
         "part of the housing",
         Column("gap", "mm", 1),
@@ -297,22 +299,18 @@ def smallest_gaps(result: SpinResult) -> Table:
         Column("time", "s", 2),
         *(Column(axis, "mm", 0) for axis in "xyz"),
     )
-    return Table(caption, header, tuple(_gap(case) for case in result.results), text_columns=3)
+    return by_case(result.results, caption, columns, _gap_rows, text_columns=3)
 
 
-def _gap(case: CaseResult) -> Group:
+def _gap_rows(case: CaseResult) -> list[Row]:
     gap = case.measures.smallest_gap
     if gap is None:
-        return line(case.title, ["not computed", *[None] * 7])
-    cells: list[Value] = [
-        shape_name(gap.moving),
-        shape_name(gap.fixed),
-        MM_PER_M * gap.distance,
-        case.speed_rpm(gap.time),
-        gap.time,
-        *(MM_PER_M * float(value) for value in gap.point),
-    ]
-    return line(case.title, cells, "alarm" if gap.distance <= 0.0 else "")
+        return [Row(("not computed", *[None] * 7))]
+    parts = shape_name(gap.moving), shape_name(gap.fixed)
+    place = (MM_PER_M * float(value) for value in gap.point)
+    size, speed = MM_PER_M * gap.distance, case.speed_rpm(gap.time)
+    cells: tuple[Value, ...] = (*parts, size, speed, gap.time, *place)
+    return [Row(cells, "alarm" if gap.distance <= 0.0 else "")]
 
 
 def smallest_tensions(result: SpinResult) -> Table:
@@ -321,12 +319,14 @@ def smallest_tensions(result: SpinResult) -> Table:
         "Smallest tension of each spring over all samples, in N. A spring that only pulls goes "
         "slack at 0; a spring that also pushes can fall below."
     )
-    groups = []
-    for case in result.results:
-        smallest = case.measures.smallest_tension
-        groups.append(line(case.title, smallest.values, "alarm" if slack_springs(smallest) else ""))
     names = result.results[0].measures.smallest_tension.spring.values
-    return Table(caption, ("load", *(Column(str(name), "N", 1) for name in names)), tuple(groups))
+    columns = (Column(str(name), "N", 1) for name in names)
+    return by_case(result.results, caption, columns, _tension_rows)
+
+
+def _tension_rows(case: CaseResult) -> list[Row]:
+    smallest = case.measures.smallest_tension
+    return [Row(tuple(smallest.values), "alarm" if slack_springs(smallest) else "")]
 
 
 def loads(result: SpinResult) -> Table:
@@ -335,23 +335,21 @@ def loads(result: SpinResult) -> Table:
         "Loads: point masses in the drum. A mass with phase 0 is at the top when the drum angle is "
         "0. y is measured from drum mid-depth to the rear."
     )
-    header: Columns = (
-        "load",
+    columns = (
         Column("mass", "kg", 3),
         Column("radius", "mm", 1),
         Column("y", "mm", 1),
         Column("phase", "deg", 1),
     )
-    groups = (Group(case.title, _masses(case.case.load)) for case in result.results)
-    return Table(caption, header, tuple(groups))
+    return by_case(result.results, caption, columns, _masses)
 
 
-def _masses(load: Load) -> tuple[Row, ...]:
+def _masses(case: CaseResult) -> list[Row]:
     rows = [
         Row((u.mass, MM_PER_M * u.radius, MM_PER_M * u.y, float(np.rad2deg(u.phase))))
-        for u in load.unbalances
+        for u in case.case.load.unbalances
     ]
-    return tuple(rows) or (Row(("0 (empty drum)", None, None, None)),)
+    return rows or [Row(("0 (empty drum)", None, None, None))]
 
 
 def profiles(result: SpinResult) -> Table:
@@ -394,3 +392,65 @@ def changed_parameters(result: SpinResult, case: CaseResult) -> Table | None:
         groups,
         text_columns=2,
     )
+
+
+def amplitude_lines(title: str, amplitudes: pd.DataFrame) -> "TerminalTable":
+    """Return amplitudes as a table for the terminal: words at the left, numbers at the right."""
+    bands = " and ".join(filter(None, amplitudes[BAND].unique()))
+    shown = amplitudes.drop(columns=BAND)
+    columns = {str(name): Column(str(name), decimals=1) for name in shown.columns}
+    return table_of(shown, columns=columns).terminal(f"{title}, {bands}")
+
+
+def case_lines(parameters: MachineParameters, case: CaseResult) -> list[str]:
+    """Return a line for each measure of a case beside its amplitudes."""
+    measures, lines = case.measures, [gap_text(case)]
+    tensions = measures.smallest_tension
+    shown = zip(tensions.spring.values, tensions.values, strict=True)
+    words = ", ".join(f"{name} {tension:.1f} N" for name, tension in shown)
+    lines.append(f"smallest spring tension {words}")
+    if parameters.drive.kind == "motor":
+        lines.append(_drive_text(measures))
+    for variable in tabulated():
+        numbers = [
+            " ".join([*labels, "-" if value is None else f"{value:.4g}"])
+            for labels, value in labelled_values(measures.table, variable)
+        ]
+        lines.append(f"{variable.kind} {', '.join(numbers)} {variable.unit_text}")
+    if (balance := balance_of(case.case, parameters, case.record)) is not None:
+        lines.append(balance_line(balance))
+    if (walk := measures.walk) is not None:
+        turn = math.degrees(walk.turn)
+        lines.append(f"the cabinet walks {1e3 * walk.distance:.1f} mm and turns by {turn:.1f} deg")
+    return [f"{case.case.name}: {line}" for line in lines if line]
+
+
+def gap_text(case: CaseResult) -> str:
+    """Return the smallest gap of a case as text; "" if there is none."""
+    gap = case.measures.smallest_gap
+    if not gap:
+        return ""
+    distance = Unit("m", "mm").from_si(gap.distance)
+    parts = f"{gap.moving} and {gap.fixed}"
+    return f"smallest gap {distance:.1f} mm between {parts}, at {gap.time:.2f} s"
+
+
+def _drive_text(measures: Measures) -> str:
+    """Return the measures of the drive as text."""
+    text = as_json(measures.table)["motor"]
+    if text["peak_torque_Nm"] is None:
+        return "the run is too short for measures of the drive"
+    line = f"motor torque on the drum up to {text['peak_torque_Nm']:.1f} N m"
+    if text["mean_torque_Nm"] is not None:
+        line += (
+            f", over a revolution up to {text['mean_torque_Nm']:.2f} N m at "
+            f"{text['mean_torque_rpm']:.0f} rpm"
+        )
+    if text["speed_ripple_percent"] is not None:
+        line += f"; speed ripple {text['speed_ripple_percent']:.1f} %"
+    if text["caught_rpm"] is not None:
+        line += (
+            f"; caught at {text['caught_rpm']:.0f} rpm with {text['caught_mean_torque_Nm']:.2f} "
+            "N m on average"
+        )
+    return line

@@ -7,16 +7,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wm_drake.parameters.unbalance_cases import UnbalanceCase
-from wm_drake.report.formatting import MM_PER_M, number, plain
+from wm_drake.report.formatting import MM_PER_M, number, plain, slack_warning
 from wm_drake.report.page import Picture, picture
 from wm_drake.report.sections import Section, SectionedPage
-from wm_drake.report.springs import slack_warning
 from wm_drake.simulation.measures.as_json import as_json
 from wm_drake.simulation.spring_tension import slack_springs
 from wm_drake.studies.spin_cycle import tables
-from wm_drake.studies.spin_cycle.drive import drive_frame, drive_table
 from wm_drake.studies.spin_cycle.figures import bars_figure, heat_map_figure, profile_figure
-from wm_drake.studies.spin_cycle.floor import feet_frame, floor_table, floor_warnings
 from wm_drake.studies.spin_cycle.measured import rms_table
 from wm_drake.studies.spin_cycle.study import (
     SpinCycleResult,
@@ -25,6 +22,13 @@ from wm_drake.studies.spin_cycle.study import (
     largest,
     mean_and_deviation,
     region_errors,
+)
+from wm_drake.studies.spin_cycle.tables import (
+    drive_frame,
+    drive_table,
+    feet_frame,
+    floor_table,
+    floor_warnings,
 )
 from wm_drake.studies.study import Facts, Result
 

@@ -1,6 +1,7 @@
-"""Tables of a spin-cycle study."""
+"""Tables of a spin-cycle study: cases, regions, drive, feet; and warnings about the feet."""
 
 import itertools
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -8,6 +9,8 @@ import xarray as xr
 
 from wm_drake.report.formatting import MISSING, MM_PER_M, RPM_PER_RAD_S, number
 from wm_drake.report.table import Column, Columns, Table, line, table_of
+from wm_drake.simulation.feet import MARGINS
+from wm_drake.simulation.measures.as_json import as_json
 from wm_drake.studies.spin_cycle.study import (
     SpinCycleResult,
     average_errors,
@@ -151,3 +154,130 @@ def worst_of_all(displacement: xr.DataArray) -> tuple[np.ndarray, np.ndarray]:
     values = displacement.values.reshape(*displacement.shape[:2], -1)
     filled = np.where(np.isfinite(values), values, -1.0)
     return filled.max(axis=0), filled.argmax(axis=0)
+
+
+DRIVE = {
+    "peak_torque_Nm": ("drive_peak_torque", 1.0),
+    "mean_torque_Nm": ("drive_mean_torque", 1.0),
+    "mean_torque_rpm": ("drive_mean_torque_speed", RPM_PER_RAD_S),
+    "peak_power_W": ("drive_peak_power", 1.0),
+    "energy_J": ("drive_energy", 1.0),
+    "speed_ripple_percent": ("drive_speed_ripple", 100.0),
+    "end_rpm": ("drive_end_speed", RPM_PER_RAD_S),
+    "caught_rpm": ("drive_caught_speed", RPM_PER_RAD_S),
+    "caught_mean_torque_Nm": ("drive_caught_torque", 1.0),
+}
+"""Columns of `drive_frame`: the measure, and its factor from SI units."""
+
+SHOWN_DRIVE = {
+    "case": Column("case"),
+    "peak_torque_Nm": Column("peak torque", "N\u00a0m", 1),
+    "mean_torque_Nm": Column("mean torque", "N\u00a0m", 2),
+    "mean_torque_rpm": Column("at", "rpm", 0),
+    "peak_power_W": Column("peak power", "W", 0),
+    "speed_ripple_percent": Column("ripple", "%", 1),
+    "end_rpm": Column("speed at the end", "rpm", 0),
+    "caught_rpm": Column("caught at", "rpm", 0),
+}
+"""Columns on the page."""
+
+
+def drive_frame(result: SpinCycleResult) -> pd.DataFrame | None:
+    """Return a row for each case with the measures of the drive; None without a motor."""
+    if "drive_peak_torque" not in result.forces:
+        return None
+    return pd.DataFrame(
+        [
+            {"case": case.name}
+            | {
+                column: factor * float(result.forces[name].sel(case=case.name))
+                for column, (name, factor) in DRIVE.items()
+            }
+            for case in result.cases
+        ]
+    )
+
+
+def drive_table(result: SpinCycleResult) -> Table | None:
+    """Return the measures of the drive of each case; None without a motor."""
+    frame = drive_frame(result)
+    if frame is None:
+        return None
+    caption = (
+        "Drive: largest torque on the drum; largest torque averaged over a revolution, and the "
+        "speed there; largest power; speed ripple, the largest coefficient of fluctuation in a "
+        "revolution; speed at the end; speed at which the drum stays below the wanted one "
+        "(Sommerfeld effect). drive.csv has all numbers."
+    )
+    kinds = ["alarm" if caught else "" for caught in frame["caught_rpm"].notna()]
+    return table_of(frame[list(SHOWN_DRIVE)], caption, SHOWN_DRIVE, kinds)
+
+
+SHOWN_FEET = {
+    "case": Column("case"),
+    "smallest_normal_force_N": Column("smallest load of a foot", "N", 1),
+    "slide_margin_N": Column("margin of sliding", "N", 1),
+    "turn_margin_Nm": Column("margin of turning", "N\u00a0m", 1),
+    "tilt_margin_Nm": Column("margin of tilting", "N\u00a0m", 1),
+    "where": Column("turning smallest in"),
+}
+"""Columns of the feet on the page."""
+
+MARGIN_COLUMNS = list(SHOWN_FEET)[1:-1]
+"""Columns of loads and margins."""
+
+
+def feet_frame(result: SpinCycleResult) -> pd.DataFrame:
+    """Return a row for each case and region, and one for the whole run: loads and margins.
+
+    Args:
+        result: Result of a machine with a cabinet.
+    """
+    rows: list[dict[str, Any]] = []
+    for case in result.cases:
+        feet = as_json(result.forces.sel(case=case.name))["feet"]
+        parts = {"run": feet, **feet.pop("regions")}
+        rows += [{"case": case.name, "part": part, **values} for part, values in parts.items()]
+    return pd.DataFrame(rows).astype(dict.fromkeys(MARGIN_COLUMNS, float))
+
+
+def floor_table(result: SpinCycleResult) -> Table | None:
+    """Return the smallest loads and margins of each case; None without a cabinet."""
+    if "turn_margin" not in result.forces:
+        return None
+    frame = feet_frame(result)
+    regions = frame[frame["part"] != "run"].dropna(subset="turn_margin_Nm")
+    lowest = regions.loc[regions.groupby("case")["turn_margin_Nm"].idxmin()].set_index("case")
+    whole = frame[frame["part"] == "run"].drop(columns="part")
+    whole = whole.assign(where=whole["case"].map(lowest["part"]))
+    kinds = ["alarm" if low <= 0.0 else "" for low in whole[MARGIN_COLUMNS].min(axis=1)]
+    which, below = "which the model keeps in its place", "Below 0 the cabinet would slide, turn"
+    if result.parameters.cabinet_moves:
+        which, below = "which moves on them", "At 0 the cabinet slides or turns, or is about to"
+    caption = (
+        f"Feet of the rigid cabinet, {which}: smallest normal load of any foot; horizontal force "
+        "that friction can still take; vertical moment that friction can still take beside it, "
+        "and the region where this is smallest; moment that still keeps the cabinet down. "
+        f"{below} or tip. feet.csv has each region."
+    )
+    return table_of(whole, caption, SHOWN_FEET, kinds)
+
+
+def floor_warnings(result: SpinCycleResult) -> list[str]:
+    """Return a warning that names the cases in which the cabinet would slide, turn or tip."""
+    if "turn_margin" not in result.forces:
+        return []
+    margins = np.min([result.forces[name].values for name in MARGINS[1:]], axis=0)
+    moving = [
+        case.name
+        for case, margin, diverged in zip(result.cases, margins, result.diverged, strict=True)
+        if margin <= 0.0 and not diverged
+    ]
+    if not moving:
+        return []
+    if result.parameters.cabinet_moves:
+        return [f"The cabinet slides, turns or lifts a side in case {', '.join(moving)}."]
+    return [
+        f"The cabinet would slide, turn or tip over in case {', '.join(moving)}. The model keeps "
+        "it in its place."
+    ]

@@ -1,18 +1,36 @@
 """The task of the study of a spin cycle: options and files checked, and runs."""
 
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
-from wm_drake.errors import input_error, nearest_names
+import numpy as np
+import xarray as xr
+
+from wm_drake.batch import simulate_many
+from wm_drake.batch.many import as_table
+from wm_drake.errors import InputError, input_error, nearest_names
 from wm_drake.model.machine import Machine
-from wm_drake.studies.inputs import channels_of, runnable_profile
+from wm_drake.model.scene import Scene
+from wm_drake.parameters import MachineParameters, SpinProfile
+from wm_drake.parameters.unbalance_cases import TABLE_9, UnbalanceCase, load_unbalance_cases
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.measures import measure
+from wm_drake.studies.inputs import channels_of, existing_file, runnable_profile
 from wm_drake.studies.run import Executor
-from wm_drake.studies.spin_cycle.inputs import MeasuredFiles, cases_of_table
+from wm_drake.studies.spin.study import run_spin
+from wm_drake.studies.spin_cycle.measured import read_accelerations, read_rms
 from wm_drake.studies.spin_cycle.options import SpinCycleOptions
 from wm_drake.studies.spin_cycle.page import SpinCycleReport
-from wm_drake.studies.spin_cycle.runs import drake_runs
-from wm_drake.studies.spin_cycle.study import measures_of, run_spin_cycle
+from wm_drake.studies.spin_cycle.study import (
+    Evaluate,
+    labels_of,
+    measures_of,
+    run_spin_cycle,
+    runs_of,
+)
 from wm_drake.studies.study import Task
 
 ENGINES = ("compiled", "drake")
@@ -51,3 +69,91 @@ class SpinCycleTask(Task):
             evaluate = partial(executor.simulate, self.machine, measures, what="cases")
             result = run_spin_cycle(parameters, self.cases, self.profile, evaluate)
         return SpinCycleReport(replace(result, measured=self.measured), self.engine)
+
+
+def cases_of_table(path: Path | None, names: Sequence[str] | None) -> list[UnbalanceCase]:
+    """Return the cases that `--cases` and `--case` select."""
+    table = load_unbalance_cases(existing_file(path, "--cases") if path else TABLE_9)
+    known = {case.name: case for case in table}
+    for name in names or []:
+        if name not in known:
+            raise input_error(f"unknown case '{name}'{nearest_names(name, known)}", where="--case")
+    return [known[name] for name in dict.fromkeys(names)] if names else table
+
+
+@dataclass(frozen=True)
+class MeasuredFiles:
+    """Files of measurements of a spin cycle; at most one of the two.
+
+    Attributes:
+        rms: Table of RMS displacements.
+        accelerations: Folder of records of acceleration.
+        channels: Names of the channels in the records, by word.
+    """
+
+    rms: Path | None = None
+    accelerations: Path | None = None
+    channels: Mapping[str, str] = field(default_factory=dict)
+
+    def read(
+        self, parameters: MachineParameters, cases: list[UnbalanceCase], profile: SpinProfile
+    ) -> xr.DataArray | None:
+        """Return the measured RMS displacements, or None without files.
+
+        Raises:
+            InputError: both kinds of files are given, a file is wrong, or a case cannot be run.
+        """
+        if self.rms and self.accelerations:
+            raise input_error("not allowed together with --measured", where="--accelerations")
+        if self.channels and not self.accelerations:
+            raise input_error("is about the files of --accelerations", where="--channels")
+        try:
+            runs_of(parameters, cases, profile)  # raises an error for cases that cannot be run
+        except InputError as error:
+            raise InputError(
+                replace(p, where="--profile", key="") if p.key == "profile" else p
+                for p in error.problems
+            ) from None
+        labels = labels_of(parameters, cases, profile)
+        if self.rms:
+            return read_rms(existing_file(self.rms, "--measured"), labels)
+        if self.accelerations:
+            return read_accelerations(self.accelerations, labels, profile, self.channels)
+        return None
+
+
+def compiled_runs(machine: Machine) -> Evaluate:
+    """Return a function that runs cases of a built machine with the compiled engine."""
+    return partial(simulate_many, machine, measures=measures_of(machine.parameters))
+
+
+def drake_runs(
+    parameters: MachineParameters, *, progress: Callable[[int], None] = lambda done: None
+) -> Evaluate:
+    """Return a function that runs cases with the Drake engine in processes; a case takes minutes.
+
+    Args:
+        progress: Called with the number of finished cases.
+    """
+
+    def evaluate(cases: Iterable[Case]) -> xr.Dataset:
+        runs = list(cases)
+        done = np.zeros(len(runs))
+
+        def report(index: int, fraction: float) -> None:
+            done[index] = fraction
+            progress(int(done.sum()))
+
+        results = run_spin(parameters, runs, "drake", progress=report).results
+        measures, scene = measures_of(parameters), Scene(parameters)
+        rows = {
+            number: (
+                result.case.name,
+                str(result.record.attrs["diverged"]),
+                measure(result.record, scene, measures).values,
+            )
+            for number, result in enumerate(results)
+        }
+        return as_table(parameters, measures, rows)
+
+    return evaluate

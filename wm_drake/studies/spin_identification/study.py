@@ -41,9 +41,9 @@ from wm_drake.studies.fitting import (
 )
 from wm_drake.studies.inputs import channels_of, runnable_profile
 from wm_drake.studies.run import Executor
-from wm_drake.studies.spin_cycle.inputs import MeasuredFiles, cases_of_table
 from wm_drake.studies.spin_cycle.measured import rms_table
 from wm_drake.studies.spin_cycle.study import DIMS, average_errors, labels_of, runs_of
+from wm_drake.studies.spin_cycle.task import MeasuredFiles, cases_of_table
 from wm_drake.studies.spin_identification.options import SpinIdentifyOptions
 from wm_drake.studies.study import Facts, Result, Task
 

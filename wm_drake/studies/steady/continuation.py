@@ -2,7 +2,8 @@
 
 A step goes along the tangent of the branch. If it reaches the next speed of the grid, the motion is
 solved at that speed; else on the plane across the tangent (Keller 1977). The matrix of one
-linearisation serves all corrections of a step that converge fast (chord method).
+linearisation serves all corrections of a step that converge fast (chord method). Floquet
+multipliers tell whether a motion is stable.
 """
 
 from collections.abc import Callable, Iterator
@@ -14,7 +15,6 @@ from wm_drake.errors import input_error
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.steady.balance import HarmonicBalance
 from wm_drake.studies.steady.condensed import Corrections
-from wm_drake.studies.steady.stability import floquet_multipliers, is_stable
 
 LENGTH = 5e-3
 """Displacement that counts as much in the arc length as `SPEEDS` of the range of speeds. [m]"""
@@ -395,3 +395,43 @@ def _at_speed(balance: HarmonicBalance, guess: FloatArray, speed: float) -> Floa
             return coefficients
         last = size
     return None
+
+
+UNIT_CIRCLE = 1e-3
+"""How far outside the unit circle a multiplier may be of a motion that is called stable.
+
+The spin of a damper's tube has the multiplier 1 exactly; rounding moves it."""
+
+
+def floquet_multipliers(slopes: FloatArray, period: float) -> FloatArray:
+    """Return the Floquet multipliers of a periodic motion. (n,) complex
+
+    A small departure from a periodic motion obeys d' = J(t) d, with the slopes J of the compiled
+    right-hand side along the motion. Over a period it becomes Phi d; the eigenvalues of Phi are the
+    Floquet multipliers. The motion is stable if all are inside the unit circle. Phi is the product
+    of the steps of the midpoint rule, which is stable for every motion that decays:
+
+        Phi = product of (1 - h/2 J_j)^-1 (1 + h/2 J_j) = product of 2 (1 - h/2 J_j)^-1 - 1
+
+    The trapezoidal rule has the same factors in another order, and the same eigenvalues.
+
+    Args:
+        slopes: (samples, n, n) slopes of the time derivative at equal distances over the period,
+            by each number k.
+        period: [s]
+    """
+    samples, n, _ = slopes.shape
+    matrices = np.eye(n) - (0.5 * period / samples) * slopes.transpose(0, 2, 1)
+    steps = 2.0 * np.linalg.inv(matrices)
+    steps -= np.eye(n)
+    while len(steps) > 1:
+        if len(steps) % 2:
+            steps = np.concatenate([steps[:-2], (steps[-1] @ steps[-2])[None]])
+        else:
+            steps = steps[1::2] @ steps[0::2]
+    return np.linalg.eigvals(steps[0])
+
+
+def is_stable(multipliers: FloatArray) -> bool:
+    """Return whether a motion with these multipliers is stable."""
+    return bool(np.max(np.abs(multipliers)) < 1.0 + UNIT_CIRCLE)

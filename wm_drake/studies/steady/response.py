@@ -7,18 +7,18 @@ import numpy as np
 import xarray as xr
 
 from wm_drake.elements.state_map import CARRIER, ELEMENT, STRETCHES, TUB
+from wm_drake.engines.compiled.run import run_compiled
 from wm_drake.engines.trajectory import COORDINATES, Trajectory
 from wm_drake.errors import input_error
 from wm_drake.model.build import AnyMachine, machine_of
 from wm_drake.model.machine import Setup
-from wm_drake.parameters import Load
+from wm_drake.parameters import Load, SpinProfile
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.mounts import KINDS, force_measures, mount_names
 from wm_drake.simulation.outputs import AXES, variables_of
 from wm_drake.studies.steady.balance import HARMONICS, SAMPLES, HarmonicBalance
 from wm_drake.studies.steady.continuation import Point, first_motion, follow
 from wm_drake.studies.steady.series import Series
-from wm_drake.studies.steady.settled import settled_coefficients
 from wm_drake.studies.threads import on_one_thread
 
 MOST_HARMONICS, MOST_SAMPLES = 40, 1024
@@ -248,3 +248,49 @@ def _largest_of_gasket(setup: Setup, values: FloatArray) -> FloatArray:
         return np.zeros((len(values), 3))
     largest: FloatArray = np.abs(values[:, :, bushings.index("gasket")]).max(axis=1)
     return largest
+
+
+REVOLUTIONS = 60
+"""Default number of drum revolutions until the motion has settled."""
+
+
+def settled_trajectory(
+    setup: Setup, speed: float, samples: int, revolutions: int = REVOLUTIONS
+) -> Trajectory:
+    """Return the last drum revolution of a run at constant speed that starts at rest.
+
+    It is an independent check of harmonic balance, and a first guess without a better one.
+
+    Args:
+        setup: Machine at rest with its load.
+        speed: Of the drum. [rad/s]
+        samples: Number of samples of a revolution.
+        revolutions: Number of drum revolutions.
+
+    Returns:
+        `samples` samples at equal distances; none if the run diverged.
+    """
+    period = 2.0 * np.pi / speed
+    profile = SpinProfile(time=(0.0, revolutions * period), speed=(speed, speed))
+    step = min(setup.parameters.step, period / samples)
+    run = run_compiled(setup, profile, step, lambda fraction: None, period / samples)
+    kept = slice(-samples - 1, -1) if run.divergence is None else slice(0, 0)
+    return run.part(kept)
+
+
+def settled_coefficients(balance: HarmonicBalance, setup: Setup, speed: float) -> FloatArray:
+    """Return the Fourier coefficients of the settled motion; NaN if the run diverged."""
+    run = settled_trajectory(setup, speed, balance.series.samples)
+    if run.divergence is not None:
+        return np.full((balance.series.size, balance.size), np.nan)
+    return coefficients_of(balance, run)
+
+
+def coefficients_of(balance: HarmonicBalance, run: Trajectory) -> FloatArray:
+    """Return the Fourier coefficients of a revolution at the samples of a balance."""
+    others = {CARRIER: run.carrier, STRETCHES: run.stretches}
+    if run.element_states is not None:
+        others[ELEMENT] = run.element_states
+    layout = balance.derivative.layout
+    states = layout.states.joined(run.state, run.deformation, run.tubes, others)
+    return np.asarray(balance.series.analysis @ states[:, balance.derivative.free])
