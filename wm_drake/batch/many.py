@@ -23,6 +23,9 @@ from wm_drake.simulation.measures import MEASURES, Variable
 from wm_drake.simulation.measures.labels import LABELS
 from wm_drake.simulation.steps import checked_integrator, checked_step
 
+AHEAD = 3
+"""Batches for each worker that are prepared or run at a time, unless they have records."""
+
 PAUSE = 2e-5
 """Pause after each case that is prepared. [s]"""
 
@@ -200,8 +203,7 @@ def _run_all(
 ) -> None:
     """Run all cases in threads and pass finished runs to `collect`.
 
-    At most one batch more than there are workers is prepared at a time, so that memory stays
-    constant.
+    Only so many batches are prepared at a time that memory stays constant.
     """
     running: set[Future[list[RunResult]]] = set()
 
@@ -211,11 +213,12 @@ def _run_all(
                 running.remove(future)
                 collect(future.result())
 
+    ahead = 1 if runner.histories else AHEAD
     with ThreadPoolExecutor(workers) as pool:
         try:
             for key, work_items in preparation.batches(_with_pauses(cases)):
                 running.add(pool.submit(runner.run, key, work_items))
-                gather(workers)  # one batch waits while the others run
+                gather(workers * ahead)  # some batches wait while the others run
             gather(0)
         except BaseException:
             runner.stopped.set()

@@ -122,12 +122,18 @@ class Runner:
         self._spare = [] if scenes is None else scenes
         self.scenes: list[Scene] = []
 
-    def run(self, key: BatchKey, work_items: list[WorkItem]) -> list[RunResult]:
+    def run(
+        self,
+        key: BatchKey,
+        work_items: list[WorkItem],
+        progress: Callable[[float], None] = lambda fraction: None,
+    ) -> list[RunResult]:
         """Run up to `WIDTH` work items side by side and measure them.
 
         Args:
             key: What they have in common.
             work_items: The work items.
+            progress: Called with the fraction of the integration that is done.
 
         Returns:
             A result for each work item; none if `stopped` was set meanwhile.
@@ -148,9 +154,10 @@ class Runner:
         if key.stepping.integrator == "midpoint":
             matrices = [item.numbers.stepping.relaxation for item in work_items]
             relaxation = self._lanes("relaxation", matrices)
-        for _ in integrate_runs(schedule, one_derivative, key.layout, p, x, samples, relaxation):
+        for done in integrate_runs(schedule, one_derivative, key.layout, p, x, samples, relaxation):
             if self.stopped.is_set():
                 return []
+            progress(done)
         moved, extremes = self._array("moved", rows * count), self._array("extremes", count + 7)
         springs = key.layout.mounts.springs if "springs" in self.needs else _NONE
         lengths = self._array("spring lengths", len(springs))

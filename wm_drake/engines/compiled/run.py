@@ -19,7 +19,7 @@ from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.machine import Integrator
 from wm_drake.parameters.types import FloatArray
 
-PAUSE_STEPS = 2000
+PAUSE_STEPS = 4000
 """Steps between two checks for divergence and reports of progress: some milliseconds."""
 
 

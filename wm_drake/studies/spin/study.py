@@ -12,6 +12,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from wm_drake.batch.runs import Runner
+from wm_drake.batch.work_items import Preparation
+from wm_drake.engines.memory import RECORDS_OF_BATCH
 from wm_drake.errors import InputError
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
@@ -21,14 +24,14 @@ from wm_drake.parameters.measured import measured_notes
 from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number
 from wm_drake.simulation.balance import balance_of, rings_of
-from wm_drake.simulation.cases import Case, is_as_measured
+from wm_drake.simulation.cases import Case, is_as_measured, notice_jumping_friction
 from wm_drake.simulation.displacements import band_of
 from wm_drake.simulation.measures import Measures, measure
 from wm_drake.simulation.measures.as_json import as_json
 from wm_drake.simulation.mounts import POINT
 from wm_drake.simulation.records import Record, save_record
 from wm_drake.simulation.runs import DEFAULT_ENGINE, DivergenceWarning, simulate
-from wm_drake.simulation.steps import checked_step
+from wm_drake.simulation.steps import checked_integrator, checked_step
 from wm_drake.studies.spin.processes import can_start_processes, map_in_processes
 from wm_drake.studies.study import Facts, Result
 
@@ -47,7 +50,10 @@ One case takes seconds, and Python systems of Drake do not run in parallel threa
 
 @dataclass(frozen=True)
 class CaseResult:
-    """Result of one case; `wall_s` is the time for simulation and measures together. [s]"""
+    """Result of one case.
+
+    `wall_s` is the time for simulation and measures together; of runs side by side, a share. [s]
+    """
 
     case: Case
     record: Record
@@ -305,7 +311,9 @@ def run_spin(
     step = checked_step(parameters, step)
     count = min(workers or os.cpu_count() or 1, len(cases))
     work_items = [_WorkItem(parameters, case, engine, step) for case in cases]
-    if engine in _IN_PROCESSES and count > 1 and can_start_processes():
+    if engine == DEFAULT_ENGINE:
+        results = _run_side_by_side(built, cases, step, progress)
+    elif engine in _IN_PROCESSES and count > 1 and can_start_processes():
         results = map_in_processes(_build_and_run, work_items, count, progress)
     else:
         scene = Scene(parameters)
@@ -328,6 +336,37 @@ def _modes_of(machine: Machine, case: Case) -> "NaturalModes | None":
     except InputError:  # its cabinet moves, or the compiled engine does not represent it
         return None
     return replace(natural, load=case.name)
+
+
+def _run_side_by_side(
+    machine: Machine,
+    cases: Sequence[Case],
+    step: float,
+    progress: Callable[[int, float], None],
+) -> list[CaseResult]:
+    """Return the results of cases, which the compiled engine runs in the lanes of a batch."""
+    notice_jumping_friction(machine.parameters)
+    scene, runner = Scene(machine.parameters), Runner(machine.parameters, (), histories=True)
+    integrator = checked_integrator(machine.parameters, None)
+    preparation = Preparation(machine, step, integrator, RECORDS_OF_BATCH)
+    results = dict[int, CaseResult]()
+    for key, items in preparation.batches(cases):
+        begin = time.perf_counter()
+
+        def report(fraction: float, numbers: tuple[int, ...]) -> None:
+            for number in numbers:
+                progress(number, fraction)
+
+        numbers = tuple(item.number for item in items)
+        runs = runner.run(key, items, partial(report, numbers=numbers))
+        share = (time.perf_counter() - begin) / len(runs)
+        for run in runs:
+            assert run.record is not None  # the runner keeps all
+            begin = time.perf_counter()
+            measures = measure(run.record, scene)
+            wall = share + time.perf_counter() - begin
+            results[run.number] = CaseResult(run.case, run.record, measures, wall)
+    return [results[number] for number in range(len(cases))]
 
 
 def _build_and_run(item: _WorkItem, report: Callable[[float], None]) -> CaseResult:
