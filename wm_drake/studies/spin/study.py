@@ -354,8 +354,8 @@ def _run_side_by_side(
         begin = time.perf_counter()
 
         def report(fraction: float, numbers: tuple[int, ...]) -> None:
-            for number in numbers:
-                progress(number, fraction)
+            for index in numbers:
+                progress(index, fraction)
 
         numbers = tuple(item.number for item in items)
         runs = runner.run(key, items, partial(report, numbers=numbers))
