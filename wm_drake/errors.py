@@ -2,8 +2,9 @@
 
 import difflib
 import re
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from typing import Any
 
 LONGEST_LINE = 500
@@ -74,6 +75,22 @@ def input_error(message: str, *, where: str = "", key: str = "") -> InputError:
     return InputError([Problem(where, key, message)])
 
 
+@contextmanager
+def problems_at(where: str, key: str | None = None) -> Iterator[None]:
+    """Replace the place of the problems that the block raises, and their key path if one is given.
+
+    Args:
+        where: Such as the name of an option.
+        key: Key path; None to keep those of the problems.
+    """
+    try:
+        yield
+    except InputError as error:
+        raise InputError(
+            replace(p, where=where, key=p.key if key is None else key) for p in error.problems
+        ) from None
+
+
 def shortened(text: str, longest: int) -> str:
     """Return a text in one printable line of limited length.
 
@@ -126,3 +143,11 @@ def nearest_names(name: str, known: Iterable[str]) -> str:
     left_out = len(names) - len(shown)
     hint += "known: " + ", ".join([*shown, *([f"{left_out} more"] if left_out else [])])
     return f" ({hint.strip()})"
+
+
+def check_known(
+    name: str, known: Collection[str], message: str, *, where: str = "", key: str = ""
+) -> None:
+    """Raise an `InputError` for a name that is not known: a message with a hint to known names."""
+    if name not in known:
+        raise input_error(f"{message}{nearest_names(name, known)}", where=where, key=key)

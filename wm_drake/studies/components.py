@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from wm_drake.errors import InputError, Problem, input_error, nearest_names
+from wm_drake.errors import InputError, Problem, check_known, input_error
 from wm_drake.parameters import (
     Component,
     MachineParameters,
@@ -84,12 +84,8 @@ def _key_of(kind: str, parameters: MachineParameters, name: str | None) -> str:
         )
         raise input_error(message, where="--machine")
     name = name or next(iter(keys))
-    if name not in keys:
-        raise input_error(
-            f"no '{name}' in {' or '.join(tables)} of '{parameters.name}'"
-            f"{nearest_names(name, keys)}",
-            where="--name",
-        )
+    message = f"no '{name}' in {' or '.join(tables)} of '{parameters.name}'"
+    check_known(name, keys, message, where="--name")
     return keys[name]
 
 
@@ -97,11 +93,8 @@ def axes_of(word: str) -> tuple[str, ...]:
     """Return the axes that a word means, the one for the bench first."""
     if word in AXIS_WORDS:
         return AXIS_WORDS[word]
-    if word in AXES:
-        return (word,)
-    raise input_error(
-        f"no axis '{word}'{nearest_names(word, [*AXIS_WORDS, *AXES])}", where="--axis"
-    )
+    check_known(word, [*AXIS_WORDS, *AXES], f"no axis '{word}'", where="--axis")
+    return (word,)
 
 
 def existing_files(paths: Sequence[Path]) -> list[Path]:

@@ -6,7 +6,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from wm_drake.errors import InputError, Problem, input_error, nearest_names
+from wm_drake.errors import (
+    InputError,
+    Problem,
+    check_known,
+    input_error,
+    nearest_names,
+    problems_at,
+)
 
 DRIVES = ("prescribed", "motor")
 """Drives of the option `--drive`."""
@@ -40,15 +47,6 @@ def problems_of_file(path: Path) -> Iterator[None]:
             Problem(": ".join(filter(None, [str(path), p.where])), p.key, p.message)
             for p in error.problems
         ) from None
-
-
-@contextmanager
-def problems_of_option(option: str) -> Iterator[None]:
-    """Name an option, and no key, in the problems that the block raises."""
-    try:
-        yield
-    except InputError as error:
-        raise InputError(Problem(option, "", p.message) for p in error.problems) from None
 
 
 def profile_of(parameters: "MachineParameters", path: Path | None) -> "SpinProfile":
@@ -111,10 +109,8 @@ def with_sets(
             changes[key] = value
     if not changes:
         return parameters, dict(sources)
-    try:
+    with problems_at("--set"):
         changed = with_values(parameters, changes)
-    except InputError as error:
-        raise InputError(Problem("--set", p.key, p.message) for p in error.problems) from None
     return changed, {**sources, **dict.fromkeys(changes, "set on the command line")}
 
 
@@ -130,10 +126,8 @@ def _set(parameters: "Tree", name: str, text: str) -> dict[str, Any]:
     factor = None if "." in name else load_factors(GASKET_FACTORS).get(name)
     if factor is None or not isinstance(parameters, MachineParameters):
         return {name: None if text in ("null", "~") else text}
-    try:
+    with problems_at("--set", name):
         variation, values = variation_of(parameters, name, factor.keys, {name: text})
-    except InputError as error:
-        raise InputError(Problem("--set", name, p.message) for p in error.problems) from None
     return variation.changes(values[name])
 
 
@@ -261,8 +255,7 @@ def with_drive(parameters: "MachineParameters", drive: str | None) -> "MachinePa
 
     if drive is None or drive == parameters.drive.kind:
         return parameters
-    if drive not in DRIVES:
-        raise input_error(f"no drive '{drive}'{nearest_names(drive, DRIVES)}", where="--drive")
+    check_known(drive, DRIVES, f"no drive '{drive}'", where="--drive")
     joint, others = parameters.drive.joint, dict(parameters.sources)
     if drive == "prescribed":
         return with_value(parameters, "drive", Drive(joint=joint))
@@ -324,8 +317,8 @@ def channels_of(text: str | None, words: tuple[str, ...] = ()) -> dict[str, str]
         word, separator, name = (piece.strip() for piece in part.partition("="))
         if not (separator and name and word):
             raise input_error(f"'{part.strip()}' is not WORD=NAME", where="--channels")
-        if words and word not in words:
-            raise input_error(f"no word '{word}'{nearest_names(word, words)}", where="--channels")
+        if words:
+            check_known(word, words, f"no word '{word}'", where="--channels")
         if word in channels:
             raise input_error(f"'{word}' is there twice", where="--channels")
         channels[word] = name

@@ -6,7 +6,7 @@ import numpy as np
 
 from wm_drake.batch.ledger import key_of
 from wm_drake.batch.remembered import model_version, sources_version
-from wm_drake.errors import input_error, nearest_names
+from wm_drake.errors import check_known
 from wm_drake.model.machine import Machine
 from wm_drake.parameters.free import FreeFile
 from wm_drake.parameters.types import FloatArray
@@ -75,10 +75,7 @@ class Plan:
         Raises:
             InputError: the method is unknown.
         """
-        if self.method not in METHODS:
-            raise input_error(
-                f"no method '{self.method}'{nearest_names(self.method, METHODS)}", key="method"
-            )
+        check_known(self.method, METHODS, f"no method '{self.method}'", key="method")
 
     def spread(self, amplitude: FloatArray) -> FloatArray:
         """Return the standard deviations of the logarithms of measured amplitudes."""

@@ -1,12 +1,8 @@
 """Options of `wm-drake calibrate`, and its declaration."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from wm_drake.studies.study import Options, Study, Task, option
-
-if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
-    from wm_drake.model.machine import Machine
+from wm_drake.studies.study import Options, Study, imported, option
 
 
 class CalibrateOptions(Options):
@@ -64,17 +60,11 @@ class CalibrateOptions(Options):
     )
 
 
-def _begin(options: CalibrateOptions, machine: "Machine") -> Task:
-    from wm_drake.studies.calibration.study import CalibrateTask
-
-    return CalibrateTask(options, machine)
-
-
 CALIBRATE = Study(
     "calibrate",
     "Fit unknown numbers of a machine to measured amplitudes, within bounds and with priors.",
     CalibrateOptions,
-    _begin,
+    imported("wm_drake.studies.calibration.study:CalibrateTask"),
     quick={"starts": 1, "iterations": 3},
     has_cluster=False,
     group="",

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wm_drake.errors import input_error, nearest_names
+from wm_drake.errors import check_known, input_error
 from wm_drake.parameters.free import FreeFile
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.calibration.calibration import Calibration, Plan, calibrate
@@ -233,9 +233,6 @@ def check_held_out(targets: Targets, held_out: Sequence[Sequence[str]]) -> None:
         for name in loads:
             if list(loads).count(name) > 1:
                 raise input_error(f"'{name}' is given twice", key="leave-out")
-            if name not in known:
-                raise input_error(
-                    f"no measured load '{name}'{nearest_names(name, known)}", key="leave-out"
-                )
+            check_known(name, known, f"no measured load '{name}'", key="leave-out")
         if known <= set(loads):
             raise input_error("leaves no load to calibrate with; name fewer loads", key="leave-out")

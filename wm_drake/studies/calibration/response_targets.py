@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from wm_drake.batch import simulate_many
-from wm_drake.errors import InputError, Problem, input_error, nearest_names
+from wm_drake.errors import InputError, Problem, check_known, nearest_names
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import FactorLevels, MachineParameters, at_levels, levels_of, load_factors
@@ -207,25 +207,6 @@ def _problem_of_factor(value: NamedValue) -> str:
     return ""
 
 
-def with_weights(
-    targets: Sequence[ResponseTarget], weights: Mapping[str, float]
-) -> tuple[tuple[ResponseTarget, ...], set[str]]:
-    """Return targets with weights multiplied by factors, and the names that fitted one.
-
-    Args:
-        targets: The targets.
-        weights: Factors by name, one of `ResponseTarget.names`.
-    """
-    used: set[str] = set()
-    result = []
-    for target in targets:
-        names = [name for name in target.names if name in weights]
-        used.update(names)
-        factor = float(np.prod([weights[name] for name in names]))
-        result.append(replace(target, weight=target.weight * factor))
-    return tuple(result), used
-
-
 def with_deviations(
     targets: Sequence[ResponseTarget], deviations: Mapping[str, float]
 ) -> tuple[ResponseTarget, ...]:
@@ -241,20 +222,10 @@ def with_deviations(
     """
     known = {name for target in targets for name in target.names}
     for name in deviations:
-        if name not in known:
-            raise input_error(
-                f"'{name}' is no response of the targets{nearest_names(name, sorted(known))}",
-                key="deviation",
-            )
+        check_known(name, known, f"'{name}' is no response of the targets", key="deviation")
     return tuple(
-        replace(
-            target,
-            deviation=next(
-                (deviations[name] for name in target.names if name in deviations),
-                target.deviation,
-            ),
-        )
-        for target in targets
+        replace(t, deviation=next((deviations[n] for n in t.names if n in deviations), t.deviation))
+        for t in targets
     )
 
 

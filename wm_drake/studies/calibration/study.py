@@ -11,7 +11,7 @@ from typing import Any
 import pandas as pd
 from rich.table import Table
 
-from wm_drake.errors import InputError, input_error
+from wm_drake.errors import InputError, input_error, problems_at
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters, located, machine_yaml
@@ -43,7 +43,7 @@ from wm_drake.studies.calibration.tables import (
     response_table,
 )
 from wm_drake.studies.calibration.targets import AMPLITUDE, Targets, targets_of
-from wm_drake.studies.inputs import existing_file, pairs_of, problems_of_option, with_measured
+from wm_drake.studies.inputs import existing_file, pairs_of, with_measured
 from wm_drake.studies.run import Executor
 from wm_drake.studies.study import Facts, Result, Task
 
@@ -144,7 +144,7 @@ class CalibrateTask(Task):
         deviations = _fractions(options.deviation, "--deviation")
         amplitude = deviations.pop(AMPLITUDE, RELATIVE_DEVIATION)
         targets = _targets(measured, deviations).weighted(_numbers(options.weight, "--weight"))
-        with problems_of_option("--limit"):
+        with problems_at("--limit", ""):
             self.targets = targets.limited(_fractions(options.limit, "--limit"))
         # the calibrated machine names the targets as its measurements
         self.machine = build_machine(measured) if options.targets else machine
@@ -220,7 +220,7 @@ def _targets(parameters: MachineParameters, deviations: Mapping[str, float]) -> 
         ", ".join(Path(name).name for name in parameters.measured),
         measured_responses(parameters),
     )
-    with problems_of_option("--deviation"):
+    with problems_at("--deviation", ""):
         return replace(targets, responses=with_deviations(targets.responses, deviations))
 
 

@@ -6,16 +6,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pandas as pd
 
-from wm_drake.errors import InputError, Problem, input_error, nearest_names
+from wm_drake.errors import InputError, Problem, check_known, input_error, nearest_names
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.measured import NamedValue
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
-from wm_drake.studies.calibration.response_targets import (
-    ResponseTarget,
-    response_targets_of,
-    with_weights,
-)
+from wm_drake.studies.calibration.response_targets import ResponseTarget, response_targets_of
 
 MILLIMETRE = Unit("m", "mm")
 
@@ -48,6 +44,19 @@ class Targets:
         """Number of values that are used."""
         used = sum(target.weight > 0.0 for target in self.responses)
         return int(np.count_nonzero(self.weight)) + used
+
+    @property
+    def names(self) -> list[tuple[str, ...]]:
+        """Names by which limits and weights are given, from one value to many, of each value.
+
+        Amplitudes come first, then the other responses.
+        """
+        amplitudes = [
+            (f"{load}:{sensor}", sensor, load, AMPLITUDE)
+            for load, _ in self.loads
+            for sensor in self.sensors
+        ]
+        return [*amplitudes, *(target.names for target in self.responses)]
 
     @property
     def response_weight(self) -> FloatArray:
@@ -128,16 +137,10 @@ class Targets:
 
         Of several limits that fit a value, the one that fits the fewest counts.
         """
-        amplitudes = [
-            (f"{load}:{sensor}", sensor, load, AMPLITUDE)
-            for load, _ in self.loads
-            for sensor in self.sensors
-        ]
-        names = [*amplitudes, *(target.names for target in self.responses)]
         limit = np.array(
             [
                 next((self.limits[name] for name in fitting if name in self.limits), np.inf)
-                for fitting in names
+                for fitting in self.names
             ]
         )
         return limit[np.concatenate([self.weight.ravel() > 0.0, self._used])]
@@ -169,16 +172,10 @@ class Targets:
         Raises:
             InputError: a name is none of these, or a limit is not above 0.
         """
-        known = [AMPLITUDE, *dict.fromkeys(name for name, _ in self.loads), *self.sensors]
-        known += [f"{load}:{sensor}" for load, _ in self.loads for sensor in self.sensors]
-        known += [name for target in self.responses for name in target.names]
+        known = {name for names in self.names for name in names}
         for name, limit in limits.items():
-            if name not in known:
-                raise input_error(
-                    f"'{name}' is no load, sensor, response or LOAD:NAME"
-                    f"{nearest_names(name, known)}",
-                    key="limit",
-                )
+            message = f"'{name}' is no load, sensor, response or LOAD:NAME"
+            check_known(name, known, message, key="limit")
             if not 0.0 < limit < np.inf:
                 raise input_error(
                     f"{limit:g} is not allowed; must be > 0 and finite", key=f"limit of '{name}'"
@@ -195,32 +192,24 @@ class Targets:
         Raises:
             InputError: a name is none of these, or a factor is below 0.
         """
-        weight = self.weight.copy()
-        responses, used = with_weights(self.responses, weights)
-        known = [*dict.fromkeys(name for name, _ in self.loads), *self.sensors]
-        known += [name for target in self.responses for name in target.names[1:4]]
+        known = {name for names in self.names for name in names} - {AMPLITUDE}
         for key, factor in weights.items():
             if not 0.0 <= factor < np.inf:
                 raise input_error(
                     f"{factor:g} is not allowed; must be >= 0 and finite", key=f"weight of '{key}'"
                 )
-            load, _, sensor = key.rpartition(":")
-            loads = (
-                self.of(load or key)
-                if load or key not in self.sensors
-                else np.ones(len(self.loads), dtype=bool)
-            )
-            sensors = np.array(
-                [name == sensor or (not load and key not in self.sensors) for name in self.sensors]
-            )
-            if not (loads.any() and sensors.any()) and key not in used:
-                raise input_error(
-                    f"'{key}' is no load, sensor, response or LOAD:SENSOR"
-                    f"{nearest_names(key, known)}",
-                    key="weight",
-                )
-            weight[np.ix_(loads, sensors)] *= factor
-        return replace(self, weight=weight, responses=responses)
+            if key not in known:
+                hint = nearest_names(key, [name for name in known if ":" not in name])
+                message = f"'{key}' is no load, sensor, response or LOAD:SENSOR{hint}"
+                raise input_error(message, key="weight")
+        factors = [
+            float(np.prod([weights[name] for name in names if name in weights]))
+            for names in self.names
+        ]
+        of_amplitudes = np.reshape(factors[: self.weight.size], self.weight.shape)
+        pairs = zip(self.responses, factors[self.weight.size :], strict=True)
+        responses = tuple(replace(t, weight=t.weight * factor) for t, factor in pairs)
+        return replace(self, weight=self.weight * of_amplitudes, responses=responses)
 
     def gasket_effects(self, amplitude: FloatArray) -> dict[str, FloatArray]:
         """Return the relative change of amplitudes that the gasket causes.
@@ -269,36 +258,26 @@ def targets_of(
         (str(name), bool(gasket == "yes"))
         for name, gasket in zip(rows["load"], rows["gasket"], strict=True)
     ]
-    problems = [
-        Problem(
-            where, "", f"no load '{name}' in the machine{nearest_names(name, parameters.loads)}"
-        )
+    known = parameters.loads
+    messages = [
+        f"no load '{name}' in the machine{nearest_names(name, known)}"
         for name, _ in loads
-        if name not in parameters.loads
+        if name not in known
     ]
-    problems += [
-        Problem(
-            where, "", f"load '{n}' occurs twice with the same gasket; each case may occur once"
-        )
-        for n, g in set(loads)
-        if loads.count((n, g)) > 1
+    messages += [
+        f"load '{name}' occurs twice with the same gasket; each case may occur once"
+        for name, gasket in set(loads)
+        if loads.count((name, gasket)) > 1
     ]
     amplitude = rows[list(sensors)].to_numpy(dtype=float)
     if not loads:
-        problems.append(
-            Problem(where, "", f"has no row of source '{EXPERIMENT}'; at least one is needed")
-        )
+        messages.append(f"has no row of source '{EXPERIMENT}'; at least one is needed")
     elif not (amplitude > 0.0).all():
-        problems.append(
-            Problem(
-                where,
-                "",
-                "an amplitude is not above 0; the logarithm of its ratio to the computed one must "
-                "exist",
-            )
+        messages.append(
+            "an amplitude is not above 0; the logarithm of its ratio to the computed one must exist"
         )
-    if problems:
-        raise InputError(problems)
+    if messages:
+        raise InputError(Problem(where, "", message) for message in messages)
     return Targets(
         tuple(loads),
         sensors,

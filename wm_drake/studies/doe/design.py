@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from wm_drake.errors import input_error, nearest_names
+from wm_drake.errors import check_known, input_error
 from wm_drake.parameters.csv_files import read_csv, read_header
 from wm_drake.studies.doe.coding import LEVELS, MODELS, Levels, columns, efficiency, level_matrix
 from wm_drake.studies.doe.exchange import d_optimal_levels
@@ -84,10 +84,8 @@ def make_design(
         model: Model to estimate, key of `MODELS`.
         seed: Seed of a D-optimal design.
     """
-    if kind not in DESIGNS:
-        raise input_error(f"no design '{kind}'{nearest_names(kind, DESIGNS)}", key="design")
-    if model not in MODELS:
-        raise input_error(f"no model '{model}'{nearest_names(model, MODELS)}", key="model")
+    check_known(kind, DESIGNS, f"no design '{kind}'", key="design")
+    check_known(model, MODELS, f"no model '{model}'", key="model")
     count, everything = len(factors), 3 ** len(factors)
     if kind == "full" and trials not in (None, everything):
         raise input_error(

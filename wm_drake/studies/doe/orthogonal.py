@@ -9,8 +9,6 @@ cancel in it as in the full factorial. For fewer factors, columns are removed, w
 the strength.
 """
 
-import itertools
-
 import numpy as np
 
 from wm_drake.errors import input_error
@@ -58,17 +56,3 @@ def orthogonal_levels(factors: int, trials: int) -> Levels:
     array = full[~np.any((full.astype(int) + 1) @ CHECKS[: _ROWS[trials]].T % 3, axis=1)]
     levels = array[:, :factors]
     return levels[np.lexsort(levels.T[::-1])]
-
-
-def strength(levels: Levels, most: int = 5) -> int:
-    """Return the strength of an array, but at most `most`.
-
-    The strength is the largest t for which any t factors have all level combinations equally often.
-    """
-    for size in range(1, min(most, levels.shape[1]) + 1):
-        for columns in itertools.combinations(range(levels.shape[1]), size):
-            cells = (levels[:, columns].astype(int) + 1) @ 3 ** np.arange(size)
-            counts = np.bincount(cells, minlength=3**size)
-            if counts.min() != counts.max():
-                return size - 1
-    return min(most, levels.shape[1])

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy import optimize
 
-from wm_drake.errors import input_error, nearest_names
+from wm_drake.errors import check_known
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.fitting.assessment import assess, evaluated
 from wm_drake.studies.fitting.descent import descended
@@ -190,8 +190,7 @@ def identify(
     Raises:
         InputError: There is no such method.
     """
-    if method not in METHODS:
-        raise input_error(f"no method '{method}'{nearest_names(method, METHODS)}", where="--method")
+    check_known(method, METHODS, f"no method '{method}'", where="--method")
     if not problem.unknowns:
         progress(1.0, 0.0)
         return evaluated(problem)

@@ -8,7 +8,7 @@ from typing import Any
 
 import xarray as xr
 
-from wm_drake.errors import InputError, input_error, nearest_names
+from wm_drake.errors import InputError, check_known, input_error, nearest_names, problems_at
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import (
@@ -43,7 +43,7 @@ from wm_drake.studies.gasket.published import Published, published_for
 from wm_drake.studies.gasket.screening import check_degrees_of_freedom, run_screening
 from wm_drake.studies.gasket.study import GasketTrials, Run
 from wm_drake.studies.gasket.surface import surfaces
-from wm_drake.studies.inputs import existing_file, pairs_of, problems_of_option, selected_cases
+from wm_drake.studies.inputs import existing_file, pairs_of, selected_cases
 from wm_drake.studies.run import Executor, machine_text
 from wm_drake.studies.study import Task
 
@@ -60,7 +60,7 @@ class GasketTask(Task):
         check_degrees_of_freedom(self.design)
         self.cases = selected_cases(parameters, options.load, True, options.profile)
         middle = at_levels(parameters, levels, [0] * len(levels))
-        with problems_of_option("--response"):
+        with problems_at("--response", ""):
             self.trials = GasketTrials(middle, levels, self.cases, options.response)
             self.verified = replace(self.trials, loads=self._every_load())
         self.published = self._published()
@@ -156,14 +156,10 @@ class GasketTask(Task):
 def _factors(parameters: MachineParameters, options: GasketOptions) -> tuple[FactorLevels, ...]:
     """Return the levels of the factors that the options select."""
     named, file, treatment = options.factor, options.factors, options.tables
-    if treatment not in TABLES:
-        hint = nearest_names(treatment, TABLES)
-        raise input_error(f"unknown treatment '{treatment}'{hint}", where="--tables")
+    check_known(treatment, TABLES, f"unknown treatment '{treatment}'", where="--tables")
     known = load_factors(GASKET_FACTORS if file is None else existing_file(file, "--factors"))
-    try:
+    with problems_at("--factor"):
         chosen = dict(factor_of_text(text, known) for text in named) if named else known
-    except InputError as error:
-        raise InputError(replace(p, where="--factor") for p in error.problems) from None
     if named and len(chosen) < len(named):
         raise input_error("a factor is given twice", where="--factor")
     try:
@@ -180,21 +176,16 @@ def _setting(parameters: MachineParameters, levels: tuple[FactorLevels, ...], te
     places = {factor.name: 0.0 for factor in levels}
     by_name = {factor.name: factor for factor in levels}
     for name, value in pairs_of(text.split(","), "--check"):
-        if name not in by_name:
-            hint = nearest_names(name, by_name)
-            raise input_error(f"unknown factor '{name}'{hint}", where="--check")
-        try:
+        check_known(name, by_name, f"unknown factor '{name}'", where="--check")
+        with problems_at("--check"):
             places[name] = place_of(parameters, by_name[name], value)
-        except InputError as error:
-            raise InputError(replace(p, where="--check") for p in error.problems) from None
     return Setting(text, tuple(places.values()))
 
 
 def _design(options: GasketOptions, names: tuple[str, ...]) -> Design:
     """Return the design that the options select, for factors with these names."""
     kind, model, trials = options.design, options.model, options.trials
-    if model not in MODELS:
-        raise input_error(f"unknown model '{model}'{nearest_names(model, MODELS)}", where="--model")
+    check_known(model, MODELS, f"unknown model '{model}'", where="--model")
     if kind in DESIGNS:
         return make_design(kind, names, trials=trials, model=model, seed=options.seed)
     if not Path(kind).is_file():

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from wm_drake.errors import InputError, Problem, input_error, nearest_names
+from wm_drake.errors import InputError, Problem, check_known, input_error, nearest_names
 from wm_drake.parameters import DAMPER_LAWS, MeasuredLoop, quantities, read_loops
 from wm_drake.parameters.units import Unit
 from wm_drake.report.terminal import say
@@ -40,11 +40,7 @@ def motions_of(
         rotates: Whether the loops must be of moments over angles.
         driven_mass: Mass at the driven end, whose inertia is taken out of the forces. [kg]
     """
-    if options.method not in METHODS:
-        raise input_error(
-            f"no method '{options.method}'{nearest_names(options.method, METHODS)}",
-            where="--method",
-        )
+    check_known(options.method, METHODS, f"no method '{options.method}'", where="--method")
     cutoff = None
     if options.cutoff is not None:
         cutoff = quantities_of(options.cutoff, Unit("Hz", "Hz"), "--cutoff")[0]

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from wm_drake.errors import input_error, nearest_names
+from wm_drake.errors import check_known, input_error
 from wm_drake.parameters import DAMPER_LAWS, DamperType, ForceTable, TorqueTable
 from wm_drake.parameters.damper_laws import DamperLaw, DamperNumbers, Kind
 from wm_drake.parameters.elements import BushingType, RubberBushingType
@@ -311,9 +311,8 @@ def fields_of_law(law: str, axis: str = "") -> tuple[str, ...]:
         axis: Axis of a bushing; "" for a damper.
     """
     laws: Mapping[str, Any] = BUSHING_LAWS if axis else DAMPER_LAWS
-    if law not in laws:
-        what = "a bushing" if axis else "a damper"
-        raise input_error(f"no law '{law}' of {what}{nearest_names(law, laws)}", where="--law")
+    what = "a bushing" if axis else "a damper"
+    check_known(law, laws, f"no law '{law}' of {what}", where="--law")
     if not axis:
         return DAMPER_LAWS[law].fields
     kinds = list(_bushing_kinds(axis))

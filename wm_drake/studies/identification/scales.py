@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wm_drake.errors import input_error, nearest_names
+from wm_drake.errors import check_known, input_error
 from wm_drake.parameters.damper_laws import Search
 from wm_drake.parameters.units import Unit
 from wm_drake.rigs.measured import MeasuredMotion
@@ -136,10 +136,7 @@ def check_names(
     """
     for option, given in (("--bounds", bounds), ("--fix", fixed)):
         for name in given:
-            if name not in known:
-                raise input_error(
-                    f"unknown number '{name}'{nearest_names(name, known)}", where=option
-                )
-    for name in fixed or {}:
+            check_known(name, known, f"unknown number '{name}'", where=option)
+    for name in fixed:
         if name in bounds:
             raise input_error(f"'{name}' has bounds and is fixed", where="--fix")

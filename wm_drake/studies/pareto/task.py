@@ -3,7 +3,7 @@
 from functools import partial
 from typing import Any
 
-from wm_drake.errors import input_error, nearest_names
+from wm_drake.errors import check_known
 from wm_drake.model.bodies import with_sdf_values
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
@@ -30,9 +30,7 @@ class DesignTask(Task):
 
     def __init__(self, options: DesignOptions, machine: Machine) -> None:
         """Read the design file and the tolerances that it names."""
-        if options.search not in SEARCHES:
-            hint = nearest_names(options.search, SEARCHES)
-            raise input_error(f"no search '{options.search}'{hint}", where="--search")
+        check_known(options.search, SEARCHES, f"no search '{options.search}'", where="--search")
         self.settings = SearchSettings(options.evaluations, options.population, options.seed)
         self.options, self.file = options, design_files.load_design(options.file)
         with problems_of_file(design_files.DESIGNS.path(options.file)):

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import pandas as pd
 from rich.table import Table
 
-from wm_drake.errors import input_error, nearest_names
+from wm_drake.errors import check_known, input_error
 from wm_drake.parameters import Component, quantities
 from wm_drake.parameters.units import Unit
 from wm_drake.report.table import readable
@@ -161,11 +161,7 @@ def _motions(kind: str, bench: Bench, options: RigOptions) -> list[Harmonic]:
                 "[A] does not twist the bushing about its axis; give -f and -a", where="--matrix"
             )
         papers = MATRICES[f"{kind} about" if rotates else kind]
-        if matrix not in papers:
-            raise input_error(
-                f"no matrix '{matrix}' for a {kind}{nearest_names(matrix, papers)}",
-                where="--matrix",
-            )
+        check_known(matrix, papers, f"no matrix '{matrix}' for a {kind}", where="--matrix")
         return list(papers[matrix])
     if not (frequency and amplitude):
         raise input_error(

@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from wm_drake.errors import InputError, Problem, input_error
+from wm_drake.errors import input_error, problems_at
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import (
     Change,
@@ -274,12 +274,8 @@ def unknowns_of(parameters: MachineParameters, texts: Sequence[str]) -> tuple[So
     for text in texts:
         names, _, bounds = (part.strip() for part in text.partition("="))
         keys = [key.strip() for key in names.split(JOIN)]
-        try:
+        with problems_at("--unknown"):
             unknowns.append(sought_of(parameters, keys, bounds))
-        except InputError as error:
-            raise InputError(
-                Problem("--unknown", p.key, p.message) for p in error.problems
-            ) from None
     return tuple(unknowns)
 
 

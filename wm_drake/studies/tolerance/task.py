@@ -1,12 +1,11 @@
 """The task of the tolerance study: options and files checked, and runs."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
 from wm_drake.engines.compiled.step_check import check_step
-from wm_drake.errors import InputError
+from wm_drake.errors import problems_at
 from wm_drake.model.bodies import with_sdf_values
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
@@ -21,12 +20,7 @@ from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.measures.responses import Response, chosen_responses, has_gap, measures_of
 from wm_drake.simulation.steps import checked_step
-from wm_drake.studies.inputs import (
-    existing_file,
-    problems_of_file,
-    problems_of_option,
-    profile_of,
-)
+from wm_drake.studies.inputs import existing_file, problems_of_file, profile_of
 from wm_drake.studies.run import Executor, machine_text
 from wm_drake.studies.study import Task
 from wm_drake.studies.tolerance.options import ToleranceOptions
@@ -57,11 +51,8 @@ class ToleranceTask(Task):
             limits = load_limits(existing_file(options.limits, "--limits"))
         self.machine, self.uncertain = self._uncertain(options, machine)
         self.responses, self.measures = _measures(self.uncertain, options.response)
-        try:
+        with problems_at(str(options.limits)):
             self.limits = limits_of(limits, self.responses)
-        except InputError as error:
-            where = str(options.limits)
-            raise InputError(replace(p, where=where) for p in error.problems) from None
 
     def _uncertain(
         self, options: ToleranceOptions, machine: Machine
@@ -124,7 +115,7 @@ def _measures(
     """Return the responses and the measures of `simulate_many`."""
     parameters, profile = uncertain.parameters, uncertain.case.profile
     listed = list(names) or [n for n in DEFAULT if n != "gap" or has_gap(parameters)]
-    with problems_of_option("--response"):
+    with problems_at("--response", ""):
         chosen = chosen_responses(parameters, profile, listed)
     if names and not any(r.name == "gap" for r in chosen) and has_gap(parameters):
         chosen += chosen_responses(parameters, profile, ["gap"])

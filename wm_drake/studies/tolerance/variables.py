@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from wm_drake.errors import InputError, Problem, input_error, nearest_names
+from wm_drake.errors import InputError, Problem, check_known, input_error, problems_at
 from wm_drake.parameters import (
     Change,
     Load,
@@ -117,12 +117,8 @@ class UncertainMachine:
         """
         cases = []
         for number, values in enumerate(self.joint.values(scores), start=first):
-            try:
+            with problems_at(f"sample {number}"):
                 cases.append(self._case(f"sample {number}", values.tolist()))
-            except InputError as error:
-                raise InputError(
-                    replace(p, where=f"sample {number}") for p in error.problems
-                ) from None
         return cases
 
     def _case(self, name: str, values: Sequence[float]) -> Case:
@@ -377,10 +373,7 @@ def _correlation_factor(tolerances: Tolerances, names: list[str]) -> FloatArray 
     if given is None:
         return None
     for name in given.quantities:
-        if name not in names:
-            raise input_error(
-                f"no quantity '{name}'{nearest_names(name, names)}", key="correlations.quantities"
-            )
+        check_known(name, names, f"no quantity '{name}'", key="correlations.quantities")
     places = [names.index(name) for name in given.quantities]
     matrix = np.eye(len(names))
     matrix[np.ix_(places, places)] = np.array(given.matrix)

@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from wm_drake.engines.compiled.step_check import check_step
-from wm_drake.errors import InputError, input_error
+from wm_drake.errors import InputError, input_error, problems_at
 from wm_drake.model.bodies import with_sdf_values
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
@@ -32,7 +32,7 @@ from wm_drake.simulation.measures.responses import (
     measures_of,
 )
 from wm_drake.simulation.steps import checked_step
-from wm_drake.studies.inputs import problems_of_option, profile_of, selected_cases
+from wm_drake.studies.inputs import profile_of, selected_cases
 from wm_drake.studies.study import Task
 from wm_drake.studies.tolerance.options import ToleranceOptions
 from wm_drake.studies.tolerance.shares import bound_if_none, share_of
@@ -406,7 +406,7 @@ class VerdictTask(Task):
 
 def _length(text: str) -> float:
     """Return a clearance. [m]"""
-    with problems_of_option("--clearance"):
+    with problems_at("--clearance", ""):
         try:
             clearance = MM.number(text)
         except ValueError as error:
