@@ -103,7 +103,6 @@ class Cabinet(Frozen):
         y = sum(foot.y for foot in self.feet.values()) / count
         return tuple(
             sorted(
-                self.feet,
-                key=lambda name: math.atan2(self.feet[name].y - y, self.feet[name].x - x),
+                self.feet, key=lambda name: math.atan2(self.feet[name].y - y, self.feet[name].x - x)
             )
         )

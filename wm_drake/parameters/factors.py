@@ -13,13 +13,7 @@ from wm_drake.parameters.files import read_yaml
 from wm_drake.parameters.keys import with_value, with_values
 from wm_drake.parameters.machine import MachineParameters
 from wm_drake.parameters.problems import problems_of
-from wm_drake.parameters.variation import (
-    Number,
-    Value,
-    number_at,
-    owned_twice,
-    range_of,
-)
+from wm_drake.parameters.variation import Number, Value, number_at, owned_twice, range_of
 
 GASKET_FACTORS = Path(__file__).parents[1] / "data" / "gasket_factors.yaml"
 """File with the factors of [B] section 4."""

@@ -27,13 +27,7 @@ from wm_drake.parameters.keys import is_index, quantities, source_of
 from wm_drake.parameters.machine import MachineParameters
 from wm_drake.parameters.problems import problems_of
 from wm_drake.parameters.spin import Load, SpinProfile
-from wm_drake.parameters.text_files import (
-    DATA,
-    ShippedFiles,
-    check_regular,
-    is_file,
-    read_text,
-)
+from wm_drake.parameters.text_files import DATA, ShippedFiles, check_regular, is_file, read_text
 
 MACHINES_FOLDER = DATA / "machines"
 CYCLES_FOLDER = DATA / "cycles"

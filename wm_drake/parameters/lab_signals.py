@@ -7,13 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from wm_drake.errors import input_error
-from wm_drake.parameters.lab_files import (
-    Channel,
-    chosen,
-    csv_channels,
-    is_lab_file,
-    read_channels,
-)
+from wm_drake.parameters.lab_files import Channel, chosen, csv_channels, is_lab_file, read_channels
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit, factor_of
 

@@ -59,9 +59,7 @@ class MeasuredLoop:
 
 
 def read_loop(
-    path: Path,
-    units: tuple[str, str, str] | None = None,
-    channels: Mapping[str, str] | None = None,
+    path: Path, units: tuple[str, str, str] | None = None, channels: Mapping[str, str] | None = None
 ) -> MeasuredLoop:
     """Read a measured loop.
 

@@ -57,11 +57,7 @@ def bushing_reactions(position, rate, packed, axis):  # type: ignore[no-untyped-
 
 
 def harmonic_loads(
-    bench: BushingBench,
-    motion: Harmonic,
-    phase: FloatArray,
-    position: FloatArray,
-    rate: FloatArray,
+    bench: BushingBench, motion: Harmonic, phase: FloatArray, position: FloatArray, rate: FloatArray
 ) -> FloatArray:
     """Return force or moment at the driven end of a bushing under steady harmonic motion (n,).
 

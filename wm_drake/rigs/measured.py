@@ -43,7 +43,6 @@ class MeasuredMotion:
     """A measured test with the motion that drives the law.
 
     Attributes:
-        loop: The recorded test.
         position, rate: Displacement or angle of the driven end from its zero, and its rate, at the
             samples (n,). [m, m/s; rad, rad/s]
         baseline: Columns (n, 1 or 2): offset of an instrument and, where two periods or more
@@ -131,7 +130,6 @@ def measured_motion(loop: MeasuredLoop, cutoff: float | None = None) -> Measured
     recorded: a cubic smoothing spline interpolates and differentiates it, and its own zero counts.
 
     Args:
-        loop: The recorded test.
         cutoff: Frequency at which the smoothing of a recorded motion halves it; None to choose it
             by generalised cross-validation. With a cutoff, every motion is taken as recorded. [Hz]
 

@@ -390,11 +390,7 @@ def execute(order: Order) -> tuple[Result, Facts, tuple[str, ...]]:
         order.command,
         options.model_dump(mode="json"),
     )
-    with (
-        _figures_in(order.run.figures),
-        _notices_once(),
-        _executor(order, run) as executor,
-    ):
+    with _figures_in(order.run.figures), _notices_once(), _executor(order, run) as executor:
         result = task.run(executor)
         error = executor.step_error()
         if executor.ledger is not None:

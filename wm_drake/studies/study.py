@@ -25,7 +25,6 @@ import pkgutil
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -222,11 +221,17 @@ class Result(ABC):
             for name, table in self.tables().items()
         )
 
+    def texts(self) -> Mapping[str, str]:
+        """Return other files of text, such as machines, by the names of the files."""
+        return {}
+
     def write(self, folder: Path) -> None:
-        """Write the tables as CSV; a study that writes other files too extends this."""
+        """Write the tables as CSV, and `texts`; a study that writes other files extends this."""
         for name, table in self.tables().items():
             digits = self.float_formats.get(name, self.float_format)
             table.to_csv(folder / f"{name}.csv", index=False, float_format=digits)
+        for name, text in self.texts().items():
+            (folder / name).write_text(text, encoding="utf-8")
 
     def warnings(self) -> Sequence[str]:
         """Return warnings of the result for the terminal."""
@@ -260,15 +265,7 @@ def imported(place: str) -> "Callable[..., Any]":
     Args:
         place: Module and name, such as "wm_drake.studies.drive.study:DriveTask".
     """
-    return partial(_call, place)
-
-
-def _call(place: str, *arguments: Any) -> Any:
-    return pkgutil.resolve_name(place)(*arguments)
-
-
-def _unchanged(parameters: "MachineParameters", _: Any) -> "MachineParameters":
-    return parameters
+    return lambda *arguments: pkgutil.resolve_name(place)(*arguments)
 
 
 @dataclass(frozen=True)
@@ -299,7 +296,7 @@ class Study:
     begin: "Callable[..., Task]"
     quick: Mapping[str, Any] = field(default_factory=dict)
     has_runs: bool = True
-    adapt: "Callable[[MachineParameters, Any], MachineParameters]" = _unchanged
+    adapt: "Callable[[MachineParameters, Any], MachineParameters]" = lambda machine, _: machine
     has_cluster: bool = True
     group: str = "study"
     has_machine: bool = True

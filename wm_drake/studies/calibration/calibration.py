@@ -48,7 +48,6 @@ class Plan:
         method: Name of a method, key of `METHODS`.
         starts: Number of starts. The first is the one in the free file; the others are drawn at
             random around it.
-        seed: Seed of the random numbers.
         iterations: Limit of iterations from each start; number of hops for basin hopping. 0 for the
             default of the method.
         deviation: Relative standard deviation of an amplitude.
@@ -158,22 +157,12 @@ def calibration_problem(values: StoredValues, plan: Plan) -> PriorProblem:
     """
     parameter_map, targets = values.evaluation.parameter_map, values.evaluation.targets
     spread = plan.spread(targets.amplitude)
+    m = parameter_map
+    columns = np.stack([m.lower, m.upper, np.clip(m.start, m.lower, m.upper), *m.prior])
     unknowns = tuple(
-        Unknown(
-            name,
-            lower,
-            upper,
-            start=min(max(start, lower), upper),
-            prior=(float(parameter_map.expected[k]), float(parameter_map.deviation[k])),
-        )
-        for k, (name, lower, upper, start) in enumerate(
-            zip(
-                parameter_map.names,
-                parameter_map.lower.tolist(),
-                parameter_map.upper.tolist(),
-                parameter_map.start.tolist(),
-                strict=True,
-            )
+        Unknown(name, lower, upper, start=start, prior=(expected, deviation))
+        for name, (lower, upper, start, expected, deviation) in zip(
+            m.names, columns.T.tolist(), strict=True
         )
     )
 
@@ -201,10 +190,7 @@ def costs_at(problem: PriorProblem, point: FloatArray, targets: Targets) -> tupl
 
 
 def _solution(
-    number: int,
-    search: Search[PriorProblem],
-    coordinates: FloatArray,
-    values: StoredValues,
+    number: int, search: Search[PriorProblem], coordinates: FloatArray, values: StoredValues
 ) -> Solution:
     """Return the end of a search as a solution."""
     problem, targets = search.problem, values.evaluation.targets

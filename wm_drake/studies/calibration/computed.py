@@ -46,7 +46,6 @@ class Evaluation:
     """Function that computes values at points.
 
     Attributes:
-        machine: A built machine.
         parameter_map: Map from points to machines.
         targets: Targets; they say which cases are run.
         workers: Number of threads; None for the number of cores.
@@ -183,7 +182,6 @@ class Runner:
     """Machine, ledger and threads with which points are evaluated.
 
     Attributes:
-        machine: A built machine.
         ledger: The open ledger of this calibration.
         workers: Number of threads; None for the number of cores.
         report: Called with the number of the search, the number of points it has evaluated and its

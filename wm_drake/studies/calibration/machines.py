@@ -17,7 +17,6 @@ def solved_machine(solution: Solution, number: int = 0) -> MachineParameters:
     "assumption: " followed by the known quantities that enter.
 
     Args:
-        solution: The solution.
         number: Number of the solution, for the name of the machine; 0 keeps the name.
     """
     parameter_map, all_texts = solution.parameter_map, fit_texts(solution)

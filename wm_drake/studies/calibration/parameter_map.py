@@ -54,7 +54,6 @@ class KnownRatio:
     """What is known of the ratio of one free quantity to a weighted sum of others.
 
     Attributes:
-        name: Name of the relation.
         quantity: Index of the quantity.
         factors: (quantities) weights of the sum.
         ratio, deviation: Expected or largest ratio, and its standard deviation.
@@ -209,11 +208,7 @@ def _known_ratios(free: FreeFile) -> Iterator[KnownRatio]:
         assert pair is not None  # the file was checked
         factors = np.array([relation.to[n].values[0] if n in relation.to else 0.0 for n in names])
         yield KnownRatio(
-            name,
-            names.index(relation.quantity),
-            factors,
-            *pair.pair,
-            relation.at_most is not None,
+            name, names.index(relation.quantity), factors, *pair.pair, relation.at_most is not None
         )
 
 

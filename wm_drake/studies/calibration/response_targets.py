@@ -47,11 +47,9 @@ class ResponseTarget:
     """A value that a response of the machine should have.
 
     Attributes:
-        load: Name of the load.
         gasket: Whether the machine has its gasket.
         of_design: Whether the value belongs to a design of gasket factors: its mean, the effect of
             a factor or the contribution of one. Otherwise it belongs to the machine itself.
-        response: The response.
         value: The value. [unit for reading of the response; % for a contribution]
         weight: Weight of its squared residual; 0 if it is not used.
         deviation: Standard deviation, as a fraction of the value, of the mean for an effect, or of
@@ -127,7 +125,6 @@ def response_targets_of(
     """Return the targets for values from files.
 
     Args:
-        parameters: The machine.
         values: Named values from `wm_drake.parameters.measured_responses`.
 
     Raises:
@@ -213,7 +210,6 @@ def with_deviations(
     """Return targets with other relative standard deviations.
 
     Args:
-        targets: The targets.
         deviations: Relative deviations by name, one of `ResponseTarget.names`. Where several names
             fit, the one that fits the fewest targets counts.
 
@@ -234,7 +230,6 @@ class ComputedResponses:
     """Function that computes the responses of machines for targets.
 
     Attributes:
-        machine: The built machine.
         targets: The targets; they say which cases are run.
         workers: Number of threads; None for the number of cores.
     """

@@ -47,7 +47,6 @@ class Solution:
     Attributes:
         parameter_map: Map from the free quantities to the machine.
         targets: Targets of the search.
-        start: Number of the start.
         point: (n) values of the free quantities, in SI units.
         amplitude: (case, sensor) computed amplitudes. [m]
         responses: (response) other computed responses. [unit for reading]

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import pandas as pd
 from rich.table import Table
@@ -55,6 +55,7 @@ class CalibrateResult(Result):
     calibration: Calibration
     predictions: Sequence[Prediction] = ()
     fewer: Sequence[Simpler] = ()
+    float_formats: ClassVar[Mapping[str, str]] = {"amplitudes": "%.4f"}
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """Return quantities, amplitudes, and, if there are any, other responses and fewer fits."""
@@ -66,14 +67,12 @@ class CalibrateResult(Result):
             shown["responses"] = response_table(self.calibration)
         return shown | ({"fewer": fewer_table(self.fewer)} if self.fewer else {})
 
-    def write(self, folder: Path) -> None:
-        """Write the machine of each solution and the tables."""
-        for number, solution in enumerate(self.calibration.solutions, start=1):
-            text = machine_yaml(solved_machine(solution, number))
-            (folder / f"machine_{number}.yaml").write_text(text, encoding="utf-8")
-        for name, table in self.tables().items():
-            digits = "%.4f" if name == "amplitudes" else self.float_format
-            table.to_csv(folder / f"{name}.csv", index=False, float_format=digits)
+    def texts(self) -> dict[str, str]:
+        """Return the machine of each solution."""
+        return {
+            f"machine_{number}.yaml": machine_yaml(solved_machine(solution, number))
+            for number, solution in enumerate(self.calibration.solutions, start=1)
+        }
 
     def as_json(self) -> dict[str, Any]:
         """Return the result for JSON."""
@@ -150,12 +149,7 @@ class CalibrateTask(Task):
         self.machine = build_machine(measured) if options.targets else machine
         resolution = 1e-3 * options.resolution
         self.plan = Plan(
-            options.method,
-            options.starts,
-            options.seed,
-            options.iterations,
-            amplitude,
-            resolution,
+            options.method, options.starts, options.seed, options.iterations, amplitude, resolution
         )
         self.free = load_free(existing_file(options.free, "--free"))
         self.plan.check()

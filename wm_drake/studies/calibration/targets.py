@@ -243,7 +243,6 @@ def targets_of(
     """Return the targets in a table of measured amplitudes, and those that are no amplitudes.
 
     Args:
-        parameters: The machine.
         table: Table from `measured_amplitudes`, in mm. Only rows of source "experiment" are used.
         where: Names of the files, for messages.
         responses: Values from `measured_responses`, of any source.

@@ -30,7 +30,6 @@ def d_optimal_levels(factors: int, trials: int, model: str, seed: int) -> Levels
         (1 + d_j) (1 - d_i) + d_ij^2,   d_ij = x_i' (X'X)^-1 x_j,   d_i = d_ii.
 
     Args:
-        factors: Number of factors.
         trials: Number of trials: at least the number of columns of the model, fewer than the grid
             has.
         model: Key of `MODELS`.

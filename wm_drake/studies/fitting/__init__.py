@@ -4,14 +4,13 @@ Enters: a `Problem`: unknowns with bounds and priors, and a function from points
 `FitProblem` compares with measurements, a `PriorProblem` weighs data against priors, a
 `NormProblem` adds norms of groups. Leaves: a `Fit` or an `Optimum`. Searches: `methods` (least
 squares, evolution), `surfaces`, `kinks` (coarse differences, hops, CMA-ES) and `grid` (grids,
-simplex). Assessment: `assessment`, `profile`, `posterior`, `jackknife`, `cross_validation`. `page`
-has what the pages of fits share.
+simplex). Assessment: `assessment`, `profile`, `posterior`, `jackknife`. `page` has what pages of
+fits share.
 May import: `parameters`, `report` and `errors`; no machine and no engine.
 """
 
-from wm_drake.studies.fitting.assessment import assess, evaluated
-from wm_drake.studies.fitting.cross_validation import left_out_errors
-from wm_drake.studies.fitting.fit import Direction, Estimate, Fit, TestError
+from wm_drake.studies.fitting.assessment import assess, evaluated, left_out_errors
+from wm_drake.studies.fitting.fit import Direction, Estimate, Fit, TestError, Verdict, verdict_of
 from wm_drake.studies.fitting.methods import METHODS, evolution, identify, least_squares, refined
 from wm_drake.studies.fitting.problem import (
     Evaluate,
@@ -23,7 +22,6 @@ from wm_drake.studies.fitting.problem import (
     rmse,
 )
 from wm_drake.studies.fitting.surfaces import response_surface
-from wm_drake.studies.fitting.verdict import Verdict, verdict_of
 
 __all__ = [
     "METHODS",

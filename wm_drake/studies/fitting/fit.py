@@ -1,12 +1,24 @@
 """Result of an identification."""
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.fitting.problem import FitProblem
+
+Verdict: TypeAlias = Literal["good", "fair", "poor"]
+
+GOOD, FAIR = 0.05, 0.15
+"""Largest lack of fit of a good and of a fair fit, as a part of the measured values."""
+
+
+def verdict_of(missed: float) -> Verdict:
+    """Return the verdict on a model that misses a part of the measured values."""
+    if missed <= GOOD:
+        return "good"
+    return "fair" if missed <= FAIR else "poor"
 
 
 @dataclass(frozen=True)
@@ -14,7 +26,6 @@ class TestError:
     """Error of one test, as in [A] Tables 2, 4, 5, 7.
 
     Attributes:
-        name: Name of the test.
         rmse: In the unit of the test.
         normalised: RMSE by the largest measured value.
     """
@@ -31,7 +42,6 @@ class Estimate:
     """Estimate of one unknown.
 
     Attributes:
-        name: Name of the unknown.
         value: Where the search ended. [SI]
         lower, upper: 95 % confidence interval within the bounds; NaN if the value is at a bound or
             not determined. [SI]
@@ -67,7 +77,6 @@ class SearchLog:
     """Course of a search.
 
     Attributes:
-        method, seed: Of the search.
         evaluations: Points at which the model was evaluated.
         history: Least cost after each round.
         notes: Remarks on the search, for the reader.
@@ -85,7 +94,6 @@ class Fit:
     """Result of an identification; the same for every method.
 
     Attributes:
-        problem: The problem.
         log: Course of the search.
         estimates: One for each unknown.
         rmse: Over all values of all tests, scaled as in the problem.

@@ -27,14 +27,12 @@ class Round:
         points: Its new points. [SI]
         values: Cost at these points.
         best: The best point so far. [SI]
-        best_value: Cost at the best point.
         spacing: Distance of neighbouring points, as a part of the region.
     """
 
     points: FloatArray
     values: FloatArray
     best: FloatArray
-    best_value: float
     spacing: float
 
 
@@ -70,7 +68,7 @@ def grid_search(problem: Problem, mesh: float) -> tuple[Optimum, tuple[Round, ..
         centre = np.array(best) if is_better else centre
         best_value = known[tuple(map(float, centre))]
         points, best_point = problem.points_at(new), problem.points_at(centre)
-        rounds.append(Round(points, values, best_point, best_value, spacing))
+        rounds.append(Round(points, values, best_point, spacing))
         if not is_better:
             if spacing <= mesh:
                 break
@@ -95,16 +93,12 @@ def simplex_search(problem: Problem, stop: float) -> Optimum:
             and the corners by less than 0.1 % of the region.
     """
     search, size = Search(problem), len(problem.unknowns)
+    simplex = np.vstack([np.full(size, 0.4), 0.4 + 0.25 * np.eye(size)])
     end = minimize(
         lambda point: float(search.costs(point[None])[0]),
         np.full(size, 0.5),
         method="Nelder-Mead",
         bounds=[(0.0, 1.0)] * size,
-        options={"fatol": stop, "xatol": 1e-3, "initial_simplex": _simplex(size)},
+        options={"fatol": stop, "xatol": 1e-3, "initial_simplex": simplex},
     )
     return Optimum(end.x, float(end.fun), int(end.nfev))
-
-
-def _simplex(size: int) -> FloatArray:
-    """Return a start simplex near the middle of the region, with edges of a quarter of its size."""
-    return np.vstack([np.full(size, 0.4), 0.4 + 0.25 * np.eye(size)])

@@ -49,7 +49,6 @@ def jackknife_interval(problem: NormProblem, best: FloatArray) -> Interval | Non
     """Return the confidence interval of an optimum.
 
     Args:
-        problem: The problem.
         best: The optimum (p,). [SI]
 
     Returns:

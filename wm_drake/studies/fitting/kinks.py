@@ -50,12 +50,6 @@ def start_number(
 
     Start 0 is that of the problem. Each other start is the best of some points that are drawn
     around it.
-
-    Args:
-        search: The search.
-        number: Number of the start.
-        seed: Seed of the random numbers.
-        draws: Number of points that are drawn.
     """
     begin = search.clipped(search.problem.start)
     if number == 0:
@@ -74,11 +68,8 @@ def best_near(
     """Return the best of some points that are drawn around a point.
 
     Args:
-        search: The search.
         point: (p,) centre of the normal distribution.
         spread: Standard deviation of each coordinate.
-        generator: Source of random numbers.
-        draws: Number of points that are drawn.
     """
     points = search.clipped(point + generator.normal(0.0, spread, (draws, len(point))))
     return np.asarray(points[int(np.argmin(search.costs(points)))])
@@ -109,7 +100,6 @@ def least_squares_search(
     difference step reduces the cost.
 
     Args:
-        search: The search.
         start: (p,) point where it starts.
         iterations: Limit of iterations.
         seed: Not used, because the method has no random part.
@@ -153,10 +143,8 @@ def basin_hopping_search(
     Doye, J. Phys. Chem. A 101, 5111 (1997)]. Only a lower cost is accepted.
 
     Args:
-        search: The search.
         start: (p,) point where it starts.
         iterations: Number of hops.
-        seed: Seed of the random numbers.
     """
     before = search.evaluations
     generator = np.random.default_rng(seed)
@@ -179,10 +167,8 @@ def evolution_search(
     distance.
 
     Args:
-        search: The search.
         start: (p,) point where it starts.
         iterations: Limit of generations.
-        seed: Seed of the random numbers.
     """
     before = search.evaluations
     options = {

@@ -12,13 +12,13 @@ from scipy import optimize
 from wm_drake.errors import check_known
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.fitting.assessment import assess, evaluated
-from wm_drake.studies.fitting.descent import descended
 from wm_drake.studies.fitting.fit import Fit
 from wm_drake.studies.fitting.problem import FitProblem, Progress
 from wm_drake.studies.fitting.search import (
     Optimum,
     Search,
     agreeing,
+    descended,
     scattered,
     silent,
     underway,
@@ -45,8 +45,6 @@ def least_squares(
     The starts are the problem's start and the best of many scattered points.
 
     Args:
-        problem: The problem.
-        seed: Seed of the scattered points.
         starts: Searches at most.
         screened: Points that are evaluated (a power of two), of which the best become starts.
         progress: Called after every step.
@@ -86,8 +84,6 @@ def evolution(
     best points of two generations come to the same least RMSE.
 
     Args:
-        problem: The problem.
-        seed: Seed of the evolution.
         population: Members for each unknown.
         generations: Generations at most.
         progress: Called after every generation.

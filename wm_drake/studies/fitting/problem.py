@@ -97,9 +97,6 @@ class Problem(ABC):
     A search moves in coordinates. The coordinate of an unknown (or of its logarithm) goes from 0 at
     the lower to 1 at the upper bound. That of an unknown with a prior is its distance from the
     expected value in standard deviations.
-
-    Attributes:
-        unknowns: The unknowns.
     """
 
     unknowns: tuple[Unknown, ...]
@@ -231,7 +228,6 @@ class NormProblem(Problem):
     """Problem of the sum of the 2-norms of the residuals of some groups, as [B] Eq. (2), (3).
 
     Attributes:
-        unknowns: The unknowns.
         evaluate: Points (k, p), in SI -> residuals (k, n); NaN where the model fails.
         curves: Group and columns of each measured curve; curves of a group follow each other.
     """
@@ -260,7 +256,6 @@ class Measurement:
     """Measured values of one test.
 
     Attributes:
-        name: Name of the test.
         values: Measured values (n,). [any unit, the model's]
         baseline: Columns (n, q) that the instrument may have added in unknown amounts, such as an
             offset or a drift; the best amount of each is taken out of every residual. None for an

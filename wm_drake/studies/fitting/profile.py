@@ -14,8 +14,8 @@ import numpy as np
 from scipy.optimize import brentq
 
 from wm_drake.parameters.types import FloatArray
-from wm_drake.studies.fitting.descent import descended
 from wm_drake.studies.fitting.problem import FitProblem
+from wm_drake.studies.fitting.search import descended
 
 MOST_STEPS = 12
 """Most steps of a search with one unknown held."""
@@ -29,7 +29,6 @@ class Profile:
     """Least sum of squares over one unknown.
 
     Attributes:
-        problem: The problem.
         point: Where the search ended (p,), in coordinates.
         unknown: Index of the unknown.
         free: Indices of the unknowns that are not at a bound.
@@ -58,22 +57,11 @@ class Profile:
             error = self._least_rmse(place)
             return float(np.sqrt(max(error**2 * count - least, 0.0)) - np.sqrt(rise))
 
-        whole, bound = self.point.copy(), 0.0 if side < 0 else 1.0
-        whole[self.unknown] = (
-            bound
-            if excess(bound) <= 0.0
-            else float(
-                brentq(
-                    excess,
-                    bound,
-                    self.point[self.unknown],
-                    xtol=NEAR,
-                    rtol=NEAR,
-                    maxiter=12,
-                    disp=False,
-                )
-            )
-        )
+        whole, end = self.point.copy(), 0.0 if side < 0 else 1.0
+        if excess(end) > 0.0:
+            limits = {"xtol": NEAR, "rtol": NEAR, "maxiter": 12, "disp": False}
+            end = float(brentq(excess, end, self.point[self.unknown], **limits))
+        whole[self.unknown] = end
         return float(self.problem.points_at(whole)[self.unknown])
 
     def _least_rmse(self, place: float) -> float:

@@ -1,10 +1,11 @@
-"""Shared by all methods of search: count of evaluations, scattered points, end of a search."""
+"""Shared by all methods of search: count of evaluations, starts, least squares from one point."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Generic, TypeVar
+from typing import Generic, TypeAlias, TypeVar
 
 import numpy as np
+from scipy import optimize
 from scipy.stats import qmc
 
 from wm_drake.parameters.types import FloatArray
@@ -47,7 +48,6 @@ class Search(Generic[AnyProblem]):
     """A problem with a count of its evaluations and the best point so far.
 
     Attributes:
-        problem: The problem.
         report: Called after each evaluation with the points evaluated and the least cost so far.
         evaluations: Points evaluated so far.
         best: Coordinates of the best point so far; None before the first finite cost.
@@ -109,3 +109,57 @@ def agreeing(problem: FitProblem, ends: list[Optimum]) -> int:
     errors = np.array([end.cost for end in ends])
     floor = 1e-9 * float(rmse(np.concatenate([m.values / m.scale for m in problem.measurements])))
     return int(np.sum(errors <= (1.0 + SAME_END) * errors.min() + floor))
+
+
+STEP = 1e-5
+"""Step of one-sided differences during a search, in ranges."""
+
+ResidualFunction: TypeAlias = Callable[[FloatArray], FloatArray]
+"""Points in coordinates (k, p) -> residuals (k, n)."""
+
+
+def descended(
+    evaluate: ResidualFunction,
+    begin: FloatArray,
+    step_done: Callable[[float], None] = lambda fraction: None,
+    most: int = 60,
+) -> Optimum:
+    """Return where least squares from one point within the unit cube end, with the RMSE as cost.
+
+    The method is scipy's trust-region reflective one.
+
+    Args:
+        evaluate: Residuals of the problem.
+        begin: First point (p,), moved a little into the cube.
+        step_done: Called before every step with the fraction of a usual search.
+        most: Evaluations of the residuals at most, without those of derivatives.
+    """
+    steps = 0
+    last: tuple[FloatArray, FloatArray] = (np.full(len(begin), np.nan), np.empty(0))
+
+    def residuals(z: FloatArray) -> FloatArray:
+        nonlocal last
+        last = (z.copy(), np.asarray(evaluate(z[None])[0]))
+        return last[1]
+
+    def jacobian(z: FloatArray) -> FloatArray:
+        nonlocal steps
+        steps += 1
+        step_done(min(1.0, steps / 25))
+        here = last[1] if np.array_equal(z, last[0]) else evaluate(z[None])[0]
+        sign = np.where(z > 0.5, -1.0, 1.0)
+        moved = evaluate(z + np.diag(STEP * sign))
+        return np.asarray(((moved - here) / (STEP * sign)[:, None]).T)
+
+    end = optimize.least_squares(
+        residuals,
+        np.clip(begin, 1e-4, 1.0 - 1e-4),
+        jacobian,
+        bounds=(0.0, 1.0),
+        x_scale=1.0,
+        ftol=1e-9,
+        xtol=1e-9,
+        gtol=1e-14,
+        max_nfev=most,
+    )
+    return Optimum(end.x, float(rmse(end.fun)))

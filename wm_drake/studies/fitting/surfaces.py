@@ -54,8 +54,6 @@ def response_surface(
     rim, and shrinks where it stays.
 
     Args:
-        problem: The problem.
-        seed: Seed of the scattered points.
         screened: Points (a power of two) that are evaluated beside the problem's start; the best is
             the first centre.
         rounds: Rounds at most.

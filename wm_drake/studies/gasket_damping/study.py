@@ -85,7 +85,6 @@ class Damping(Result):
         parameters: Machine before the search.
         grid: Optimum of the grid search, its point in SI. [N s/m, N m s/rad]
         scipy: Optimum of the bounded search of scipy, its point in SI. [N s/m, N m s/rad]
-        measured: The measured displacements.
         rounds: The grids of the grid search.
         truth: True values of a virtual experiment; None for a measurement. [N s/m, N m s/rad]
         at_best: Computed record at the better optimum, by load.
@@ -249,10 +248,7 @@ def planted_damping(parameters: MachineParameters, linear: str, torsional: str) 
 
 
 def identify_damping(
-    machine: Machine,
-    measured: Measured,
-    truth: FloatArray | None = None,
-    mesh: float = MESH,
+    machine: Machine, measured: Measured, truth: FloatArray | None = None, mesh: float = MESH
 ) -> Damping:
     """Identify C_L and C_T from measured displacements.
 
@@ -324,7 +320,6 @@ class EnvelopeModel:
     The envelopes are those of the analytic signal (`smooth_envelope`).
 
     Attributes:
-        machine: The built machine.
         profile: Its profile, cut after the window.
         curves: Load and columns of each curve: upper and lower envelope of a sensor with a load.
     """

@@ -43,12 +43,24 @@ STRONG = 6.0
 
 
 @dataclass(frozen=True, eq=False)
-class LawResult:
+class FittedLaw:
+    """A law with its fit to the tests, and the judgement of the fit."""
+
+    model: ComponentModel
+    fit: Fit
+    judgement: Judgement
+
+    @property
+    def law(self) -> str:
+        """Name of the law."""
+        return self.model.law
+
+
+@dataclass(frozen=True, eq=False)
+class LawResult(FittedLaw):
     """One of the rival laws.
 
     Attributes:
-        fit: Its fit to the tests.
-        judgement: Judgement of the fit.
         left_out: RMSE of each test, predicted from the others (m,); NaN with less than
             `FEWEST_LEFT_OUT` tests. [N; N m]
         criterion: Bayesian information criterion with the number of independent samples; smaller is
@@ -57,10 +69,6 @@ class LawResult:
         predicted: Judgement of the prediction.
     """
 
-    law: str
-    model: ComponentModel
-    fit: Fit
-    judgement: Judgement
     left_out: FloatArray
     criterion: float
     prediction: Fit | None
@@ -226,7 +234,6 @@ class TestedLoop:
     """A measured loop beside those of the laws.
 
     Attributes:
-        measured: The loop.
         kind: "fitted" or "blind".
         index: Its number among the tests of its kind.
         fits: Fit, or blind evaluation, of all tests of its kind, by law.
@@ -283,7 +290,6 @@ def compare_laws(
     """Fit rival laws to the same tests and predict others.
 
     Args:
-        method, seed: Of the search.
         progress: Called with a law and the fraction done of its search.
     """
     fits = {
@@ -313,7 +319,6 @@ def fit_law(
     """Fit a law; from many tests, search with a part of them and then refine with all.
 
     Args:
-        model: The law with its unknowns.
         motions: Tests, sorted by their motion.
         method, seed, progress: As for `identify`.
     """
@@ -346,7 +351,6 @@ def _result(model: ComponentModel, fit: Fit, tests: SplitTests, independent: flo
         )
     prediction = _prediction(model, fit, tests.predicted) if tests.predicted else None
     return LawResult(
-        model.law,
         model,
         fit,
         judge(fit, motions),

@@ -12,13 +12,9 @@ from wm_drake.report.sections import Section, SectionedPage
 from wm_drake.report.table import Column, Group, Row, Table, line, table_of
 from wm_drake.studies.fitting.page import estimates_frame, values_table
 from wm_drake.studies.identification.comparison import Comparison
-from wm_drake.studies.identification.figures import (
-    evenly_chosen,
-    motion_text,
-    rival_loops_figure,
-)
+from wm_drake.studies.identification.figures import evenly_chosen, motion_text, rival_loops_figure
 from wm_drake.studies.identification.judgement import per_cent
-from wm_drake.studies.identification.page import fixed_numbers, frequency_of, motion_sentences
+from wm_drake.studies.identification.page import frequency_of, motion_sentences
 from wm_drake.studies.rig.units import units_of
 from wm_drake.studies.study import Facts
 
@@ -103,7 +99,7 @@ def parameters_by_law(comparison: Comparison) -> pd.DataFrame:
     """Return value, interval and bounds of each unknown of each law, for reading."""
     parts = []
     for r in comparison.results:
-        table = estimates_frame(r.fit, fixed_numbers(r.model.fixed))
+        table = estimates_frame(r.fit, r.model.fixed_numbers)
         table.insert(0, "law", r.law)
         parts.append(table)
     return pd.concat(parts, ignore_index=True)
@@ -178,7 +174,7 @@ def laws_shown(comparison: Comparison) -> Table:
 
 
 def _estimates(comparison: Comparison) -> Table:
-    tables = {r.law: values_table(r.fit, fixed_numbers(r.model.fixed)) for r in comparison.order}
+    tables = {r.law: values_table(r.fit, r.model.fixed_numbers) for r in comparison.order}
     groups = tuple(
         Group(law, tuple(Row((group.heading, *group.rows[0].cells)) for group in table.groups))
         for law, table in tables.items()

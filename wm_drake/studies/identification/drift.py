@@ -64,11 +64,7 @@ def coulomb_fits(
         slider_damping: Its c2. [N s/m]
         progress: Called after each test with the number of tests that are done.
     """
-    known = {
-        "friction_force": f_max,
-        "transition_velocity": 0.0,
-        "slider_damping": slider_damping,
-    }
+    known = {"friction_force": f_max, "transition_velocity": 0.0, "slider_damping": slider_damping}
     printed, rows = printed_table(), []
     for measured in motions:
         model = damper_model("stv_sponge", [measured], Given(BOUNDS, known))

@@ -1,5 +1,6 @@
 """Identified numbers as a file: a fragment that changes one component, or a component file."""
 
+import io
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -21,7 +22,7 @@ from wm_drake.parameters.units import Unit
 from wm_drake.studies.components import Target
 from wm_drake.studies.fitting import Fit
 from wm_drake.studies.fitting.page import unit_text
-from wm_drake.studies.identification.models import ComponentModel, unit_of_field
+from wm_drake.studies.identification.models import ComponentModel
 from wm_drake.studies.identification.scales import ANGLE, FORCE, LENGTH, TORQUE
 
 FIXED = "fixed by the user in an identification"
@@ -94,11 +95,10 @@ def written_fragment(entries: dict[str, Any], head: Sequence[str], destination: 
             *parents, name = path.split(".")
             _node(body, parents)[name] = YAML(typ="safe").load(text)
         _node(body, target.key.split(".")).update(_leaving(entries, target.component))
-    dumped: list[str] = []
-    yaml = YAML()
+    stream, yaml = io.StringIO(), YAML()
     yaml.width = 4096
-    yaml.dump(body, _Lines(dumped))
-    return "\n".join(lines) + "\n" + "".join(dumped)
+    yaml.dump(body, stream)
+    return "\n".join(lines) + "\n" + stream.getvalue()
 
 
 def _of_fragment(changes: Mapping[str, str]) -> tuple[dict[str, str], list[str]]:
@@ -116,20 +116,12 @@ def _node(tree: Any, path: Sequence[str]) -> Any:
     return tree
 
 
-class _Lines:
-    def __init__(self, lines: list[str]) -> None:
-        self._lines = lines
-
-    def write(self, part: str | bytes) -> None:
-        """Keep a part of the text."""
-        self._lines.append(part if isinstance(part, str) else part.decode())
-
-
 def _entries(fit: Fit, model: ComponentModel) -> tuple[dict[str, Any], list[str]]:
     """Return values with sources by field, and comments on what is missing."""
     fields = model.fields(fit.values)
     estimates = {estimate.name: estimate for estimate in fit.estimates}
     units = {unknown.name: unknown.unit for unknown in fit.problem.unknowns}
+    units |= {name: unit for name, _, unit in model.fixed_numbers}
     entries: dict[str, Any] = {"law": fields["law"]} if "law" in fields else {}
     comments = []
     source = f"identified from {len(fit.tests)} loops, normalised RMSE {_normalised(fit):.3g}"
@@ -145,7 +137,7 @@ def _entries(fit: Fit, model: ComponentModel) -> tuple[dict[str, Any], list[str]
                     "the table's rises there are not to be trusted."
                 )
         elif name in model.fixed:
-            entries[name] = {"value": _text(value, _unit_of_fixed(name), 10), "source": FIXED}
+            entries[name] = {"value": _text(value, units[name], 10), "source": FIXED}
         elif name in estimates:
             estimate, unit = estimates[name], units[name]
             if not estimate.determined:
@@ -183,12 +175,6 @@ def _text(value: float, unit: Unit, digits: int) -> str:
 
 def _normalised(fit: Fit) -> float:
     return float(np.sqrt(np.mean([test.normalised**2 for test in fit.tests])))
-
-
-def _unit_of_fixed(name: str) -> Unit:
-    unit = unit_of_field(name)
-    assert unit is not None, name  # the model has checked the names
-    return unit
 
 
 def _fixed_rises(table: str, model: ComponentModel) -> str:

@@ -28,12 +28,11 @@ from wm_drake.studies.identification.scales import (
     ALONG,
     FORCE,
     TORQUE,
+    MonotoneCurve,
     check_names,
     scale_of,
     unknowns_of,
-    with_bounds,
 )
-from wm_drake.studies.identification.tables import OddTable, TwoSidedTable
 
 KNOTS = 5
 """Knots of a table on each side of zero."""
@@ -56,7 +55,6 @@ class ComponentModel:
     """A law of a component whose numbers are unknown.
 
     Attributes:
-        law: Name of the law.
         unknowns: Numbers that are searched.
         fields: Function of a point (p,) that returns the component's fields, in SI; a table as a
             mapping.
@@ -69,6 +67,12 @@ class ComponentModel:
     fields: Callable[[FloatArray], dict[str, Any]]
     bench: Callable[[FloatArray], Bench]
     fixed: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def fixed_numbers(self) -> list[tuple[str, float, Unit]]:
+        """Name, SI value and unit of each fixed number."""
+        units = {name: unit_of_field(name) for name in self.fixed}
+        return [(name, self.fixed[name], unit) for name, unit in units.items() if unit]
 
 
 @dataclass(frozen=True)
@@ -112,14 +116,17 @@ def damper_model(
     registered, scale = DAMPER_LAWS[law], scale_of(motions)
     if sponge_mass > 0.0:
         _check_sponge_mass(registered, motions)
-    tables = tuple(OddTable(curve, scale, given.knots) for curve in registered.curves)
+    tables = tuple(
+        MonotoneCurve(curve, scale, given.knots, is_odd=True) for curve in registered.curves
+    )
+    rises = [rise for table in tables for rise in table.unknowns]
     numbers_of_law = [name for name in names if name not in registered.curves]
-    check_names([*numbers_of_law, *_rises(tables)], given.bounds, given.fixed)
+    check_names([*numbers_of_law, *(rise.name for rise in rises)], given.bounds, given.fixed)
     bounded = {name: ends for name, ends in given.bounds.items() if name in numbers_of_law}
     searched = {**registered.unknowns, **bounded}
     known = {**(kept or {}), **given.fixed}
     numbers = unknowns_of(searched, _units(registered), scale, given.bounds, known)
-    unknowns = (*numbers, *_free_rises(tables, given))
+    unknowns = (*numbers, *_free_rises(rises, given))
     fields = _Fields({"law": law, **known}, unknowns, tables)
     return ComponentModel(
         law,
@@ -185,10 +192,7 @@ class TestedAxis:
 
 
 def bushing_model(
-    law: str,
-    motions: Sequence[MeasuredMotion],
-    tested: TestedAxis,
-    given: Given | None = None,
+    law: str, motions: Sequence[MeasuredMotion], tested: TestedAxis, given: Given | None = None
 ) -> ComponentModel:
     """Return one axis of a bushing with unknown numbers.
 
@@ -208,20 +212,23 @@ def bushing_model(
         )
     scale, kinds = scale_of(motions, tested.arm), _bushing_kinds(axis)
     stiffness = next(iter(kinds))
-    tables = (TwoSidedTable(stiffness, scale, given.knots, about),) if law == "table" else ()
+    tables: tuple[MonotoneCurve, ...] = ()
+    if law == "table":
+        tables = (MonotoneCurve(stiffness, scale, given.knots, about=about),)
     if set(BUSHING_LAWS[law]) & _OF_RUBBER and not isinstance(base, RubberBushingType):
         raise input_error(
             f"law '{law}' has branches of rubber, which a bushing of a damper's tubes cannot have; "
             "allowed are voigt, table and voigt_havsin",
             where="--law",
         )
+    rises = [rise for table in tables for rise in table.unknowns]
     names = list(kinds)
     searched = {names[k]: kinds[names[k]] for k in BUSHING_LAWS[law]}
-    check_names([*searched, *_rises(tables)], given.bounds, given.fixed)
+    check_names([*searched, *(rise.name for rise in rises)], given.bounds, given.fixed)
     kinds_of_units = ABOUT if about else ALONG
     units = {name: kinds_of_units[kind] for name, kind in searched.items()}
     numbers = unknowns_of(searched, units, scale, given.bounds, given.fixed)
-    unknowns = (*numbers, *_free_rises(tables, given))
+    unknowns = (*numbers, *_free_rises(rises, given))
     known = {name: value for name, value in given.fixed.items() if name in searched}
     _check_fixed(base, {unknown.name: unknown.upper for unknown in numbers} | known)
     fields = _Fields(given.fixed, unknowns, tables)
@@ -277,7 +284,7 @@ class _Fields:
 
     known: Mapping[str, Any]
     unknowns: tuple[Unknown, ...]
-    tables: tuple[OddTable | TwoSidedTable, ...]
+    tables: tuple[MonotoneCurve, ...]
 
     def __call__(self, point: FloatArray) -> dict[str, Any]:
         named = {u.name: float(value) for u, value in zip(self.unknowns, point, strict=True)}
@@ -289,18 +296,13 @@ class _Fields:
         return {**fields, **curves}
 
 
-def _free_rises(tables: tuple[OddTable | TwoSidedTable, ...], given: Given) -> tuple[Unknown, ...]:
+def _free_rises(rises: Sequence[Unknown], given: Given) -> tuple[Unknown, ...]:
     """Return the rises of tables that are not fixed, with the user's bounds where there are any."""
-    rises = with_bounds(_unknown_rises(tables), given.bounds)
-    return tuple(rise for rise in rises if rise.name not in given.fixed)
-
-
-def _unknown_rises(tables: tuple[OddTable | TwoSidedTable, ...]) -> tuple[Unknown, ...]:
-    return tuple(unknown for table in tables for unknown in table.unknowns)
-
-
-def _rises(tables: tuple[OddTable | TwoSidedTable, ...]) -> list[str]:
-    return [unknown.name for unknown in _unknown_rises(tables)]
+    return tuple(
+        Unknown(rise.name, *given.bounds.get(rise.name, (rise.lower, rise.upper)), rise.unit)
+        for rise in rises
+        if rise.name not in given.fixed
+    )
 
 
 def fields_of_law(law: str, axis: str = "") -> tuple[str, ...]:

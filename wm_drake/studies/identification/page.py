@@ -1,6 +1,6 @@
 """Page and tables of a fit to the loops of a component."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +12,6 @@ from wm_drake.report.table import Column, Table, table_of
 from wm_drake.rigs.measured import HarmonicMotion, MeasuredMotion, RecordedMotion
 from wm_drake.studies.fitting import Fit
 from wm_drake.studies.fitting.page import (
-    FixedNumber,
     correlations_table,
     history_picture,
     search_facts,
@@ -21,7 +20,6 @@ from wm_drake.studies.fitting.page import (
 )
 from wm_drake.studies.identification.figures import loops_figure, motion_text
 from wm_drake.studies.identification.judgement import Judgement, per_cent
-from wm_drake.studies.identification.models import unit_of_field
 from wm_drake.studies.rig.units import units_of
 from wm_drake.studies.study import Facts
 
@@ -54,7 +52,7 @@ def identify_page(result: "FitResult", facts: Facts) -> str:
     if fit.log.history:
         unit = units_of(motions[0].loop.rotates).force_unit
         sections.append(Section("search", "Search", (history_picture(fit, unit),)))
-    values = values_table(fit, fixed_numbers(result.model.fixed))
+    values = values_table(fit, result.model.fixed_numbers)
     undetermined = " ".join(undetermined_sentences(fit))
     sections += [
         Section("values", "Values", tables=(values,), text=undetermined),
@@ -72,12 +70,6 @@ def identify_page(result: "FitResult", facts: Facts) -> str:
         about=f"Fit to {len(motions)} measured loop{'s' if len(motions) > 1 else ''}.",
         method=METHOD,
     ).html()
-
-
-def fixed_numbers(fixed: Mapping[str, float]) -> list[FixedNumber]:
-    """Return fixed numbers with their units."""
-    units = {name: unit_of_field(name) for name in fixed}
-    return [(name, fixed[name], unit) for name, unit in units.items() if unit]
 
 
 def errors_table(fit: Fit, motions: Sequence[MeasuredMotion], judgement: Judgement) -> pd.DataFrame:

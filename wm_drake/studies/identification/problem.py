@@ -10,12 +10,7 @@ from wm_drake.rigs.forces import damper_tensions, harmonic_loads
 from wm_drake.rigs.heavy_sponge import steady_tensions
 from wm_drake.rigs.integration import PHASE
 from wm_drake.rigs.loops import steady_deformations
-from wm_drake.rigs.measured import (
-    HarmonicMotion,
-    MeasuredMotion,
-    RecordedMotion,
-    sines_of,
-)
+from wm_drake.rigs.measured import HarmonicMotion, MeasuredMotion, RecordedMotion, sines_of
 from wm_drake.rigs.recorded import recorded_forces
 from wm_drake.studies.fitting import FitProblem, Measurement
 from wm_drake.studies.identification.models import ComponentModel

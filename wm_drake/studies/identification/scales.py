@@ -7,6 +7,7 @@ import numpy as np
 
 from wm_drake.errors import check_known, input_error
 from wm_drake.parameters.damper_laws import Search
+from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.rigs.measured import MeasuredMotion
 from wm_drake.studies.fitting import Unknown
@@ -54,7 +55,6 @@ class Scale:
     force: float
     stiffness: float
     damping: float
-    slowest: float
     fastest: float
     stroke: float
 
@@ -89,7 +89,7 @@ def scale_of(motions: Sequence[MeasuredMotion], arm: float = 0.0) -> Scale:
         damping.append(size / speed)
         speeds.append(speed)
         strokes.append(stroke)
-    return Scale(max(force), max(stiffness), max(damping), min(speeds), max(speeds), max(strokes))
+    return Scale(max(force), max(stiffness), max(damping), max(speeds), max(strokes))
 
 
 def unknowns_of(
@@ -117,17 +117,8 @@ def unknowns_of(
     return tuple(unknowns)
 
 
-def with_bounds(
-    unknowns: tuple[Unknown, ...], bounds: Mapping[str, tuple[float, float]]
-) -> tuple[Unknown, ...]:
-    """Return the unknowns with the user's bounds where there are some."""
-    return tuple(Unknown(u.name, *bounds.get(u.name, (u.lower, u.upper)), u.unit) for u in unknowns)
-
-
 def check_names(
-    known: list[str],
-    bounds: Mapping[str, tuple[float, float]],
-    fixed: Mapping[str, float],
+    known: list[str], bounds: Mapping[str, tuple[float, float]], fixed: Mapping[str, float]
 ) -> None:
     """Check names of fields.
 
@@ -140,3 +131,39 @@ def check_names(
     for name in fixed:
         if name in bounds:
             raise input_error(f"'{name}' has bounds and is fixed", where="--fix")
+
+
+class MonotoneCurve:
+    """Curve of force over displacement through zero that never falls.
+
+    The rises between its knots are the unknowns: of each side, or the same of both sides.
+    """
+
+    def __init__(
+        self, name: str, scale: Scale, knots: int, *, about: bool = False, is_odd: bool = False
+    ) -> None:
+        """Space the knots of each side equally up to the stroke.
+
+        Args:
+            name: Field of the component.
+            scale: Scale of the measured loops.
+            knots: Knots of each side.
+            about: Whether it is a curve of torque over angle.
+            is_odd: Whether both sides have the same rises.
+        """
+        self.name = name
+        self.position = scale.stroke * np.arange(1, knots + 1) / knots
+        self._names = ("angle", "torque") if about else ("displacement", "force")
+        unit = TORQUE if about else FORCE
+        self.unknowns = tuple(
+            Unknown(f"{name}.rise_{side}{k + 1}", 0.0, scale.force, unit)
+            for side in (("",) if is_odd else ("plus_", "minus_"))
+            for k in range(knots)
+        )
+
+    def curve(self, rises: FloatArray) -> dict[str, tuple[float, ...]]:
+        """Return the table of these rises, as a mapping."""
+        sides = np.cumsum(np.reshape(rises, (-1, len(self.position))), axis=1)
+        plus, minus = sides[0], sides[-1]
+        ends = ((*(-self.position[::-1]), 0.0, *self.position), (*(-minus[::-1]), 0.0, *plus))
+        return dict(zip(self._names, ends, strict=True))

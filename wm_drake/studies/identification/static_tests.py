@@ -43,19 +43,18 @@ class StaticResult(Result):
         """Return the curves."""
         return {"static": static_table(list(self.curves.values()))}
 
-    def write(self, folder: Path) -> None:
-        """Write the tables for a machine, the curves, and their measures as JSON."""
-        super().write(folder)
+    def texts(self) -> dict[str, str]:
+        """Return the tables for a machine, and the measures of the curves as JSON."""
         entries = {
             field_of(axis): table_entry(curve.table(self.knots), _source(curve))
             for axes, curve in self.curves.items()
             for axis in axes
         }
         head = ["Tables from quasi-static tests: mean of loading and unloading."]
-        text = written_fragment(entries, head, self.destination)
-        (folder / "identified.yaml").write_text(text, encoding="utf-8")
-        text = json.dumps(self.as_json(), indent=1)
-        (folder / "static.json").write_text(text, encoding="utf-8")
+        return {
+            "identified.yaml": written_fragment(entries, head, self.destination),
+            "static.json": json.dumps(self.as_json(), indent=1),
+        }
 
     def as_json(self) -> dict[str, Any]:
         """Return the measures of each axis for JSON, in SI."""

@@ -1,8 +1,10 @@
 """The commands `identify damper`, `bushing` and `gasket`: fits, their judgement and comparison."""
 
 import json
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -12,11 +14,12 @@ from rich.table import Table
 from wm_drake.errors import input_error
 from wm_drake.parameters.units import Unit
 from wm_drake.rigs.measured import MeasuredMotion
-from wm_drake.studies.components import Target, axes_of, existing_files, mass_of, target_of
+from wm_drake.studies.components import axes_of, existing_files, mass_of, target_of
 from wm_drake.studies.fitting import Fit
 from wm_drake.studies.fitting.page import estimates_frame, undetermined_sentences, values_table
 from wm_drake.studies.identification.comparison import (
     Comparison,
+    FittedLaw,
     SplitTests,
     check_blind,
     compare_laws,
@@ -44,130 +47,141 @@ from wm_drake.studies.identification.options import AxisFitOptions, DamperFitOpt
 from wm_drake.studies.identification.page import (
     errors_table,
     fitted_loops,
-    fixed_numbers,
     identify_page,
     motion_sentences,
 )
 from wm_drake.studies.inputs import pairs_of, quantities_of
 from wm_drake.studies.rig.units import units_of
 from wm_drake.studies.run import Executor
-from wm_drake.studies.study import Facts, Result, Task
+from wm_drake.studies.study import Result, Task
 
 
 @dataclass(frozen=True)
-class FittedComponent:
-    """A component and how its numbers are written.
+class FittedComponent(Destination):
+    """A component whose numbers are identified, and where they go.
 
     Attributes:
         title: Component, for headings.
-        target: The component as it was.
-        changes: Other numbers of the machine that the user changed: text by key path.
         copies: Fields of each law that get the value of another field.
-        out: Folder of the results, from which a file names the machine.
     """
 
-    title: str
-    target: Target
-    changes: Mapping[str, str]
+    title: str = ""
     copies: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
-    out: Path = Path()
 
-    def write(self, path: Path, fit: Fit, model: ComponentModel, remarks: Sequence[str]) -> None:
-        """Write the identified numbers as a machine or component file, if they are complete."""
-        if self.missing(path.name, fit, model):
-            return
-        destination = Destination(self.target, self.out, self.changes)
-        text = fragment(fit, model, destination, self.copies.get(model.law), remarks)
-        path.write_text(text, encoding="utf-8")
-
-    def missing(self, name: str, fit: Fit, model: ComponentModel) -> list[str]:
+    def missing(self, name: str, law: FittedLaw) -> list[str]:
         """Return a sentence that names the numbers that a file lacks, so that it is not written."""
-        missing = missing_numbers(fit, model, self.target.component)
+        missing = missing_numbers(law.fit, law.model, self.target.component)
         if not missing:
             return []
         return [
             f"{name} is not written: the data do not determine {', '.join(missing)}, which the law "
-            f"{model.law} needs and {self.target.component.name} did not have; give a value with "
-            "--fix."
+            f"{law.model.law} needs and {self.target.component.name} did not have; give a value "
+            "with --fix."
         ]
 
 
-class SampledResult(Result):
-    """Result whose CSV files have all digits, but for the samples of loops."""
+@dataclass(frozen=True)
+class IdentifiedResult(Result):
+    """Result with identified numbers. CSV files have all digits, but for the samples of loops."""
 
+    component: FittedComponent
     float_format: ClassVar[str | None] = None
     float_formats: ClassVar[Mapping[str, str]] = {"loops": "%.7g"}
 
+    @property
+    @abstractmethod
+    def laws(self) -> Mapping[str, FittedLaw]:
+        """Fitted laws by the names of the machine or component files with their numbers."""
+
+    @abstractmethod
+    def fit_as_dict(self) -> dict[str, Any]:
+        """Return the fit or the comparison for JSON, in SI."""
+
+    @property
+    def missing(self) -> list[str]:
+        """Sentences on files that are not written, because their numbers are not complete."""
+        return [
+            text for name in self.laws for text in self.component.missing(name, self.laws[name])
+        ]
+
+    def texts(self) -> dict[str, str]:
+        """Return the identified numbers of each law, and the fit as JSON."""
+        files = {}
+        for name, law in self.laws.items():
+            if not self.component.missing(name, law):
+                copies = self.component.copies.get(law.model.law)
+                remarks = law.judgement.sentences
+                files[name] = fragment(law.fit, law.model, self.component, copies, remarks)
+        return files | {"fit.json": json.dumps(self.fit_as_dict(), indent=1)}
+
 
 @dataclass(frozen=True)
-class FitResult(SampledResult):
+class FitResult(IdentifiedResult):
     """Fit of one law."""
 
-    component: FittedComponent
     model: ComponentModel
     fit: Fit
     motions: Sequence[MeasuredMotion]
+    page = identify_page
 
     @property
     def title(self) -> str:
         """Component and law, for headings."""
         return f"{self.component.title}, law {self.model.law}"
 
-    @property
+    @cached_property
     def judgement(self) -> Judgement:
         """Judgement of the fit."""
         return judge(self.fit, self.motions)
 
+    @property
+    def laws(self) -> dict[str, FittedLaw]:
+        """The fitted law."""
+        return {"identified.yaml": FittedLaw(self.model, self.fit, self.judgement)}
+
     def tables(self) -> dict[str, pd.DataFrame]:
         """Return the values, the error of each test, and all samples."""
         return {
-            "parameters": estimates_frame(self.fit, fixed_numbers(self.model.fixed)),
+            "parameters": estimates_frame(self.fit, self.model.fixed_numbers),
             "errors": errors_table(self.fit, self.motions, self.judgement),
             "loops": fitted_loops(self.fit, self.motions),
         }
 
-    def write(self, folder: Path) -> None:
-        """Write tables, identified numbers, and the fit as JSON."""
-        super().write(folder)
-        path = folder / "identified.yaml"
-        self.component.write(path, self.fit, self.model, self.judgement.sentences)
-        text = json.dumps(self._fit_as_dict(), indent=1)
-        (folder / "fit.json").write_text(text, encoding="utf-8")
-
-    def _fit_as_dict(self) -> dict[str, Any]:
+    def fit_as_dict(self) -> dict[str, Any]:
+        """Return the fit for JSON, in SI."""
         return {
             **self.fit.as_dict(),
             "fixed": {
                 name: {"value": value, "unit": unit.si}
-                for name, value, unit in fixed_numbers(self.model.fixed)
+                for name, value, unit in self.model.fixed_numbers
             },
             "judgement": self.judgement.as_dict(),
         }
 
     def as_json(self) -> dict[str, Any]:
         """Return the fit for JSON, in SI."""
-        return {"component": self.title, **self._fit_as_dict()}
+        return {"component": self.title, **self.fit_as_dict()}
 
     def terminal(self) -> list[Table | str]:
         """Return the judgement, the values, and remarks."""
         fit, unit = self.fit, units_of(self.motions[0].loop.rotates).force_unit
         title = f"{self.title}: RMSE {fit.rmse:.4g} {unit} by {fit.log.method}"
-        table = values_table(fit, fixed_numbers(self.model.fixed)).terminal(title)
-        remarks = [*undetermined_sentences(fit), *fit.log.notes]
-        remarks += self.component.missing("identified.yaml", fit, self.model)
+        table = values_table(fit, self.model.fixed_numbers).terminal(title)
+        remarks = [*undetermined_sentences(fit), *fit.log.notes, *self.missing]
         return [*self.judgement.sentences, *motion_sentences(self.motions), table, *remarks]
-
-    def page(self, facts: Facts) -> str:
-        """Return the page."""
-        return identify_page(self, facts)
 
 
 @dataclass(frozen=True)
-class ComparisonResult(SampledResult):
+class ComparisonResult(IdentifiedResult):
     """Several laws that were fitted to the same tests."""
 
-    component: FittedComponent
     comparison: Comparison
+    page = comparison_page
+
+    @property
+    def laws(self) -> dict[str, FittedLaw]:
+        """All laws."""
+        return {f"identified_{law.law}.yaml": law for law in self.comparison.results}
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """Return measures, values and errors of the laws, and all samples."""
@@ -178,27 +192,13 @@ class ComparisonResult(SampledResult):
             "loops": loops_by_law(self.comparison),
         }
 
-    def write(self, folder: Path) -> None:
-        """Write tables, the identified numbers of each law, and the comparison as JSON."""
-        super().write(folder)
-        for law in self.comparison.results:
-            path = folder / f"identified_{law.law}.yaml"
-            self.component.write(path, law.fit, law.model, law.judgement.sentences)
-        text = json.dumps(self.comparison.as_dict(), indent=1)
-        (folder / "fit.json").write_text(text, encoding="utf-8")
-
-    @property
-    def missing(self) -> list[str]:
-        """Sentences on files that are not written."""
-        return [
-            sentence
-            for law in self.comparison.results
-            for sentence in self.component.missing(f"identified_{law.law}.yaml", law.fit, law.model)
-        ]
+    def fit_as_dict(self) -> dict[str, Any]:
+        """Return the comparison for JSON, in SI."""
+        return self.comparison.as_dict()
 
     def as_json(self) -> dict[str, Any]:
         """Return the comparison for JSON, in SI."""
-        return {"component": self.component.title, **self.comparison.as_dict()}
+        return {"component": self.component.title, **self.fit_as_dict()}
 
     def terminal(self) -> list[Table | str]:
         """Return what the data say about the laws, their measures, and remarks."""
@@ -207,10 +207,6 @@ class ComparisonResult(SampledResult):
         motions = (*comparison.motions, *comparison.validation)
         sentences = (*comparison.sentences, *motion_sentences(motions))
         return [*sentences, table, *bounds_sentences(comparison), *self.missing]
-
-    def page(self, facts: Facts) -> str:
-        """Return the page."""
-        return comparison_page(self, facts)
 
 
 class FitTask(Task):
@@ -280,7 +276,7 @@ class DamperFitTask(FitTask):
         parts += [f"sponge of {1e3 * sponge:g} g"] if sponge else []
         parts += [f"less the inertia of {driven:g} kg at the driven end"] if driven else []
         changes = dict(pairs_of(options.sets, "--set"))
-        self.component = FittedComponent(", ".join(parts), target, changes)
+        self.component = FittedComponent(target, Path(), changes, ", ".join(parts))
         self._read_validation(driven)
 
 
@@ -304,9 +300,10 @@ class AxisFitTask(FitTask):
             law: bushing_model(law, self.motions, tested, numbers) for law, numbers in given.items()
         }
         self.component = FittedComponent(
-            f"{target.component.name}, {options.axis.replace('_', ' ')}",
             target,
+            Path(),
             dict(pairs_of(options.sets, "--set")),
+            f"{target.component.name}, {options.axis.replace('_', ' ')}",
             {law: _copies(model, axes) for law, model in self.models.items()},
         )
         self._read_validation()

@@ -4,7 +4,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import pandas as pd
 from rich.table import Table
@@ -30,7 +30,7 @@ from wm_drake.studies.identification.options import Table2Options
 from wm_drake.studies.identification.table2_page import fits_shown, sentences, table2_page
 from wm_drake.studies.inputs import quantities_of
 from wm_drake.studies.run import Executor
-from wm_drake.studies.study import Facts, Result, Task
+from wm_drake.studies.study import Result, Task
 
 FREQUENCIES = (1.0, 3.0, 6.67, 10.0)
 """Frequencies of [C] Table 1. [Hz]"""
@@ -52,7 +52,7 @@ class Table2Result(Result):
     fits: pd.DataFrame
     trend: FrequencyTrend
     source: str
-    float_format: ClassVar[str] = "%.6g"
+    page = table2_page
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """Return the fits."""
@@ -66,10 +66,6 @@ class Table2Result(Result):
     def terminal(self) -> list[Table | str]:
         """Return the fits, and what they and the trend say."""
         return [fits_shown(self.fits).terminal(self.source), *sentences(self.fits, self.trend)]
-
-    def page(self, facts: Facts) -> str:
-        """Return the page."""
-        return table2_page(self, facts)
 
 
 class Table2Task(Task):

@@ -8,14 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wm_drake.parameters import machine_yaml
-from wm_drake.report.formatting import (
-    MISSING,
-    MM_PER_M,
-    listed,
-    plain,
-    significant,
-    with_interval,
-)
+from wm_drake.report.formatting import MISSING, MM_PER_M, listed, plain, significant, with_interval
 from wm_drake.report.page import Picture, as_json, fragment, picture
 from wm_drake.report.sections import Section, SectionedPage
 from wm_drake.report.table import Table, Value, line
@@ -30,6 +23,7 @@ from wm_drake.studies.pareto.figures import (
     history_figure,
     pairs_of,
 )
+from wm_drake.studies.pareto.problem import Goal
 from wm_drake.studies.pareto.robust import FRESH, Promise
 from wm_drake.studies.pareto.study import COMPROMISE, ParetoFront
 from wm_drake.studies.study import Facts, Result
@@ -64,16 +58,16 @@ class DesignResult(Result):
         }
         return frames | ({"robust": tables.promises_table(self.promises)} if self.promises else {})
 
-    def write(self, folder: Path) -> None:
-        """Write the tables, and the machine files of chosen designs."""
-        super().write(folder)
+    def texts(self) -> dict[str, str]:
+        """Return the machine files of chosen designs."""
+        files = {}
         for name, number in self.front.chosen.items():
             machine = self.front.machine(number)
             about = f"Design '{name}' of a design study of machine {machine.name}"
             changes = {"name": f"{machine.name}, {name}", "about": about, "measured": ()}
             copy = machine.model_copy(update=changes)
-            path = folder / tables.machine_file_name(name)
-            path.write_text(machine_yaml(copy), encoding="utf-8")
+            files[tables.machine_file_name(name)] = machine_yaml(copy)
+        return files
 
     def as_json(self) -> dict[str, Any]:
         """Return the result for JSON."""
@@ -153,7 +147,7 @@ def summary(
     for goal, value, nominal in zip(
         designs.objectives, front.objectives[number], front.nominal_objectives, strict=True
     ):
-        unit = goal.unit.shown.replace("*", " ")
+        unit = _unit(goal)
         parts.append(
             f"{goal.given.quantity} {_text(value)} {unit} in place of {_text(nominal)} {unit}"
         )
@@ -184,6 +178,10 @@ def _growth(shown: Envelopes, number: int) -> str:
 
 def _text(value: float) -> str:
     return significant(float(value)) if np.isfinite(value) else MISSING
+
+
+def _unit(goal: Goal) -> str:
+    return goal.unit.shown.replace("*", " ")
 
 
 def _front(front: ParetoFront) -> Picture:
@@ -220,23 +218,22 @@ def _picked(front: ParetoFront, shown: Envelopes) -> dict[str, Any]:
 
 def _rows(front: ParetoFront) -> list[list[tuple[str, str, str]]]:
     """Return kind, name and value of each number of each design, for the picked one."""
-    designs, entries = front.designs, []
-    for number, design in enumerate(front.search.designs):
+    entries = []
+    for number in range(len(front.objectives)):
+        objectives, constraints = front.goals(number)
         rows = [
-            ("objective", g.given.quantity, f"{_text(v)} {g.unit.shown.replace('*', ' ')}")
-            for g, v in zip(designs.objectives, front.objectives[number], strict=True)
+            ("objective", g.given.quantity, f"{_text(value)} {_unit(g)}") for g, value in objectives
         ]
-        for goal, value in zip(designs.constraints, front.constraints[number], strict=True):
-            unit = goal.unit.shown.replace("*", " ")
+        for goal, value in constraints:
+            unit = _unit(goal)
             side = "at most" if goal.is_small_better else "at least"
-            margin = abs(float(value) - goal.limit)
+            margin = abs(value - goal.limit)
             text = f"{_text(value)} {unit}, {side} {_text(goal.limit)} {unit}"
             text += f": margin {_text(margin)} {unit}"
             rows.append(("constraint", goal.given.quantity, text))
-        for dimension, place in zip(designs.dimensions, design, strict=True):
-            value, unit = dimension.shown(float(place))
-            shown = value if isinstance(value, str) else _text(value)
-            rows.append(("variable", dimension.name, f"{shown} {unit.replace('*', ' ')}"))
+        for name, place, unit in front.variables(number):
+            shown = place if isinstance(place, str) else _text(place)
+            rows.append(("variable", name, f"{shown} {unit.replace('*', ' ')}"))
         entries.append(rows)
     return entries
 
@@ -259,8 +256,7 @@ def _promises(kept: Sequence[Promise]) -> Table:
     """Return what the chosen designs of a robust front promised and keep on fresh samples."""
     groups = []
     for p in kept:
-        unit = p.goal.unit.shown.replace("*", " ")
-        cells: list[Value] = [f"{p.goal.given.quantity}, {p.goal.given.over}", unit]
+        cells: list[Value] = [f"{p.goal.given.quantity}, {p.goal.given.over}", _unit(p.goal)]
         cells += [with_interval(v.value, v.lower, v.upper) for v in (p.promised, p.fresh)]
         groups.append(line(p.design, [*cells, p.is_kept], "alarm" if p.is_kept is False else ""))
     caption = (

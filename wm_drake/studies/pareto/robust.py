@@ -24,7 +24,6 @@ class Promise:
     """One goal of a chosen design, as the search saw it and on fresh samples.
 
     Attributes:
-        design: Name of the chosen design.
         promised: Its value over the samples of the search, with the 95 % interval. [unit for
             reading]
         fresh: The same over fresh samples.

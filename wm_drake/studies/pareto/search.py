@@ -88,7 +88,6 @@ class SearchSettings:
     Attributes:
         evaluations: Number of designs to evaluate, at least one population.
         population: Designs of a generation.
-        seed: Of all random numbers.
     """
 
     evaluations: int = 2000

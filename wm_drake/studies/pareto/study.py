@@ -23,8 +23,7 @@ class ParetoFront:
 
     Attributes:
         objectives, constraints: Values of the front, in units for reading. (n, m) and (n, k)
-        nominal_objectives, nominal_constraints: Those of the machine itself, moved into the
-            bounds. (m,) and (k,)
+        nominal_objectives: Those of the machine itself, moved into the bounds. (m,)
         chosen: Numbers of chosen designs, from 0, by name: best Dx, ..., compromise.
     """
 
@@ -33,12 +32,22 @@ class ParetoFront:
     objectives: FloatArray
     constraints: FloatArray
     nominal_objectives: FloatArray
-    nominal_constraints: FloatArray
     chosen: dict[str, int]
 
     def machine(self, number: int) -> MachineParameters:
         """Return the machine of a design of the front."""
         return self.designs.machine_at(self.search.designs[number])
+
+    def goals(self, number: int) -> tuple[list[tuple[Goal, float]], list[tuple[Goal, float]]]:
+        """Return objectives and constraints of a design with their values, in units for reading."""
+        objectives = zip(self.designs.objectives, self.objectives[number].tolist(), strict=True)
+        constraints = zip(self.designs.constraints, self.constraints[number].tolist(), strict=True)
+        return list(objectives), list(constraints)
+
+    def variables(self, number: int) -> list[tuple[str, float | str, str]]:
+        """Return name, value and unit for reading of each variable of a design."""
+        places = zip(self.designs.dimensions, self.search.designs[number].tolist(), strict=True)
+        return [(dimension.name, *dimension.shown(place)) for dimension, place in places]
 
 
 def run_designs(
@@ -56,14 +65,13 @@ def run_designs(
         len(designs.constraints),
     )
     result = SEARCHES[search](problem, settings)
-    nominal = designs.evaluate(designs.nominal()[None], run)
+    nominal, _ = designs.evaluate(designs.nominal()[None], run)
     return ParetoFront(
         designs,
         result,
         _values(designs.objectives, result.objectives),
         _values(designs.constraints, result.constraints),
-        nominal[0][0],
-        nominal[1][0],
+        nominal[0],
         chosen_designs(designs.objectives, result.objectives),
     )
 

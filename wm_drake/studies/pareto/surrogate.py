@@ -143,7 +143,6 @@ def _spread(
         candidates, values: Designs of a predicted front and their predicted objectives.
         known: Designs that were evaluated.
         count: Number of designs to return.
-        random: Source of random numbers.
     """
     best, taken = known.f[known.is_best()], known.x
     together = np.vstack([best, values])

@@ -12,21 +12,15 @@ from wm_drake.studies.pareto.study import ParetoFront
 def front_table(front: ParetoFront) -> pd.DataFrame:
     """Return objectives, constraints and variables of each design of the front."""
     rows = []
-    for number, design in enumerate(front.search.designs):
+    for number in range(len(front.objectives)):
+        objectives, constraints = front.goals(number)
         row: dict[str, Any] = {"design": number + 1}
-        row |= _goals(front, number)
-        for dimension, place in zip(front.designs.dimensions, design, strict=True):
-            value, unit = dimension.shown(float(place))
-            row[f"{dimension.name} [{unit}]" if unit else dimension.name] = value
+        row |= {goal.key: value for goal, value in objectives}
+        row |= {f"{goal.key} (limit)": value for goal, value in constraints}
+        for name, value, unit in front.variables(number):
+            row[f"{name} [{unit}]" if unit else name] = value
         rows.append(row)
     return pd.DataFrame(rows)
-
-
-def _goals(front: ParetoFront, number: int) -> dict[str, float]:
-    designs = front.designs
-    names = [g.key for g in designs.objectives] + [f"{g.key} (limit)" for g in designs.constraints]
-    values = (*front.objectives[number], *front.constraints[number])
-    return dict(zip(names, map(float, values), strict=True))
 
 
 def history_table(front: ParetoFront) -> pd.DataFrame:
@@ -56,20 +50,16 @@ def promises_table(kept: Sequence[Promise]) -> pd.DataFrame:
 
 def designs_as_json(front: ParetoFront) -> list[dict[str, Any]]:
     """Return objectives, constraints and variables of each design of the front."""
-    designs, entries = front.designs, []
-    for number, design in enumerate(front.search.designs):
-        shown = [
-            (d.name, *d.shown(float(x))) for d, x in zip(designs.dimensions, design, strict=True)
-        ]
-        values = zip(designs.objectives, front.objectives[number], strict=True)
-        limits = zip(designs.constraints, front.constraints[number], strict=True)
+    entries = []
+    for number in range(len(front.objectives)):
+        objectives, constraints = front.goals(number)
         entries.append(
             {
-                "objectives": {goal.key: value for goal, value in values},
-                "constraints": {goal.key: value for goal, value in limits},
+                "objectives": {goal.key: value for goal, value in objectives},
+                "constraints": {goal.key: value for goal, value in constraints},
                 "variables": {
                     name: {"value": value, "unit": unit} if unit else value
-                    for name, value, unit in shown
+                    for name, value, unit in front.variables(number)
                 },
             }
         )

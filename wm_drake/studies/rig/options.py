@@ -13,10 +13,7 @@ class RigOptions(ComponentOptions):
         None, "Of the motion; several as '1,3,5 Hz'.", "FREQUENCIES", "--frequency -f"
     )
     amplitude: str | None = option(
-        None,
-        "Of the motion; several as '1,3,5 mm', angles in deg.",
-        "AMPLITUDES",
-        "--amplitude -a",
+        None, "Of the motion; several as '1,3,5 mm', angles in deg.", "AMPLITUDES", "--amplitude -a"
     )
     matrix: str | None = option(
         None, "Run the test matrix of a paper: A, or for dampers C.", "PAPER"

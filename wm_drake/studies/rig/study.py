@@ -38,7 +38,7 @@ from wm_drake.studies.rig.page import (
 )
 from wm_drake.studies.rig.printed import printed_errors, printed_verdict
 from wm_drake.studies.run import Executor
-from wm_drake.studies.study import Facts, Result, Task
+from wm_drake.studies.study import Result, Task
 
 
 @dataclass(frozen=True)
@@ -56,6 +56,7 @@ class RigResult(Result):
     beyond: Sequence[str] = ()
     printed: tuple[Sequence[float], str] | None = None
     float_format: ClassVar[str] = "%.9g"
+    page = rig_page
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """Return each loop, what is derived from the loops, and the effect of masses."""
@@ -81,10 +82,6 @@ class RigResult(Result):
     def effect(self) -> str:
         """Sentence on the effect of masses; "" without masses."""
         return "" if self.massless is None else masses_sentence(self.run, self.massless)
-
-    def page(self, facts: Facts) -> str:
-        """Return the page."""
-        return rig_page(self, facts)
 
     def warnings(self) -> Sequence[str]:
         """Return a warning for a table that the motions leave."""

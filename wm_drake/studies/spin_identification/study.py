@@ -6,7 +6,6 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
@@ -88,7 +87,6 @@ class Sought:
 
     Attributes:
         variation: Numbers of the machine that are equal to the unknown.
-        unknown: The unknown of the fit.
     """
 
     variation: Variation
@@ -171,11 +169,9 @@ class SpinIdentification(Result):
             "rms": rms_table(self.after),
         }
 
-    def write(self, folder: Path) -> None:
-        """Write the identified machine and the tables."""
-        text = machine_yaml(identified_machine(self))
-        (folder / "identified.yaml").write_text(text, encoding="utf-8")
-        super().write(folder)
+    def texts(self) -> dict[str, str]:
+        """Return the identified machine."""
+        return {"identified.yaml": machine_yaml(identified_machine(self))}
 
     def as_json(self) -> dict[str, Any]:
         """Return the result for JSON."""
@@ -446,7 +442,6 @@ def identify_from_spin(
         measured: (case, region, accelerometer, axis) RMS displacements; NaN where nothing was
             measured. [m]
         planted: True numbers of a virtual experiment, in SI units.
-        seed: Seed of the points that are evaluated before the search.
         progress: Called with the fraction done and the lowest error so far.
 
     Raises:

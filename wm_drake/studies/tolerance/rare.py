@@ -63,12 +63,7 @@ class RareEvent:
 
 
 def subset_simulation(
-    limit: Callable[[FloatArray], FloatArray],
-    size: int,
-    *,
-    samples: int = 1000,
-    seed: int = 0,
-    begun: Callable[[int], None] = lambda level: None,
+    limit: Callable[[FloatArray], FloatArray], size: int, *, samples: int = 1000, seed: int = 0
 ) -> RareEvent:
     """Return the probability that a limit-state function of normal scores is at most 0.
 
@@ -76,13 +71,10 @@ def subset_simulation(
         limit: Function of scores (n, size) with n values. NaN counts as failure.
         size: Number of independent standard normal scores.
         samples: Samples of each level, a multiple of 10 and at least 100.
-        seed: Of the random numbers.
-        begun: Called with the number of each level, from 0, when it begins.
     """
     random = np.random.default_rng(seed)
     chains, length = round(LEVEL * samples), round(1.0 / LEVEL)
     scores = random.standard_normal((samples, size))
-    begun(0)
     values = _evaluated(limit, scores)
     # the first level has independent samples: chains of length one
     history, probability, errors = values[None, :], 1.0, list[float]()
@@ -96,7 +88,6 @@ def subset_simulation(
         thresholds.append(threshold)
         probability *= LEVEL
         errors.append(_deviation((history <= threshold).astype(float)))
-        begun(level)
         scores, history, step = _conditional(
             limit, scores[order[:chains]], values[order[:chains]], threshold, length, step, random
         )
@@ -144,7 +135,6 @@ def _conditional(
         threshold: Largest allowed value.
         length: Samples of each chain.
         step: First s.
-        random: Source of random numbers.
 
     Returns:
         Scores (length * chains, size), their limits (length, chains), and the last s.

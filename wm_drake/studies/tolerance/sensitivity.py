@@ -64,7 +64,6 @@ def sobol_indices(
     Args:
         at_a: Measure at the rows of A. (n,) n is a power of two.
         at_exchanged: Measure at the rows of `exchanged`. ((d + 1) n,)
-        seed: Of the bootstrap.
 
     Returns:
         An index for each quantity; None if the measure is not finite at a row or does not vary.

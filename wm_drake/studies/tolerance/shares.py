@@ -21,7 +21,6 @@ class Share:
 
     Attributes:
         count: Number of samples with the property.
-        samples: Number of samples.
         lower, upper: Ends of the 95 % interval of Clopper and Pearson, which is exact for
             independent samples and wide enough for samples of a Sobol sequence.
     """

@@ -52,7 +52,6 @@ class Settings:
         samples: Samples of the machine, a power of two.
         sensitivity: Samples of the Sobol indices, a power of two up to `samples`; 0 for none.
         subset: Samples of each level of the subset simulation; 0 for none.
-        seed: Of all random numbers.
     """
 
     samples: int = 4096
