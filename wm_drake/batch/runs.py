@@ -158,7 +158,7 @@ class Runner:
             if self.stopped.is_set():
                 return []
             progress(done)
-        moved, extremes = self._array("moved", rows * count), self._array("extremes", count + 7)
+        moved, extremes = self._array("moved", count * rows), self._array("extremes", count + 7)
         springs = key.layout.mounts.springs if "springs" in self.needs else _NONE
         lengths = self._array("spring lengths", len(springs))
         measure_samples_lanes(
@@ -176,14 +176,15 @@ class Runner:
             extremes,
             lengths,
         )
-        filtered = self._filtered(moved.reshape(rows, count, WIDTH), extremes[-WIDTH:], key)
+        by_point = moved.reshape(count, rows, WIDTH)
+        filtered = self._filtered(by_point, extremes[-WIDTH:], key)
         arrays = (
             samples.reshape(rows, size, WIDTH),
-            moved.reshape(rows, count, WIDTH),
+            by_point.transpose(1, 0, 2),
             extremes.reshape(-1, WIDTH),
             *self._forces_of_mounts(key, samples, rows, size, p),
             lengths.reshape(-1, WIDTH),
-            filtered,
+            filtered.transpose(1, 0, 2),
             *_peaks(filtered),
         )
         paths: list[Path | None] = [None] * len(work_items)
@@ -202,19 +203,18 @@ class Runner:
         """Return the filtered displacements at the sensors of runs side by side, if needed.
 
         Args:
-            moved: Displacements at the measured points. (rows, points, lanes) [m]
+            moved: Displacements at the measured points. (points, rows, lanes) [m]
             good: Number of samples of each run before it diverged. (lanes,)
             key: What the runs have in common.
 
         Returns:
-            (rows, sensors, lanes); of no rows if no measure needs them or no run is complete. [m]
+            (sensors, rows, lanes); empty if no measure needs them or no run is complete. [m]
         """
-        rows, sensors = len(moved), moved.shape[1] - 3
+        sensors, rows = len(moved) - 3, moved.shape[1]
         if "sensors" not in self.needs or not np.any(good == rows):
             return np.empty((0, 0, WIDTH))
         band = pass_band(key.profile, key.period)
-        flat = filtered_lanes(moved.reshape(rows, -1), sensors, key.period, band, self._array)
-        return flat.reshape(rows, sensors, WIDTH)
+        return filtered_lanes(moved[:sensors], key.period, band, self._array)
 
     def _forces_of_mounts(
         self, key: BatchKey, samples: FloatArray, rows: int, size: int, p: FloatArray
@@ -281,10 +281,11 @@ class Runner:
 
 
 def _peaks(filtered: FloatArray) -> tuple[FloatArray, np.ndarray]:
-    """Return the amplitudes (sensors, lanes) of filtered displacements (rows, sensors, lanes)."""
-    rows, sensors, lanes = filtered.shape
-    sizes, at = amplitudes(filtered.reshape(rows, sensors * lanes))
-    return sizes.reshape(sensors, lanes), at.reshape(sensors, lanes)
+    """Return the amplitudes (sensors, lanes) of filtered displacements (sensors, rows, lanes)."""
+    if not len(filtered):
+        return np.empty((0, WIDTH)), np.empty((0, WIDTH), dtype=int)
+    sizes, at = zip(*map(amplitudes, filtered), strict=True)
+    return np.stack(sizes), np.stack(at)
 
 
 @dataclass(frozen=True)

@@ -50,38 +50,37 @@ def filtered(displacement: FloatArray, period: float, band: tuple[float, float])
     """
     rows, columns = displacement.shape
     groups = -(-columns // WIDTH)
-    lanes = aligned(rows * groups * WIDTH)
-    side_by_side = lanes.reshape(rows, groups * WIDTH)
-    side_by_side[:, :columns] = displacement
-    return filtered_lanes(side_by_side, groups, period, band)[:, :columns].copy()
+    lanes = aligned(groups * rows * WIDTH).reshape(groups, rows, WIDTH)
+    for group, first in enumerate(range(0, columns, WIDTH)):
+        part = displacement[:, first : first + WIDTH]
+        lanes[group, :, : part.shape[1]] = part
+    answer = filtered_lanes(lanes, period, band)
+    return np.hstack(answer)[:, :columns].copy() if groups else displacement.copy()
 
 
 def filtered_lanes(
     signals: FloatArray,
-    groups: int,
     period: float,
     band: tuple[float, float],
     array: Callable[[str, int], FloatArray] = lambda name, size: aligned(size * WIDTH),
 ) -> FloatArray:
-    """Return the first groups of `WIDTH` signals of an array, as from `filtered`.
+    """Return groups of `WIDTH` signals, as from `filtered`.
 
     Args:
-        signals: (n, >= groups * WIDTH), contiguous; the number of columns is a multiple of `WIDTH`.
-            [m]
-        groups: Number of groups to filter.
+        signals: (groups, n, WIDTH), contiguous. [m]
         period: Time between samples. [s]
         band: Pass band. [Hz]
         array: Function that returns an array of lanes, given a name and a size. A caller that
             filters often can use the same memory again.
     """
-    rows, columns = signals.shape
+    groups, rows, _ = signals.shape
     padding = min(round(PADDING_PERIODS / band[0] / period), rows - 1)
     if padding <= 6 * FILTER_ORDER + 3:  # the padding that sosfiltfilt chooses by default
-        return np.full((rows, groups * WIDTH), np.nan)
+        return np.full(signals.shape, np.nan)
     answer, work = array("filtered", rows * groups), array("filter", rows + 2 * padding)
-    shape = (rows, groups, columns // WIDTH)
-    filter_both_ways(signals.ravel(), shape, *_band_pass(period, band), padding, work, answer)
-    return answer.reshape(rows, groups * WIDTH)
+    sections = _band_pass(period, band)
+    filter_both_ways(signals.ravel(), (rows, groups), *sections, padding, work, answer)
+    return answer.reshape(signals.shape)
 
 
 @functools.cache

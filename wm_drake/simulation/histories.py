@@ -139,7 +139,7 @@ def measure_samples_lanes(
         branches: `Branches` of rubber bushings, None without them.
         points, count: Measured points, one after the other, and their number.
         springs: Array of the indices of the springs whose lengths are measured.
-        moved: Displacement at each sample and point, written. [m]
+        moved: Displacement at each point and sample, written; point after point. [m]
         extremes: Written: largest absolute displacement at each point [m]; largest absolute force
             and moment of the gasket on the housing, x, y, z [N, N m]; number of samples in bounds.
         lengths: Written: smallest length of each spring; inf for a run without samples in bounds.
@@ -164,7 +164,7 @@ def measure_samples_lanes(
         motion = tub_motion(x)
         for k in range(count):
             value = displacement_at(motion, measured, k * POINT_SIZE)
-            values[row * count + k] = value
+            values[k * rows + row] = value
             largest[k] = larger(largest[k], value, good)
         if gasket >= 0:
             _, on_housing = bushing_wrench(motion, numbers, gasket, x, branches)

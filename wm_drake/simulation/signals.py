@@ -22,32 +22,31 @@ def filter_both_ways(signals, shape, sections, settled, padding, work, answer):
         y = b0 x + z0;   z0 = b1 x - a1 y + z1;   z1 = b2 x - a2 y
 
     Args:
-        signals: Samples as a flat array of lanes, row after row.
-        shape: Number of rows, of groups of `lanes.WIDTH` signals to filter, and of groups in
-            `signals`.
+        signals: Samples as a flat array of lanes, group after group of `lanes.WIDTH` signals.
+        shape: Number of rows of each group, and of groups to filter.
         sections: b0, b1, b2, 1, a1, a2 of each of the `SECTIONS` sections, as from
             `scipy.signal.butter`, flat.
         settled: z0 and z1 of a constant signal of 1 of each section, from
             `scipy.signal.sosfilt_zi`, flat.
         padding: Number of rows by which the signals are mirrored at both ends.
         work: Flat array of (rows + 2 padding) lanes, overwritten.
-        answer: The filtered signals, a flat array of lanes, written.
+        answer: The filtered signals, a flat array of lanes as `signals`, written.
     """
     align_stack()
-    rows, groups, stride = shape
+    rows, groups = shape
     given, kept, filtered = lane_array(signals), lane_array(work), lane_array(answer)
     c, rest = number_array(sections), number_array(settled)
     padded = rows + 2 * padding
-    for group in range(groups):
-        state = settled_state(rest, given[_mirrored(-padding, rows) * stride + group])
+    for first in range(0, groups * rows, rows):
+        state = settled_state(rest, given[first + _mirrored(-padding, rows)])
         for at in range(padded):
             row = _mirrored(at - padding, rows)
-            kept[at], state = pass_sections(given[row * stride + group], state, c)
+            kept[at], state = pass_sections(given[first + row], state, c)
         state = settled_state(rest, kept[padded - 1])
         for at in range(padded - 1, padding - 1, -1):
             value, state = pass_sections(kept[at], state, c)
             if at < padding + rows:
-                filtered[(at - padding) * groups + group] = value
+                filtered[first + at - padding] = value
 
 
 @law
