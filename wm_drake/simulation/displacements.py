@@ -55,7 +55,7 @@ def filtered(displacement: FloatArray, period: float, band: tuple[float, float])
         part = displacement[:, first : first + WIDTH]
         lanes[group, :, : part.shape[1]] = part
     answer = filtered_lanes(lanes, period, band)
-    return np.hstack(answer)[:, :columns].copy() if groups else displacement.copy()
+    return np.hstack([*answer])[:, :columns].copy() if groups else displacement.copy()
 
 
 def filtered_lanes(
