@@ -78,7 +78,7 @@ def packed_torque_limit(limit: TorqueLimit | TorqueLimitTable) -> FloatArray:
     if isinstance(limit, TorqueLimit):
         return pack_number(0.0)
     cubics = monotone_cubics(np.array(limit.speed), np.array(limit.torque)[:, None])[:, :, 0]
-    return pack_table(limit.speed, cubics.T, 0.0)
+    return pack_table(limit.speed, cubics, 0.0)
 
 
 @functools.lru_cache(maxsize=256)  # a study packs the same curves for each run
@@ -89,7 +89,7 @@ def _packed_curves(x: tuple[float, ...], ys: tuple[tuple[float, ...], ...]) -> F
     # rounding can make a flat end fall by 1e-11
     end_slopes = np.maximum(a + h * (2.0 * b + h * 3.0 * c), 0.0)
     packed = np.array(
-        [pack_table(x, cubics[:, :, curve].T, float(end_slopes[curve])) for curve in range(len(ys))]
+        [pack_table(x, cubics[..., i], float(slope)) for i, slope in enumerate(end_slopes)]
     )
     packed.flags.writeable = False
     return packed

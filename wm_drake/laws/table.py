@@ -87,15 +87,12 @@ def pack_table(x, cubics, end_slope):
 
     Args:
         x: Abscissas (n,).
-        cubics: Coefficients (n - 1, 4) of the piece that begins at each but the last, the constant
+        cubics: Coefficients (4, n - 1) of the piece that begins at each but the last, the constant
             first.
         end_slope: Slope at the last point.
     """
-    pieces = [
-        _PIECE.pack(begin=begin, y=y, a=a, b=b, c=c)
-        for begin, (y, a, b, c) in zip(x[:-1], cubics, strict=True)
-    ]
-    return np.concatenate([[len(x)], *pieces, _END.pack(x=x[-1], slope=end_slope)])
+    pieces = _PIECE.pack_rows(begin=x[:-1], **dict(zip("yabc", cubics, strict=True)))
+    return np.concatenate([[len(x)], pieces.ravel(), _END.pack(x=x[-1], slope=end_slope)])
 
 
 def table_range(packed, at):
