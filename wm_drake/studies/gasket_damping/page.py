@@ -8,24 +8,7 @@ import xarray as xr
 from scipy.interpolate import griddata
 
 from wm_drake.parameters.types import FloatArray
-from wm_drake.report.figure import (
-    MARK,
-    MEASURED,
-    OURS,
-    QUIET,
-    Axis,
-    Cells,
-    Figure,
-    Line,
-    Mark,
-    Panel,
-    Points,
-    Rule,
-    Scale,
-    band,
-    in_grid,
-    segments,
-)
+from wm_drake.report import figure as fig
 from wm_drake.report.formatting import MM_PER_M, number, percent, significant
 from wm_drake.report.page import Picture, picture, versions_of
 from wm_drake.report.sections import Section, SectionedPage
@@ -223,7 +206,7 @@ def _surface_picture(result: Damping) -> Picture:
     )
 
 
-def surface_figure(result: Damping) -> Figure:
+def surface_figure(result: Damping) -> fig.Figure:
     """Return the distance at the points of the grid search, with the path of the search."""
     points = np.array([in_units_of_paper(p) for grid in result.rounds for p in grid.points])
     values = np.concatenate([grid.values for grid in result.rounds])
@@ -233,38 +216,40 @@ def surface_figure(result: Damping) -> Figure:
     )
     cells = griddata(points, values, tuple(np.meshgrid(across, up)))
     low, high = float(values.min()), float(values.max())
-    scale = Scale(low=low, high=high, shades="-Blues", label="distance, mm")
-    marks: list[Mark] = [Cells(cells, across, up, scale=scale, opacity=0.6)]
+    scale = fig.Scale(low=low, high=high, shades="-Blues", label="distance, mm")
+    marks: list[fig.Mark] = [fig.Cells(cells, across, up, scale=scale, opacity=0.6)]
     for index, grid in enumerate(result.rounds):
         shown = np.array([in_units_of_paper(p) for p in grid.points]).reshape(-1, 2)
         symbol = "circle" if index == 0 else "x-thin"
-        grid_points = Points(*shown.T, symbol=symbol, is_open=True, color=MARK, size=6.0)
+        grid_points = fig.Points(*shown.T, symbol=symbol, is_open=True, color=fig.MARK, size=6.0)
         marks.append(replace(grid_points, opacity=min(1.0, 0.35 + 0.15 * index)))
     path = np.array([in_units_of_paper(grid.best) for grid in result.rounds])
     key = "path of the best point"
-    marks.append(Line(*path.T, color=MEASURED, width=2.2, key=key))
-    marks.append(Points(*path[-1:].T, color=MEASURED, size=8.0, key=key))
+    marks.append(fig.Line(*path.T, color=fig.MEASURED, width=2.2, key=key))
+    marks.append(fig.Points(*path[-1:].T, color=fig.MEASURED, size=8.0, key=key))
     if result.interval is not None:
         ends = (result.interval.best, result.interval.low, result.interval.high)
         best, below, above = (np.array(in_units_of_paper(point)) for point in ends)
         key = "better optimum, 95 % intervals"
-        marks.append(Points(*best[:, None], symbol="square", color=MARK, size=6.0, key=key))
+        marks.append(fig.Points(*best[:, None], symbol="square", color=fig.MARK, size=6.0, key=key))
         x, y = (np.array([below[0], best[0]]), np.array([best[1], below[1]]))
         to_x, to_y = (np.array([above[0], best[0]]), np.array([best[1], above[1]]))
-        marks.append(segments((x, y), (to_x, to_y), color=MARK, key=key))
+        marks.append(fig.segments((x, y), (to_x, to_y), color=fig.MARK, key=key))
     if result.truth is not None:
         planted = np.array(in_units_of_paper(result.truth))[:, None]
-        marks.append(Points(*planted, symbol="cross-thin", color=OURS, size=18.0, key="planted"))
-    linear, torsional = Axis(label="C_L, N s/mm"), Axis(label="C_T, N mm s/deg")
-    colors = Scale(
+        marks.append(
+            fig.Points(*planted, symbol="cross-thin", color=fig.OURS, size=18.0, key="planted")
+        )
+    linear, torsional = fig.Axis(label="C_L, N s/mm"), fig.Axis(label="C_T, N mm s/deg")
+    colors = fig.Scale(
         low=float(points[:, 1].min()), high=float(points[:, 1].max()), label=torsional.label
     )
-    over = Points(points[:, 0], values, values=points[:, 1], scale=colors)
+    over = fig.Points(points[:, 0], values, values=points[:, 1], scale=colors)
     panels = (
-        Panel(name="path", marks=tuple(marks), x=linear, y=torsional),
-        Panel(name="distance", marks=(over,), x=linear, y=Axis(label="distance, mm")),
+        fig.Panel(name="path", marks=tuple(marks), x=linear, y=torsional),
+        fig.Panel(name="distance", marks=(over,), x=linear, y=fig.Axis(label="distance, mm")),
     )
-    return Figure(panels=in_grid(panels, 2), height=380.0)
+    return fig.Figure(panels=fig.in_grid(panels, 2), height=380.0)
 
 
 def _envelopes_picture(result: Damping, load: str) -> Picture:
@@ -284,7 +269,7 @@ def _source(result: Damping) -> str:
     return "measured" if result.truth is None else "virtual experiment"
 
 
-def envelopes_figure(result: Damping, load: str) -> Figure:
+def envelopes_figure(result: Damping, load: str) -> fig.Figure:
     """Return the envelopes computed at the optimum and the measured ones, one panel per sensor."""
     every = {"time": slice(None, None, 10)}
     computed = (MM_PER_M * envelopes(result.at_best[load])).isel(every)
@@ -293,18 +278,20 @@ def envelopes_figure(result: Damping, load: str) -> Figure:
     panels = []
     for name in map(str, computed.sensor.values):
         ours, other = computed.sel(sensor=name), others.sel(sensor=name)
-        area = band(ours.time.values, ours.lower.values, ours.upper.values, opacity=0.3)
+        area = fig.band(ours.time.values, ours.lower.values, ours.upper.values, opacity=0.3)
         lines = [
-            Line(other.time.values, other[side].values, color=MEASURED, dash="dashed")
+            fig.Line(other.time.values, other[side].values, color=fig.MEASURED, dash="dashed")
             for side in ("upper", "lower")
         ]
         marks = (
-            Rule(0.0, color=QUIET),
+            fig.Rule(0.0, color=fig.QUIET),
             replace(area, key="computed"),
             *(replace(curve, key=_source(result)) for curve in lines),
         )
-        panels.append(Panel(title=name, marks=marks, x=Axis(label="time, s"), y=Axis(label="mm")))
-    return Figure(panels=in_grid(panels, 3, share="both"), height=150.0)
+        panels.append(
+            fig.Panel(title=name, marks=marks, x=fig.Axis(label="time, s"), y=fig.Axis(label="mm"))
+        )
+    return fig.Figure(panels=fig.in_grid(panels, 3, share="both"), height=150.0)
 
 
 def _amplitudes(result: Damping) -> Table:

@@ -5,18 +5,7 @@
 
 import numpy as np
 
-from wm_drake.report.figure import (
-    MARK,
-    MEASURED,
-    QUIET,
-    Axis,
-    Figure,
-    Line,
-    Mark,
-    Panel,
-    Points,
-    in_grid,
-)
+from wm_drake.report import figure as fig
 from wm_drake.report.formatting import MM_PER_M
 from wm_drake.studies.pareto.envelopes import Envelopes
 from wm_drake.studies.pareto.study import COMPROMISE, ParetoFront
@@ -45,7 +34,7 @@ def pairs_of(front: ParetoFront) -> list[tuple[int, int]]:
     return [(i, j) for i in range(count) for j in range(i + 1, count)][:MOST_PAIRS]
 
 
-def front_figure(front: ParetoFront) -> Figure:
+def front_figure(front: ParetoFront) -> fig.Figure:
     """Return the front: one panel for each pair of objectives.
 
     Args:
@@ -58,32 +47,32 @@ def front_figure(front: ParetoFront) -> Figure:
     for pair in pairs_of(front):
         x, y = front.objectives[:, pair].T
         machine = front.nominal_objectives[list(pair)]
-        marks: tuple[Mark, ...] = (
-            Points(x, y, key=DESIGNS),
-            Points(x[chosen], y[chosen], symbol="diamond", size=11.0, key="chosen designs"),
-            Points(
+        marks: tuple[fig.Mark, ...] = (
+            fig.Points(x, y, key=DESIGNS),
+            fig.Points(x[chosen], y[chosen], symbol="diamond", size=11.0, key="chosen designs"),
+            fig.Points(
                 machine[:1],
                 machine[1:],
                 symbol="cross-thin",
-                color=MARK,
+                color=fig.MARK,
                 size=15.0,
                 key="the machine itself",
             ),
-            Points(
+            fig.Points(
                 x[picked : picked + 1],
                 y[picked : picked + 1],
                 is_open=True,
-                color=MEASURED,
+                color=fig.MEASURED,
                 size=15.0,
                 key=PICKED,
             ),
         )
-        across, up = (Axis(label=labels[index]) for index in pair)
-        panels.append(Panel(marks=marks, x=across, y=up))
-    return Figure(panels=in_grid(panels, len(panels)), height=330.0)
+        across, up = (fig.Axis(label=labels[index]) for index in pair)
+        panels.append(fig.Panel(marks=marks, x=across, y=up))
+    return fig.Figure(panels=fig.in_grid(panels, len(panels)), height=330.0)
 
 
-def envelopes_figure(shown: Envelopes, picked: int) -> Figure:
+def envelopes_figure(shown: Envelopes, picked: int) -> fig.Figure:
     """Return the envelopes of a design and of the machine itself, one panel for each sensor.
 
     Args:
@@ -92,26 +81,28 @@ def envelopes_figure(shown: Envelopes, picked: int) -> Figure:
     columns = min(COLUMNS, len(shown.sensors))
     sizes = np.concatenate([shown.designs.ravel(), shown.nominal.ravel()])
     largest = MM_PER_M * float(np.nanmax(sizes, initial=0.0))
-    x = Axis(label="time, s", range=(0.0, float(shown.time[0] + shown.time[-1])))
-    y = Axis(range=(0.0, 1.05 * largest or 1.0))
+    x = fig.Axis(label="time, s", range=(0.0, float(shown.time[0] + shown.time[-1])))
+    y = fig.Axis(range=(0.0, 1.05 * largest or 1.0))
     panels = []
     for sensor, of_design, nominal in zip(
         shown.sensors, shown.designs[picked], shown.nominal, strict=False
     ):
         marks = (
-            Line(shown.time, MM_PER_M * nominal, color=QUIET, key="the machine itself"),
-            Line(shown.time, MM_PER_M * of_design, color=MEASURED, width=2.2, key=PICKED),
+            fig.Line(shown.time, MM_PER_M * nominal, color=fig.QUIET, key="the machine itself"),
+            fig.Line(shown.time, MM_PER_M * of_design, color=fig.MEASURED, width=2.2, key=PICKED),
         )
-        panels.append(Panel(title=f"{sensor}, mm", marks=marks, x=x, y=y))
-    return Figure(panels=in_grid(panels, columns, share="both"), height=160.0)
+        panels.append(fig.Panel(title=f"{sensor}, mm", marks=marks, x=x, y=y))
+    return fig.Figure(panels=fig.in_grid(panels, columns, share="both"), height=160.0)
 
 
-def history_figure(front: ParetoFront) -> Figure:
+def history_figure(front: ParetoFront) -> fig.Figure:
     """Return the hypervolume over the number of evaluated designs."""
     evaluations, volume = np.array(front.search.history).T
     marks = (
-        Line(evaluations, volume, width=2.2),
-        Points(evaluations[-1:], volume[-1:], color=MEASURED, size=8.0),
+        fig.Line(evaluations, volume, width=2.2),
+        fig.Points(evaluations[-1:], volume[-1:], color=fig.MEASURED, size=8.0),
     )
-    panel = Panel(marks=marks, x=Axis(label="evaluated designs"), y=Axis(label="hypervolume"))
-    return Figure(panels=(panel,), height=240.0)
+    panel = fig.Panel(
+        marks=marks, x=fig.Axis(label="evaluated designs"), y=fig.Axis(label="hypervolume")
+    )
+    return fig.Figure(panels=(panel,), height=240.0)

@@ -7,22 +7,7 @@ from typing import Any
 import numpy as np
 
 from wm_drake.parameters.types import FloatArray
-from wm_drake.report.figure import (
-    MARK,
-    MEASURED,
-    OURS,
-    QUIET,
-    Axis,
-    Figure,
-    Line,
-    Mark,
-    Panel,
-    Points,
-    Rule,
-    Text,
-    in_grid,
-    shade,
-)
+from wm_drake.report import figure as fig
 from wm_drake.report.formatting import MM_PER_M
 from wm_drake.rigs import ForceLoop, RigRun
 from wm_drake.rigs.run import slider_friction_curves
@@ -48,7 +33,7 @@ def overlaid_figure(
     line: Callable[[ForceLoop], str],
     *,
     over: str,
-) -> Figure:
+) -> fig.Figure:
     """Draw loops in panels, several per panel, as [C] Figs. 6, 7, 14 and [A] Figs. 5, 8, 12 (B).
 
     Args:
@@ -70,18 +55,18 @@ def overlaid_figure(
     columns = min(COLUMNS, max(2, len(panels)))
     units, shown = units_of(loops[0].rotates), []
     for title in panels:
-        marks: list[Mark] = []
+        marks: list[fig.Mark] = []
         for loop in (loop for loop in loops if panel(loop) == title):
             values = units.factor * (loop.displacement if over == "displacement" else loop.velocity)
             key = line(loop)
             color = _color(lines.index(key), len(lines))
-            marks.append(Line(_closed(values), _closed(loop.force), color=color, key=key))
+            marks.append(fig.Line(_closed(values), _closed(loop.force), color=color, key=key))
         shown.append(loop_panel(title, marks, units.label(over), units.force_label))
-    placed = in_grid(shown, columns, share="y")
-    return Figure(panels=placed, height=190.0, widths=(1.0,) * columns, keys=tuple(lines))
+    placed = fig.in_grid(shown, columns, share="y")
+    return fig.Figure(panels=placed, height=190.0, widths=(1.0,) * columns, keys=tuple(lines))
 
 
-def time_figure(loop: ForceLoop, points: Mapping[str, int]) -> Figure:
+def time_figure(loop: ForceLoop, points: Mapping[str, int]) -> fig.Figure:
     """Draw motion and force over one period and the loop, as [A] Figs. 5, 8, 12, [C] Figs. 4, 5.
 
     Args:
@@ -91,47 +76,49 @@ def time_figure(loop: ForceLoop, points: Mapping[str, int]) -> Figure:
     factor, force = units.factor, units.force_label
     time = np.append(loop.time, 1.0 / loop.motion.frequency)
     at = list(points.values())
-    motion = Line(time, factor * _closed(loop.displacement), color=QUIET, dash="dashed")
-    of_time = Line(time, _closed(loop.force), width=2.2, is_second=True)
+    motion = fig.Line(time, factor * _closed(loop.displacement), color=fig.QUIET, dash="dashed")
+    of_time = fig.Line(time, _closed(loop.force), width=2.2, is_second=True)
     reach, largest = (1.13 * float(np.abs(one.y).max()) or 1.0 for one in (motion, of_time))
     panels = [
-        Panel(
+        fig.Panel(
             marks=(
-                Rule(0.0, color=QUIET),
+                fig.Rule(0.0, color=fig.QUIET),
                 motion,
                 of_time,
                 *_letters(points, loop.time[at], loop.force[at], is_second=True),
             ),
-            x=Axis(label="time, s"),
-            y=Axis(
-                label=f"{units.label('displacement')} (dashed)", color=QUIET, range=(-reach, reach)
+            x=fig.Axis(label="time, s"),
+            y=fig.Axis(
+                label=f"{units.label('displacement')} (dashed)",
+                color=fig.QUIET,
+                range=(-reach, reach),
             ),
-            second=Axis(label=force, color=OURS, range=(-largest, largest)),
+            second=fig.Axis(label=force, color=fig.OURS, range=(-largest, largest)),
         )
     ]
     for x, over in ((loop.displacement, "displacement"), (loop.velocity, "velocity")):
-        curve = Line(factor * _closed(x), _closed(loop.force), width=2.2)
+        curve = fig.Line(factor * _closed(x), _closed(loop.force), width=2.2)
         letters = _letters(points, factor * x[at], loop.force[at])
         panels.append(loop_panel("", [curve, *letters], units.label(over), force))
-    return Figure(panels=in_grid(panels, 3), height=220.0)
+    return fig.Figure(panels=fig.in_grid(panels, 3), height=220.0)
 
 
 def _letters(
     points: Mapping[str, int], x: FloatArray, y: FloatArray, *, is_second: bool = False
-) -> list[Mark]:
+) -> list[fig.Mark]:
     """Return a dot and a letter at each point."""
     if not points:
         return []
-    marks: list[Mark] = [Points(x, y, color=MARK, size=6.0, is_second=is_second)]
+    marks: list[fig.Mark] = [fig.Points(x, y, color=fig.MARK, size=6.0, is_second=is_second)]
     for letter, a, b in zip(points, x.tolist(), y.tolist(), strict=True):
-        above = Text(a, b, letter, is_bold=True, across="right", up="bottom", shift=(-5.0, 3.0))
+        above = fig.Text(a, b, letter, is_bold=True, across="right", up="bottom", shift=(-5.0, 3.0))
         below = replace(above, across="left", up="top", shift=(5.0, -3.0))
         if not is_second:  # D lies close to C
             marks.append(below if letter == "D" else above)
     return marks
 
 
-def friction_law_figure(run: RigRun) -> Figure | None:
+def friction_law_figure(run: RigRun) -> fig.Figure | None:
     """Draw friction over slider velocity at constant deformation rates, as [C] Fig. 12.
 
     The result is None for a law without MSTV friction.
@@ -142,7 +129,7 @@ def friction_law_figure(run: RigRun) -> Figure | None:
     if curves is None:
         return None
     marks = [
-        Line(
+        fig.Line(
             MM_PER_M * w,
             curve,
             color=_color(k, len(rates_mm_s)),
@@ -152,13 +139,13 @@ def friction_law_figure(run: RigRun) -> Figure | None:
         for k, (u, curve) in enumerate(zip(rates_mm_s, curves, strict=True))
     ]
     x, y = "sliding velocity of the sponge on the tube, mm/s", "friction force on the sponge, N"
-    return Figure(panels=(loop_panel("", marks, x, y),), height=240.0)
+    return fig.Figure(panels=(loop_panel("", marks, x, y),), height=240.0)
 
 
-def loop_panel(title: str, marks: Sequence[Mark], x: str, y: str) -> Panel:
+def loop_panel(title: str, marks: Sequence[fig.Mark], x: str, y: str) -> fig.Panel:
     """Return a panel with a zero line. `x`, `y`: labels."""
-    shown = (Rule(0.0, color=QUIET, width=0.8), *marks)
-    return Panel(title=title, marks=shown, x=Axis(label=x), y=Axis(label=y))
+    shown = (fig.Rule(0.0, color=fig.QUIET, width=0.8), *marks)
+    return fig.Panel(title=title, marks=shown, x=fig.Axis(label=x), y=fig.Axis(label=y))
 
 
 def _closed(values: Any) -> FloatArray:
@@ -167,4 +154,4 @@ def _closed(values: Any) -> FloatArray:
 
 def _color(index: int, count: int) -> str:
     """Return a colour of the scale from blue to yellow; for one or two lines a fixed colour."""
-    return (OURS, MEASURED)[index] if count <= 2 else shade(0.88 * index / (count - 1))
+    return (fig.OURS, fig.MEASURED)[index] if count <= 2 else fig.shade(0.88 * index / (count - 1))
