@@ -46,10 +46,9 @@ from wm_drake.simulation.measures.responses import known_responses
 from wm_drake.studies.calibration.calibration import Calibration, Plan, calibrate, identity_of
 from wm_drake.studies.calibration.computed import Runner
 from wm_drake.studies.calibration.fewer import fit_with_fewer
-from wm_drake.studies.calibration.machines import solved_machine
 from wm_drake.studies.calibration.prediction import Prediction, predict
 from wm_drake.studies.calibration.response_targets import with_deviations
-from wm_drake.studies.calibration.solutions import Solution, percents_of
+from wm_drake.studies.calibration.solutions import Solution, percents_of, solved_machine
 from wm_drake.studies.calibration.tables import FITS, fewer_table, prediction_table
 from wm_drake.studies.calibration.targets import EXPERIMENT, Targets, targets_of
 from wm_drake.studies.gasket.published import published_for

@@ -16,10 +16,9 @@ from wm_drake.parameters.free import Measured, load_free
 from wm_drake.studies.calibration.calibration import Plan, calibrate, identity_of
 from wm_drake.studies.calibration.computed import Evaluation, Runner
 from wm_drake.studies.calibration.fewer import check_counts, fit_with_fewer
-from wm_drake.studies.calibration.machines import solved_machine
 from wm_drake.studies.calibration.parameter_map import parameter_map_of
 from wm_drake.studies.calibration.prediction import check_held_out, predict
-from wm_drake.studies.calibration.solutions import Solution, distinct
+from wm_drake.studies.calibration.solutions import Solution, distinct, solved_machine
 from wm_drake.studies.calibration.tables import (
     amplitude_rows,
     fewer_table,

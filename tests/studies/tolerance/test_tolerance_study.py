@@ -18,9 +18,8 @@ from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.measures.responses import Response
 from wm_drake.studies.study import Facts
-from wm_drake.studies.tolerance.page import ToleranceReport
+from wm_drake.studies.tolerance.page import ToleranceReport, samples_frame
 from wm_drake.studies.tolerance.study import Settings, limits_of, run_tolerances
-from wm_drake.studies.tolerance.tables import samples_frame
 from wm_drake.studies.tolerance.variables import uncertain_machine
 from wm_drake.studies.tolerance.words import in_percent, rare_sentences, summary
 

@@ -26,12 +26,11 @@ from wm_drake.studies.calibration.calibration import (
 )
 from wm_drake.studies.calibration.computed import Runner
 from wm_drake.studies.calibration.fewer import Simpler, check_counts, fit_with_fewer
-from wm_drake.studies.calibration.machines import solved_machine
 from wm_drake.studies.calibration.options import CalibrateOptions
 from wm_drake.studies.calibration.parameter_map import parameter_map_of
 from wm_drake.studies.calibration.prediction import Prediction, check_held_out, predict
 from wm_drake.studies.calibration.response_targets import with_deviations
-from wm_drake.studies.calibration.solutions import percents_of
+from wm_drake.studies.calibration.solutions import percents_of, solved_machine
 from wm_drake.studies.calibration.tables import (
     FITS,
     amplitude_rows,

@@ -6,13 +6,18 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
-from rich.table import Table
+from rich.table import Table as TerminalTable
 
 from wm_drake.errors import input_error
 from wm_drake.parameters import read_loops
 from wm_drake.parameters.damper_laws import DamperNumbers
 from wm_drake.parameters.units import Unit
+from wm_drake.report.figure import Figure, Line, Mark, Points, in_grid
+from wm_drake.report.page import picture
+from wm_drake.report.sections import Section, SectionedPage
+from wm_drake.report.table import Column, Columns, Table, line, table_of
 from wm_drake.rigs import Harmonic
 from wm_drake.rigs.measured import HarmonicMotion, measured_motion
 from wm_drake.studies.components import existing_files
@@ -25,12 +30,117 @@ from wm_drake.studies.identification.drift import (
     mstv_of_c,
     printed_table,
 )
+from wm_drake.studies.identification.figures import LAW_COLOURS
 from wm_drake.studies.identification.inputs import units_of
 from wm_drake.studies.identification.options import Table2Options
-from wm_drake.studies.identification.table2_page import fits_shown, sentences, table2_page
 from wm_drake.studies.inputs import quantities_of
+from wm_drake.studies.rig.figures import loop_panel
 from wm_drake.studies.run import Executor
-from wm_drake.studies.study import Result, Task
+from wm_drake.studies.study import Facts, Result, Task
+
+
+def table2_page(result: "Table2Result", facts: Facts) -> str:
+    """Return the page as text of one self-contained HTML file."""
+    drift = picture(
+        drift_figure(result.fits),
+        "Fitted and printed k1 and c1 over frequency, one line per amplitude.",
+        "k1 and c1 of the Coulomb model over frequency: fitted (lines) and printed in [C] Table 2 "
+        "(crosses).",
+    )
+    claim = (
+        '[C] section 4.1: "the friction forces decrease when the exciting frequencies become '
+        'higher".'
+    )
+    return SectionedPage(
+        "Coulomb model fitted to each test ([C] Table 2)",
+        " ".join(sentences(result.fits, result.trend)),
+        [
+            Section("comparison", "Fitted against printed", (drift,)),
+            Section("fits", "Fitted and printed values", tables=(fits_shown(result.fits),)),
+            Section("trend", "Force over frequency", tables=(_trends(result.trend),), text=claim),
+        ],
+        facts.rows(),
+        about=result.source,
+    ).html()
+
+
+def sentences(fits: pd.DataFrame, trend: FrequencyTrend) -> list[str]:
+    """Return what the fits and the trends say, in words."""
+    texts = []
+    known = fits.dropna(subset=["k1", "c1"])
+    if len(known):
+        ratios = {
+            name: float(np.exp(np.mean(np.log(known[f"{name} ratio"].clip(lower=1e-6)))))
+            for name in ("k1", "c1")
+        }
+        texts.append(
+            f"Over {len(known)} printed tests the fitted k1 is {ratios['k1']:.3g} times and c1 "
+            f"{ratios['c1']:.3g} times the printed one (geometric mean)."
+        )
+    rise, free = (peaks[-1] / peaks[0] - 1.0 for peaks in (trend.printed, trend.without_dashpots))
+    low, high = (f"{f:g} Hz" for f in (trend.frequencies[0], trend.frequencies[-1]))
+    texts.append(
+        "[C] section 4.1 says that the friction force falls with frequency. With its printed "
+        f"numbers the peak force grows by {100 * rise:.2g} % from {low} to {high} at 1 mm, because "
+        f"c1 and c2 do; without them it changes by {100 * free:.1g} %, because the MSTV friction "
+        "depends on a quotient of velocities only. Even a level peak needs a friction that falls "
+        f"with velocity: f_max from {trend.friction[0]:.3g} N at {low} to "
+        f"{trend.friction[-1]:.3g} N at {high}."
+    )
+    return texts
+
+
+COLUMNS = {
+    "frequency_hz": Column("frequency", "Hz"),
+    "amplitude_mm": Column("amplitude", "mm"),
+    "k1": Column("k1 printed", "N/mm", 1),
+    "k1 fitted": Column("k1 fitted", decimals=1),
+    "k1 ratio": Column("ratio", decimals=2),
+    "c1": Column("c1 printed", "N s/mm", 2),
+    "c1 fitted": Column("c1 fitted", decimals=2),
+    "c1 ratio": Column("ratio", decimals=2),
+    "RMSE/peak": Column("RMSE / peak", decimals=3),
+}
+"""Columns of the fits."""
+
+
+def fits_shown(fits: pd.DataFrame) -> Table:
+    """Return the fit of each test beside the printed one."""
+    caption = (
+        "Each test fitted alone, within the bounds of [C] section 3.3: k1 from 50 to 300 N/mm, c1 "
+        "from 0 to 10 N s/mm."
+    )
+    return table_of(fits, caption, COLUMNS)
+
+
+def _trends(trend: FrequencyTrend) -> Table:
+    rows = {
+        "peak force, printed numbers": trend.printed,
+        "peak force, c1 and c2 nearly zero": trend.without_dashpots,
+        "f_max for the peak of the first": trend.friction,
+    }
+    columns = (Column(f"{f:g} Hz", decimals=1) for f in trend.frequencies)
+    heads: Columns = ("loops of 1 mm, N", *columns)
+    groups = tuple(line(name, values) for name, values in rows.items())
+    return Table("Peak force of the MSTV damper over frequency.", heads, groups)
+
+
+def drift_figure(fits: pd.DataFrame) -> Figure:
+    """Return fitted and printed k1 and c1 over frequency."""
+    rounded = fits.assign(amplitude_mm=fits.amplitude_mm.round(3))
+    panels = []
+    for name, unit in (("k1", "N/mm"), ("c1", "N s/mm")):
+        marks: list[Mark] = []
+        for k, (amplitude, rows) in enumerate(rounded.groupby("amplitude_mm")):
+            color, key = LAW_COLOURS[k % len(LAW_COLOURS)], f"{amplitude:g} mm"
+            ordered = rows.sort_values("frequency_hz")
+            x, fitted = ordered.frequency_hz.to_numpy(), ordered[f"{name} fitted"].to_numpy()
+            marks.append(Line(x, fitted, color=color, symbol="circle", size=5.0, key=key))
+            printed = ordered[name].to_numpy()
+            marks.append(Points(x, printed, color=color, symbol="x-thin", size=9.0, key=key))
+        panels.append(loop_panel("", marks, "frequency, Hz", f"{name}, {unit}"))
+    return Figure(panels=in_grid(panels, 2), height=230.0, key_title="amplitude")
+
 
 FREQUENCIES = (1.0, 3.0, 6.67, 10.0)
 """Frequencies of [C] Table 1. [Hz]"""
@@ -63,7 +173,7 @@ class Table2Result(Result):
         rows = json.loads(self.fits.to_json(orient="records", double_precision=15))
         return {"tests": rows, "peak_force_over_frequency": asdict(self.trend)}
 
-    def terminal(self) -> list[Table | str]:
+    def terminal(self) -> list[TerminalTable | str]:
         """Return the fits, and what they and the trend say."""
         return [fits_shown(self.fits).terminal(self.source), *sentences(self.fits, self.trend)]
 

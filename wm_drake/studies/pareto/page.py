@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 
 from wm_drake.parameters import machine_yaml
 from wm_drake.report.formatting import MISSING, MM_PER_M, listed, plain, significant, with_interval
 from wm_drake.report.page import Picture, as_json, fragment, picture
 from wm_drake.report.sections import Section, SectionedPage
 from wm_drake.report.table import Table, Value, line
-from wm_drake.studies.pareto import tables
 from wm_drake.studies.pareto.envelopes import Envelopes
 from wm_drake.studies.pareto.figures import (
     DESIGNS,
@@ -29,7 +29,6 @@ from wm_drake.studies.pareto.study import COMPROMISE, ParetoFront
 from wm_drake.studies.study import Facts, Result
 
 if TYPE_CHECKING:
-    import pandas as pd
     from rich import table as terminal
 
 
@@ -50,13 +49,13 @@ class DesignResult(Result):
 
     float_format = None
 
-    def tables(self) -> "dict[str, pd.DataFrame]":
+    def tables(self) -> dict[str, pd.DataFrame]:
         """Return front, history and, of a robust front, the check on fresh samples."""
         frames = {
-            "front": tables.front_table(self.front),
-            "history": tables.history_table(self.front),
+            "front": front_table(self.front),
+            "history": history_table(self.front),
         }
-        return frames | ({"robust": tables.promises_table(self.promises)} if self.promises else {})
+        return frames | ({"robust": promises_table(self.promises)} if self.promises else {})
 
     def texts(self) -> dict[str, str]:
         """Return the machine files of chosen designs."""
@@ -66,7 +65,7 @@ class DesignResult(Result):
             about = f"Design '{name}' of a design study of machine {machine.name}"
             changes = {"name": f"{machine.name}, {name}", "about": about, "measured": ()}
             copy = machine.model_copy(update=changes)
-            files[tables.machine_file_name(name)] = machine_yaml(copy)
+            files[machine_file_name(name)] = machine_yaml(copy)
         return files
 
     def as_json(self) -> dict[str, Any]:
@@ -74,9 +73,9 @@ class DesignResult(Result):
         front = self.front
         goals = zip(front.designs.objectives, front.nominal_objectives, strict=True)
         shown = {
-            "robust": tables.promises_table(self.promises).to_dict("records"),
+            "robust": promises_table(self.promises).to_dict("records"),
             "evaluations": front.search.evaluations,
-            "front": tables.designs_as_json(front),
+            "front": designs_as_json(front),
             "hypervolume": front.search.hypervolume,
             "chosen": {name: number + 1 for name, number in front.chosen.items()},
             "nominal": {goal.key: value for goal, value in goals},
@@ -244,7 +243,7 @@ def _chosen(front: ParetoFront) -> Table:
     for index, (kind, name, _) in enumerate(rows[0]):
         cells = [rows[number][index][2].split(", at")[0] for number in front.chosen.values()]
         groups.append(line(name, [kind, *cells]))
-    groups.append(line("machine file", ["", *map(tables.machine_file_name, front.chosen)]))
+    groups.append(line("machine file", ["", *map(machine_file_name, front.chosen)]))
     caption = (
         "Chosen designs. The compromise is nearest to the best of all objectives, each scaled to "
         "the range of the front. Each has a machine file for --machine."
@@ -275,3 +274,60 @@ def _history(front: ParetoFront) -> Picture:
     )
     alternative = "Hypervolume over the number of evaluated designs."
     return picture(history_figure(front), alternative, caption)
+
+
+def front_table(front: ParetoFront) -> pd.DataFrame:
+    """Return objectives, constraints and variables of each design of the front."""
+    rows = []
+    for number in range(len(front.objectives)):
+        objectives, constraints = front.goals(number)
+        row: dict[str, Any] = {"design": number + 1}
+        row |= {goal.key: value for goal, value in objectives}
+        row |= {f"{goal.key} (limit)": value for goal, value in constraints}
+        for name, value, unit in front.variables(number):
+            row[f"{name} [{unit}]" if unit else name] = value
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def history_table(front: ParetoFront) -> pd.DataFrame:
+    """Return the hypervolume after each generation."""
+    return pd.DataFrame(front.search.history, columns=["evaluations", "hypervolume"])
+
+
+def machine_file_name(name: str) -> str:
+    """Return the name of the machine file of a chosen design."""
+    return f"machine_{name.replace(' ', '_')}.yaml"
+
+
+def promises_table(kept: Sequence[Promise]) -> pd.DataFrame:
+    """Return the check of a robust front on fresh samples."""
+    return pd.DataFrame(
+        {
+            "design": p.design,
+            "quantity": p.goal.key,
+            "over": p.goal.given.over,
+            **{f"promised_{name}": value for name, value in vars(p.promised).items()},
+            **{f"fresh_{name}": value for name, value in vars(p.fresh).items()},
+            "kept": p.is_kept,
+        }
+        for p in kept
+    )
+
+
+def designs_as_json(front: ParetoFront) -> list[dict[str, Any]]:
+    """Return objectives, constraints and variables of each design of the front."""
+    entries = []
+    for number in range(len(front.objectives)):
+        objectives, constraints = front.goals(number)
+        entries.append(
+            {
+                "objectives": {goal.key: value for goal, value in objectives},
+                "constraints": {goal.key: value for goal, value in constraints},
+                "variables": {
+                    name: {"value": value, "unit": unit} if unit else value
+                    for name, value, unit in front.variables(number)
+                },
+            }
+        )
+    return entries
