@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -54,7 +54,11 @@ def read_channels(path: Path) -> list[Channel]:
     read, package = _READERS[path.suffix.lower()]
     try:
         with _without_remarks():
-            channels = read(path)
+            channels = [
+                Channel(name, unit, values, None if time is None else np.asarray(time, dtype=float))
+                for name, unit, samples, time in read(path)
+                if (values := _numbers(samples)) is not None
+            ]
     except ImportError:
         raise input_error(
             f"needs the package {package}: pip install 'wm-drake[lab]'", where=str(path)
@@ -123,72 +127,54 @@ def _numbers(values: Any) -> FloatArray | None:
     return array.reshape(-1).astype(float)
 
 
-def _mdf(path: Path) -> list[Channel]:
+RawChannel: TypeAlias = tuple[str, str, Any, Any]
+"""Name, unit, samples and times of a channel as a library has them; the times may be None."""
+
+
+def _mdf(path: Path) -> Iterator[RawChannel]:
     from asammdf import MDF
 
-    channels = []
     with MDF(path) as mdf:
         for group, content in enumerate(mdf.groups):
             master = mdf.masters_db.get(group)
             for index, described in enumerate(content.channels):
-                if index == master:
-                    continue
-                signal = mdf.get(group=group, index=index)
-                values = _numbers(signal.samples)
-                if values is not None:
-                    time = np.asarray(signal.timestamps, dtype=float)
-                    channels.append(Channel(described.name, signal.unit or "", values, time))
-    return channels
+                if index != master:
+                    signal = mdf.get(group=group, index=index)
+                    yield described.name, signal.unit or "", signal.samples, signal.timestamps
 
 
-def _tdms(path: Path) -> list[Channel]:
+def _tdms(path: Path) -> Iterator[RawChannel]:
     from nptdms import TdmsFile
 
-    channels = []
     for group in TdmsFile.read(path).groups():
         for channel in group.channels():
-            values = _numbers(channel[:])
-            if values is None:
-                continue
-            step = float(channel.properties.get("wf_increment", math.nan))
-            begin = float(channel.properties.get("wf_start_offset", 0.0))
-            time: FloatArray | None = None
-            if step > 0.0:
-                time = np.asarray(begin + step * np.arange(len(values)), dtype=float)
-            unit = str(channel.properties.get("unit_string", ""))
-            channels.append(Channel(channel.name, unit, values, time))
-    return channels
+            samples, about = channel[:], channel.properties
+            step = float(about.get("wf_increment", math.nan))
+            begin = float(about.get("wf_start_offset", 0.0))
+            time = begin + step * np.arange(len(samples)) if step > 0.0 else None
+            yield channel.name, str(about.get("unit_string", "")), samples, time
 
 
-def _uff(path: Path) -> list[Channel]:
+def _uff(path: Path) -> Iterator[RawChannel]:
     import pyuff
 
     sets = pyuff.UFF(str(path)).read_sets()
-    channels = []
     for data in sets if isinstance(sets, list) else [sets]:
-        if data.get("type") != 58:
-            continue
-        values = _numbers(np.real(data["data"]))
-        if values is not None:
+        if data.get("type") == 58:
             unit = str(data.get("ordinate_axis_units_lab", "")).strip()
             unit = "" if unit.upper() == "NONE" else unit
-            time = np.asarray(data["x"], dtype=float)
-            channels.append(Channel(str(data["id1"]).strip(), unit, values, time))
-    return channels
+            yield str(data["id1"]).strip(), unit, np.real(data["data"]), data["x"]
 
 
-def _mat(path: Path) -> list[Channel]:
+def _mat(path: Path) -> Iterator[RawChannel]:
     from scipy.io import loadmat
 
-    channels = []
     for name, content in loadmat(path).items():
-        values = None if name.startswith("__") else _numbers(content)
-        if values is not None:
-            channels.append(Channel(name, "", values, None))
-    return channels
+        if not name.startswith("__"):
+            yield name, "", content, None
 
 
-_READERS: dict[str, tuple[Callable[[Path], list[Channel]], str]] = {
+_READERS: dict[str, tuple[Callable[[Path], Iterator[RawChannel]], str]] = {
     ".mf4": (_mdf, "asammdf"),
     ".mdf": (_mdf, "asammdf"),
     ".tdms": (_tdms, "npTDMS"),

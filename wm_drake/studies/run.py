@@ -129,11 +129,14 @@ class Executor:
             cases: Cases.
             what: Word beside the progress bar.
         """
-        if self._report is not None:
-            return self._counted(machine, measures, cases)
-        listed = list(cases)
-        with progress_bar(len(listed), what) as report:
-            return self._run(machine, measures, listed, report)
+        if self._report is None:
+            listed = list(cases)
+            with progress_bar(len(listed), what) as report:
+                return self._run(machine, measures, listed, report)
+        whole, before = self._report, self._reported
+        table = self._run(machine, measures, cases, lambda done: whole(before + done))
+        self._reported += table.sizes["run"]
+        return table
 
     def each(
         self, function: Callable[[Any], Any], items: Sequence[Any]
@@ -217,15 +220,6 @@ class Executor:
         """Show a bar in percent for each name; yield the function of number and fraction."""
         with progress_bars(names) as report:
             yield report
-
-    def _counted(
-        self, machine: "Machine", measures: tuple[str, ...], cases: "Iterable[Case]"
-    ) -> "xr.Dataset":
-        report, before = self._report, self._reported
-        assert report is not None
-        table = self._run(machine, measures, cases, lambda done: report(before + done))
-        self._reported += table.sizes["run"]
-        return table
 
     def _run(
         self,

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from wm_drake.studies.component_options import ARM, AXIS, JIG_MASS, OUTER_MASS, ComponentOptions
-from wm_drake.studies.study import Options, Study, Task, option
+from wm_drake.studies.study import Options, Study, imported, option
 
 UNITS: Any = option(
     None, "Of time, displacement, force, where files do not say: 's,mm,N'.", "UNITS"
@@ -92,50 +92,39 @@ class Table2Options(Options):
     units: str | None = UNITS
 
 
-def _begin(kind: str, options: Any) -> Task:
-    from wm_drake.studies.identification import study
-
-    if kind == "table2":
-        from wm_drake.studies.identification.table2 import Table2Task
-
-        return Table2Task(options)
-    if options.static:
-        from wm_drake.studies.identification.static_tests import StaticTask
-
-        return StaticTask(kind, options)
-    return study.DamperFitTask(options) if kind == "damper" else study.AxisFitTask(kind, options)
-
-
-def _declared(kind: str, about: str, options: type[Options], folder: str) -> Study:
-    return Study(
-        kind,
-        about,
-        options,
-        partial(_begin, kind),
-        has_runs=False,
-        group="identify",
-        has_machine=False,
-        folder=folder,
-    )
-
-
-FOLDER = "wm-drake-identify"
 IDENTIFY = (
-    _declared(
-        "damper",
-        "Identify a friction damper; a curve of its law is found as a monotone table. Several laws "
-        "are fitted to the same files and compared. Forces of inertia of masses at the driven end "
-        "are printed and taken out of the measured ones.",
-        DamperFitOptions,
-        FOLDER,
+    *(
+        Study(
+            kind,
+            about,
+            options,
+            partial(imported("wm_drake.studies.identification.study:task_of"), kind),
+            has_runs=False,
+            group="identify",
+            has_machine=False,
+            folder="wm-drake-identify",
+        )
+        for kind, about, options in (
+            (
+                "damper",
+                "Identify a friction damper; a curve of its law is found as a monotone table. "
+                "Several laws are fitted to the same files and compared. Forces of inertia of "
+                "masses at the driven end are printed and taken out of the measured ones.",
+                DamperFitOptions,
+            ),
+            ("bushing", "One axis of a six-component bushing.", AxisFitOptions),
+            ("gasket", "One axis of the gasket.", AxisFitOptions),
+        )
     ),
-    _declared("bushing", "One axis of a six-component bushing.", AxisFitOptions, FOLDER),
-    _declared("gasket", "One axis of the gasket.", AxisFitOptions, FOLDER),
-    _declared(
+    Study(
         "table2",
         "Fit k1 and c1 of the Coulomb model to each test alone, beside [C] Table 2.",
         Table2Options,
-        "wm-drake-table2",
+        imported("wm_drake.studies.identification.table2:Table2Task"),
+        has_runs=False,
+        group="identify",
+        has_machine=False,
+        folder="wm-drake-table2",
     ),
 )
 """Commands that identify a component."""

@@ -50,6 +50,7 @@ from wm_drake.studies.identification.page import (
     identify_page,
     motion_sentences,
 )
+from wm_drake.studies.identification.static_tests import StaticTask
 from wm_drake.studies.inputs import pairs_of, quantities_of
 from wm_drake.studies.rig.units import units_of
 from wm_drake.studies.run import Executor
@@ -315,3 +316,10 @@ def _copies(model: ComponentModel, axes: tuple[str, ...]) -> dict[str, str]:
     names = [*(unknown.name for unknown in model.unknowns), *model.fixed]
     fields = list(dict.fromkeys(name.split(".")[0] for name in names))
     return {f"{name[: -len(ours)]}{other}": name for name in fields for other in others}
+
+
+def task_of(kind: str, options: Any) -> Task:
+    """Return the task of a command `identify`: quasi-static tests, or a fit to loops."""
+    if options.static:
+        return StaticTask(kind, options)
+    return DamperFitTask(options) if kind == "damper" else AxisFitTask(kind, options)
