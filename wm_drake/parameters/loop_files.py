@@ -5,6 +5,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -87,37 +88,47 @@ def read_loop(
         raise input_error("is empty; needs the columns time, displacement, force", where=str(path))
     line, head = rows[0]
     head = _renamed(head, channels or {}, f"{path}:{line}")
-    columns, factors, rotates = _columns(head, units, f"{path}:{line}")
+    columns = _columns(head, units, f"{path}:{line}")
     table: FloatArray = np.array(
-        [_numbers(cells, head, columns, f"{path}:{at}") for at, cells in rows[1:]]
+        [_numbers(cells, len(head), columns, f"{path}:{at}") for at, cells in rows[1:]]
     ).reshape(-1, 3)
-    lines = [at for at, _ in rows[1:]]
-    return _checked_loop(path, table, lines, head, (columns, factors, rotates))
+    return _checked_loop(path, table, [at for at, _ in rows[1:]], columns)
+
+
+class _Column(NamedTuple):
+    """Column of time, displacement or force.
+
+    Attributes:
+        index: Its place in the file.
+        head: Its cell of the header.
+        unit: SI unit and display unit; those of an angle or a moment in a rotation.
+        factor: Factor that converts it to SI units.
+    """
+
+    index: int
+    head: str
+    unit: Unit
+    factor: float
 
 
 def _checked_loop(
-    path: Path,
-    table: FloatArray,
-    lines: Sequence[int],
-    head: Sequence[str],
-    kind: tuple[tuple[int, int, int], tuple[float, float, float], bool],
+    path: Path, table: FloatArray, lines: Sequence[int], columns: Sequence[_Column]
 ) -> MeasuredLoop:
     """Return a loop from a table of time, displacement and force; check time and signals.
 
     Args:
         table: In the units of the file (n, 3).
         lines: Line, or number of the sample, of each row.
-        head: Cells of the header.
-        kind: From `_columns`.
+        columns: From `_columns`.
     """
-    columns, factors, rotates = kind
+    factors = [column.factor for column in columns]
     not_rising = np.flatnonzero(np.diff(table[:, 0]) < 0.0)
     if len(not_rising):
         at = int(not_rising[0]) + 1
         raise input_error(
             f"time falls: {table[at, 0]:g} after {table[at - 1, 0]:g}",
             where=f"{path}:{lines[at]}",
-            key=head[columns[0]],
+            key=columns[0].head,
         )
     table = with_distinct_times(table, str(path))
     if len(table) < FEWEST:
@@ -131,8 +142,9 @@ def _checked_loop(
     for column in (1, 2):
         if np.ptp(table[:, column]) * factors[column] < SMALLEST_RANGE:
             message = f"is constant ({table[0, column]:g} on lines {lines[0]} to {lines[-1]})"
-            raise input_error(message, where=f"{path}:{lines[0]}", key=head[columns[column]])
+            raise input_error(message, where=f"{path}:{lines[0]}", key=columns[column].head)
     time, displacement, force = (table * factors).T
+    rotates = columns[1].unit == _ANGLE
     return MeasuredLoop(path.stem, str(path), time, displacement, force, rotates)
 
 
@@ -162,16 +174,16 @@ def _lab_loop(
         c.values if clock is None or c.time is None else np.interp(clock, c.time, c.values)
         for c in signals.values()
     ]
-    kind = _columns(head, units, str(path))
+    columns = _columns(head, units, str(path))
     if len({len(values) for values in table}) > 1:
         raise input_error("its channels have different numbers of samples", where=str(path))
-    samples = np.stack([table[index] for index in kind[0]], axis=1)
+    samples = np.stack([table[column.index] for column in columns], axis=1)
     if len(samples) < FEWEST:
         message = f"has {len(samples)} samples; a loop needs at least {FEWEST}"
         raise input_error(message, where=str(path))
     if not np.isfinite(samples).all():
         raise input_error("has a sample that is not a finite number", where=str(path))
-    return _checked_loop(path, samples, range(1, len(samples) + 1), head, kind)
+    return _checked_loop(path, samples, range(1, len(samples) + 1), columns)
 
 
 def _picked(path: Path, channels: Mapping[str, str]) -> dict[str, Channel]:
@@ -259,19 +271,13 @@ def _rows(path: Path) -> Iterator[tuple[int, list[str]]]:
             raise input_error(f"cannot be read as CSV ({error})", where=where) from None
 
 
-def _columns(
-    head: list[str], units: tuple[str, str, str] | None, place: str
-) -> tuple[tuple[int, int, int], tuple[float, float, float], bool]:
-    """Return indices, unit factors and kind of the columns time, displacement and force.
+def _columns(head: list[str], units: tuple[str, str, str] | None, place: str) -> list[_Column]:
+    """Return the columns time, displacement and force.
 
     Args:
         head: Cells of the header.
         units: Units of the three columns if the header has none.
         place: File and line, for messages.
-
-    Returns:
-        Indices of the three columns, factors that convert them to SI units, and whether the loop is
-        one of angle and moment.
     """
     columns: dict[str, tuple[int, Unit, str | None]] = {}
     for index, cell in enumerate(head):
@@ -291,23 +297,16 @@ def _columns(
             "force (or moment)",
             where=place,
         )
-    rotates = columns["displacement"][1] == _ANGLE
-    if rotates != (columns["force"][1] == _TORQUE):
+    if (columns["displacement"][1] == _ANGLE) != (columns["force"][1] == _TORQUE):
         raise input_error(
             "mixes a rotation with a translation: angle goes with moment, displacement with force",
             where=place,
         )
-    factors = [
-        _factor(
-            head[columns[column][0]], column, columns[column][1], (columns[column][2], given), place
-        )
+    return [
+        _Column(i, head[i], unit, _factor(head[i], column, unit, (in_header, given), place))
         for given, column in zip(units or (None,) * 3, _COLUMNS, strict=True)
+        for i, unit, in_header in [columns[column]]
     ]
-    return (
-        (columns["time"][0], columns["displacement"][0], columns["force"][0]),
-        (factors[0], factors[1], factors[2]),
-        rotates,
-    )
 
 
 def _factor(
@@ -339,28 +338,24 @@ def _factor(
         raise input_error(str(error), where=place, key=head) from None
 
 
-def _numbers(
-    cells: list[str], head: list[str], columns: tuple[int, int, int], place: str
-) -> list[float]:
-    if len(cells) != len(head):
+def _numbers(cells: list[str], width: int, columns: Sequence[_Column], place: str) -> list[float]:
+    """Return the numbers of the columns in a row, which must have as many cells as the header."""
+    if len(cells) != width:
         raise input_error(
-            f"has {len(cells)} values but the header has {len(head)} columns"
-            f"{'; the decimal sign is a point' if len(cells) > len(head) else ''}",
+            f"has {len(cells)} values but the header has {width} columns"
+            f"{'; the decimal sign is a point' if len(cells) > width else ''}",
             where=place,
         )
     values = []
-    for index in columns:
+    for column in columns:
+        cell = cells[column.index]
         try:
-            value = plain_number(cells[index])
+            value = plain_number(cell)
         except ValueError:
             raise input_error(
-                f"'{cells[index]}' is not a number{comma_hint(cells[index])}",
-                where=place,
-                key=head[index],
+                f"'{cell}' is not a number{comma_hint(cell)}", where=place, key=column.head
             ) from None
         if not np.isfinite(value):
-            raise input_error(
-                f"'{cells[index]}' is not a finite number", where=place, key=head[index]
-            )
+            raise input_error(f"'{cell}' is not a finite number", where=place, key=column.head)
         values.append(value)
     return values

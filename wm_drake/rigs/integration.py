@@ -36,15 +36,15 @@ MOST_PERIODS = 200
 STEADY = 1e-7
 """A period repeats the one before if no state differs by more, in amplitudes."""
 
-TOLERANCES = {"rtol": 2e-8, "atol": 2e-9}
-"""Tolerances of LSODA, in amplitudes."""
-
 EXPLICIT_TOLERANCES = (2e-10, 2e-11)
 """Relative and absolute tolerance of the explicit method, in amplitudes. It steps over the corners
 of friction, where the error of a step is larger than its estimate: these keep it below 2e-8."""
 
 LONGEST_STEP = 0.05
 """Longest step: no stretch of slip is stepped over. [rad]"""
+
+LSODA = {"rtol": 2e-8, "atol": 2e-9, "hmax": LONGEST_STEP, "mxstep": 200_000, "ml": 0, "mu": 0}
+"""Options of LSODA: tolerances in amplitudes, longest step, most steps, diagonal Jacobian."""
 
 MOST_STIFF = 32
 """Stiff benches that are one system: all step as the stiffest one needs."""
@@ -115,17 +115,8 @@ def stiff_period(begin: FloatArray, packed: FloatArray, motion: FloatArray) -> F
         with warnings.catch_warnings():
             warnings.simplefilter("error", ODEintWarning)
             try:
-                solution = odeint(
-                    derivative,
-                    parts[-1][-1],
-                    PHASE[piece],
-                    ml=0,
-                    mu=0,
-                    tfirst=True,
-                    mxstep=200_000,
-                    hmax=LONGEST_STEP,
-                    **TOLERANCES,
-                )
+                begin_of_piece = parts[-1][-1]
+                solution = odeint(derivative, begin_of_piece, PHASE[piece], tfirst=True, **LSODA)
             except ODEintWarning as warning:
                 raise NotSteadyError(
                     f"a sponge on the bench cannot be integrated: {warning}"

@@ -75,7 +75,7 @@ def _picture_sections(
     table: pd.DataFrame,
 ) -> list[Section]:
     calibration = result.calibration
-    errors = _errors_picture(best, table, _other_models(table))
+    errors = _errors_picture(best, table)
     envelopes = tuple(_envelopes_picture(best, table, i) for i in range(len(best.results)))
     return [
         Section("errors", "Errors of the amplitudes", (errors,)),
@@ -97,26 +97,25 @@ def _picture_sections(
 def _table_sections(
     result: CalibrateResult, best: SpinResult, table: pd.DataFrame
 ) -> list[Section]:
-    calibration, predictions = result.calibration, result.predictions
+    calibration, predictions, fewer = result.calibration, result.predictions, result.fewer
     effects, relations = effects_table(calibration), relations_table(calibration)
-    sections = [Section("amplitudes", "Amplitudes", tables=(tables.comparison(best, table),))]
-    if calibration.targets.responses:
-        responses = (responses_shown(calibration),)
-        sections.append(Section("responses", "Other responses", tables=responses))
-    if effects:
-        sections.append(Section("gasket", "Effect of the gasket", tables=(effects,)))
-    if predictions:
-        intervals = (intervals_table(calibration, p) for p in predictions)
-        shown = (predictions_shown(predictions), *intervals)
-        sections.append(Section("prediction", "Prediction", tables=shown, text=PREDICTION))
-    quantities = (quantities_shown(calibration), *([relations] if relations else []))
-    sections.append(Section("quantities", "Quantities", tables=quantities))
-    if result.fewer:
-        fits = (fewer_shown(result.fewer),)
-        sections.append(Section("fewer", "Fewer free quantities", tables=fits))
+    responses = [responses_shown(calibration)] if calibration.targets.responses else []
+    predicted = [predictions_shown(predictions)] if predictions else []
+    predicted += [intervals_table(calibration, prediction) for prediction in predictions]
+    quantities = [quantities_shown(calibration), *filter(None, [relations])]
     speeds = tables.critical_speeds(best), tables.smallest_gaps(best)
-    sections.append(Section("speeds", "Critical speeds and smallest gaps", tables=speeds))
-    return [*sections, Section("searches", "Searches", tables=(searches_table(calibration),))]
+    return [
+        Section("amplitudes", "Amplitudes", tables=[tables.comparison(best, table)]),
+        Section("responses", "Other responses", tables=responses),
+        Section("gasket", "Effect of the gasket", tables=[effects] if effects else []),
+        Section(
+            "prediction", "Prediction", tables=predicted, text=PREDICTION if predictions else ""
+        ),
+        Section("quantities", "Quantities", tables=quantities),
+        Section("fewer", "Fewer free quantities", tables=[fewer_shown(fewer)] if fewer else []),
+        Section("speeds", "Critical speeds and smallest gaps", tables=speeds),
+        Section("searches", "Searches", tables=[searches_table(calibration)]),
+    ]
 
 
 PREDICTION = (
@@ -340,11 +339,10 @@ def searches_table(calibration: Calibration) -> Table:
     return Table(caption, columns, groups)
 
 
-def _other_models(table: pd.DataFrame) -> list[str]:
-    return [s for s in dict.fromkeys(table["source"]) if s not in (tables.EXPERIMENT, tables.OURS)]
+def _errors_picture(best: SpinResult, table: pd.DataFrame) -> Picture:
+    others = list(dict.fromkeys(table["source"]))
+    others = [source for source in others if source not in (tables.EXPERIMENT, tables.OURS)]
 
-
-def _errors_picture(best: SpinResult, table: pd.DataFrame, others: Sequence[str]) -> Picture:
     def errors(case: object, source: str) -> np.ndarray | None:
         changes = tables.differences(table, case, source)  # type: ignore[arg-type]
         return np.array([change.percent for change in changes]) if changes else None
@@ -353,21 +351,13 @@ def _errors_picture(best: SpinResult, table: pd.DataFrame, others: Sequence[str]
     for case in best.results:
         ours = errors(case, tables.OURS)
         if ours is not None:
-            rows.append(
-                (
-                    case.title,
-                    ours,
-                    next((e for o in others if (e := errors(case, o)) is not None), None),
-                )
-            )
+            of_others = (errors(case, source) for source in others)
+            rows.append((case.title, ours, next((e for e in of_others if e is not None), None)))
     caption = "Percent differences from the experiment. Blue dots: calibrated machine."
     if others:
         caption += f" Grey diamonds: {', '.join(others)}."
-    return picture(
-        errors_figure(rows, list(best.parameters.sensors)),
-        "The numbers are in the table below.",
-        caption,
-    )
+    figure = errors_figure(rows, list(best.parameters.sensors))
+    return picture(figure, "The numbers are in the table below.", caption)
 
 
 def _quantities_picture(calibration: Calibration) -> Picture:

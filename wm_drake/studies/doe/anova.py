@@ -130,10 +130,6 @@ class LeastSquares:
     total: float
     df_resid: int
 
-    def adjusted_r2(self) -> float:
-        """Return the explained part of the variance, adjusted for the degrees of freedom."""
-        return 1.0 - (len(self.fitted) - 1) / self.df_resid * (self.ssr / self.total)
-
 
 class SumCoding:
     """Sum-coded columns of a design: main effects and, optionally, two-factor interactions."""
@@ -279,6 +275,9 @@ def _analysed(coding: SumCoding, response: FloatArray) -> AnovaTable:
             f = float(np.divide(sum_sq / df, noise))
         p = float(fdtrc(df, fit.df_resid, f)) if fit.df_resid > 0 else np.nan
         terms.append(Term(term, scale * variances[term], sum_sq, df, f, p, effects[term]))
+    adjusted_r2 = math.nan
+    if math.isfinite(scale) and fit.df_resid:
+        adjusted_r2 = 1.0 - (len(response) - 1) / fit.df_resid * (fit.ssr / fit.total)
     return AnovaTable(
         constant=float(fit.params[0]),
         terms=tuple(terms),
@@ -288,7 +287,7 @@ def _analysed(coding: SumCoding, response: FloatArray) -> AnovaTable:
         total_sum_sq=fit.total,
         residual_sum_sq=fit.ssr,
         residual_df=fit.df_resid,
-        adjusted_r2=fit.adjusted_r2() if math.isfinite(scale) and fit.df_resid else math.nan,
+        adjusted_r2=adjusted_r2,
         predicted_r2=_predicted_r2(fit, coding.leverages) if math.isfinite(scale) else math.nan,
         fitted=fit.fitted,
         residual=fit.residual,

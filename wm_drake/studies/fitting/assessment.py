@@ -62,7 +62,9 @@ def assess(problem: FitProblem, point: FloatArray, log: SearchLog) -> Fit:
     jacobian, evaluated = central_differences(problem, point, residuals)
     bound = _bounds_hit(problem, point, jacobian)
     free = np.flatnonzero(bound == 0)
-    spread = _spread(problem, residuals, jacobian[:, free])
+    variance = _variances(problem, residuals, jacobian[:, free])
+    resolution = np.maximum(variance, _resolution(problem) ** 2)
+    spread = _Spread(jacobian[:, free], variance, resolution)
     p = len(problem.unknowns)
     slope = _slopes(problem, point)[free]
     covariance = np.full((p, p), np.nan)
@@ -196,11 +198,6 @@ class _Spread:
                     )
                 )
         return tuple(undetermined)
-
-
-def _spread(problem: FitProblem, residuals: FloatArray, jacobian: FloatArray) -> _Spread:
-    variance = _variances(problem, residuals, jacobian)
-    return _Spread(jacobian, variance, np.maximum(variance, _resolution(problem) ** 2))
 
 
 def _estimates(

@@ -137,17 +137,12 @@ def _damping_text(damping: FloatArray) -> str:
 def points_table(result: Damping) -> pd.DataFrame:
     """Return every point of the grid search: round, damping and value of the objective."""
     rows = [
-        {
-            "round": index,
-            "spacing [% of region]": 100.0 * grid.spacing,
-            "C_L [N s/mm]": in_units_of_paper(point)[0],
-            "C_T [N mm s/deg]": in_units_of_paper(point)[1],
-            "objective [mm]": value,
-        }
+        (index, 100.0 * grid.spacing, *in_units_of_paper(point), value)
         for index, grid in enumerate(result.rounds, start=1)
         for point, value in zip(grid.points, grid.values, strict=True)
     ]
-    return pd.DataFrame(rows)
+    units = "spacing [% of region]", "C_L [N s/mm]", "C_T [N mm s/deg]", "objective [mm]"
+    return pd.DataFrame(rows, columns=["round", *units])
 
 
 def _optima(result: Damping) -> Table:
@@ -167,6 +162,8 @@ def _optima(result: Damping) -> Table:
         groups.append(line("95 % interval of the better one", (*texts, "", "")))
     if result.truth is not None:
         groups.append(line("planted", (*in_units_of_paper(result.truth), "", ""), "measured"))
+    linear, torsional = in_units_of_paper(result.rounds[-1].spacing * (UPPER - LOWER))
+    mesh = f"{significant(linear, 2)} N s/mm and {significant(torsional, 2)} N mm s/deg"
     columns = (
         "found by",
         Column("C_L", "N s/mm", 4),
@@ -179,18 +176,12 @@ def _optima(result: Damping) -> Table:
         f"envelopes at all sensors, every 5 ms from {WINDOW[0]:g} to {WINDOW[1]:g} s, [B] Eq. (2), "
         "(3). These envelopes are smooth (magnitude of the analytic signal). The grid of the "
         "search moves to its best point and is halved when it has no better point than its centre, "
-        f"until its spacing is at most {_mesh_text(result)}. "
+        f"until its spacing is at most {mesh}. "
         "The interval shows how much the optimum depends on single curves (one sensor with one "
         "load): each is left out once (jackknife). An error that all curves share, such as a "
         "wrong stiffness of a spring, is not in it."
     )
     return Table(caption, columns, tuple(groups))
-
-
-def _mesh_text(result: Damping) -> str:
-    """Return the spacing of the last grid in both unknowns."""
-    linear, torsional = in_units_of_paper(result.rounds[-1].spacing * (UPPER - LOWER))
-    return f"{significant(linear, 2)} N s/mm and {significant(torsional, 2)} N mm s/deg"
 
 
 def _surface_picture(result: Damping) -> Picture:
@@ -208,7 +199,7 @@ def _surface_picture(result: Damping) -> Picture:
 
 def surface_figure(result: Damping) -> fig.Figure:
     """Return the distance at the points of the grid search, with the path of the search."""
-    points = np.array([in_units_of_paper(p) for grid in result.rounds for p in grid.points])
+    points = in_units_of_paper(np.concatenate([grid.points for grid in result.rounds]))
     values = np.concatenate([grid.values for grid in result.rounds])
     points, values = points[np.isfinite(values)], values[np.isfinite(values)]
     across, up = (
@@ -219,24 +210,23 @@ def surface_figure(result: Damping) -> fig.Figure:
     scale = fig.Scale(low=low, high=high, shades="-Blues", label="distance, mm")
     marks: list[fig.Mark] = [fig.Cells(cells, across, up, scale=scale, opacity=0.6)]
     for index, grid in enumerate(result.rounds):
-        shown = np.array([in_units_of_paper(p) for p in grid.points]).reshape(-1, 2)
-        symbol = "circle" if index == 0 else "x-thin"
+        shown, symbol = in_units_of_paper(grid.points), "x-thin" if index else "circle"
         grid_points = fig.Points(*shown.T, symbol=symbol, is_open=True, color=fig.MARK, size=6.0)
         marks.append(replace(grid_points, opacity=min(1.0, 0.35 + 0.15 * index)))
-    path = np.array([in_units_of_paper(grid.best) for grid in result.rounds])
+    path = in_units_of_paper(np.array([grid.best for grid in result.rounds]))
     key = "path of the best point"
     marks.append(fig.Line(*path.T, color=fig.MEASURED, width=2.2, key=key))
     marks.append(fig.Points(*path[-1:].T, color=fig.MEASURED, size=8.0, key=key))
     if result.interval is not None:
         ends = (result.interval.best, result.interval.low, result.interval.high)
-        best, below, above = (np.array(in_units_of_paper(point)) for point in ends)
+        best, below, above = map(in_units_of_paper, ends)
         key = "better optimum, 95 % intervals"
         marks.append(fig.Points(*best[:, None], symbol="square", color=fig.MARK, size=6.0, key=key))
         x, y = (np.array([below[0], best[0]]), np.array([best[1], below[1]]))
         to_x, to_y = (np.array([above[0], best[0]]), np.array([best[1], above[1]]))
         marks.append(fig.segments((x, y), (to_x, to_y), color=fig.MARK, key=key))
     if result.truth is not None:
-        planted = np.array(in_units_of_paper(result.truth))[:, None]
+        planted = in_units_of_paper(result.truth)[:, None]
         marks.append(
             fig.Points(*planted, symbol="cross-thin", color=fig.OURS, size=18.0, key="planted")
         )

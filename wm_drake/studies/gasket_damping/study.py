@@ -159,16 +159,13 @@ class Damping(Result):
         return gasket_damping_page(self, facts)
 
 
-def in_units_of_paper(damping: FloatArray) -> tuple[float, float]:
-    """Return C_L and C_T in the units of [B]. [N s/mm, N mm s/deg]"""
-    linear, torsional = (
-        unit.from_si(float(value)) for unit, value in zip(UNITS, damping, strict=True)
-    )
-    return linear, torsional
+def in_units_of_paper(damping: FloatArray) -> FloatArray:
+    """Return C_L and C_T (..., 2) in the units of [B]. [N s/mm, N mm s/deg]"""
+    return damping * np.array([unit.from_si(1.0) for unit in UNITS])
 
 
 def _named(damping: FloatArray) -> dict[str, float]:
-    return dict(zip(UNKNOWNS, in_units_of_paper(damping), strict=True))
+    return dict(zip(UNKNOWNS, in_units_of_paper(damping).tolist(), strict=True))
 
 
 class GasketDampingTask(Task):
@@ -357,15 +354,11 @@ class EnvelopeModel:
                 point, load = run.number // len(self._targets), run.case.name
                 parts = [where for name, where in self.curves if name == load]
                 columns = slice(parts[0].start, parts[-1].stop)
-                differences[point, columns] = self._differences(load, run.record)
+                apart = _envelopes(run.record.displacement) - self._targets[load]
+                differences[point, columns] = MM_PER_M * np.moveaxis(apart, 2, 0).ravel()
 
         simulate_many(self.machine, cases, measures=("extremes",), histories=True, finished=keep)
         return differences
-
-    def _differences(self, load: str, record: Record) -> FloatArray:
-        """Return the differences of all curves of a load in a row. [mm]"""
-        differences = _envelopes(record.displacement) - self._targets[load]
-        return MM_PER_M * np.moveaxis(differences, 2, 0).ravel()
 
 
 def _envelopes(displacement: xr.DataArray) -> FloatArray:
@@ -426,12 +419,8 @@ def as_measured(table: xr.DataArray, sensors: list[str], where: str) -> xr.DataA
         raise input_error("times must not fall from row to row", where=where)
     if not np.isfinite(values).all():
         raise input_error("a displacement is not a finite number", where=where)
-    grid = (
-        np.arange(
-            np.ceil(time[0] / OUTPUT_PERIOD - 1e-6), np.floor(time[-1] / OUTPUT_PERIOD + 1e-6) + 1
-        )
-        * OUTPUT_PERIOD
-    )
+    first, last = time[0] / OUTPUT_PERIOD - 1e-6, time[-1] / OUTPUT_PERIOD + 1e-6
+    grid = np.arange(np.ceil(first), np.floor(last) + 1) * OUTPUT_PERIOD
     columns = [np.interp(grid, time, column) for column in values.T]
     return xr.DataArray(
         np.stack(columns, axis=1), {"time": grid, "sensor": sensors}, ["time", "sensor"]

@@ -40,8 +40,8 @@ def comparison_page(result: "ComparisonResult", facts: Facts) -> str:
     blind_words = "blind prediction of tests that no fit has seen"
     predicted = _pictures(comparison, "blind", blind_words)
     fitted = _pictures(comparison, "fitted", "fit to the tests")
-    sections = [Section("blind", "Blind prediction", predicted)] if predicted else []
-    sections += [
+    sections = [
+        Section("blind", "Blind prediction", predicted),
         Section("fits", "Measured and fitted loops", fitted),
         Section("laws", "Laws compared", tables=(laws_shown(comparison),)),
         Section("errors", "Errors of each test", tables=(_errors(comparison),)),

@@ -123,24 +123,16 @@ def frequency_trend(
 
     printed = peaks()
     least = float(getattr(damper, "friction_force"))  # noqa: B009
+    ends = 1e-3 * least, least
     friction = [
-        least
-        if index == 0
-        else float(
-            brentq(
-                lambda f, k=index: peaks(friction_force=f)[k] - printed[0],
-                1e-3 * least,
-                least,
-                rtol=1e-3,
-            )
-        )
-        for index in range(len(frequencies))
+        float(brentq(lambda f, k=k: peaks(friction_force=f)[k] - printed[0], *ends, rtol=1e-3))
+        for k in range(1, len(frequencies))
     ]
     return FrequencyTrend(
         tuple(frequencies),
         printed,
         peaks(sponge_damping=1e-3, slider_damping=1e-3),
-        tuple(friction),
+        (least, *friction),
     )
 
 

@@ -48,18 +48,17 @@ def identify_page(result: "FitResult", facts: Facts) -> str:
         )
         for over in ("displacement", "velocity")
     )
-    sections = [Section("loops", "Measured and fitted loops", loops)]
-    if fit.log.history:
-        unit = units_of(motions[0].loop.rotates).force_unit
-        sections.append(Section("search", "Search", (history_picture(fit, unit),)))
+    unit = units_of(motions[0].loop.rotates).force_unit
     values = values_table(fit, result.model.fixed_numbers)
     undetermined = " ".join(undetermined_sentences(fit))
-    sections += [
+    correlations = [correlations_table(fit)] if fit.estimates else []
+    sections = [
+        Section("loops", "Measured and fitted loops", loops),
+        Section("search", "Search", [history_picture(fit, unit)] if fit.log.history else []),
         Section("values", "Values", tables=(values,), text=undetermined),
         Section("errors", "Errors", tables=(_errors(fit, motions, judgement),)),
+        Section("correlations", "Correlations", tables=correlations),
     ]
-    if fit.estimates:
-        sections.append(Section("correlations", "Correlations", tables=(correlations_table(fit),)))
     made = [*search_facts(fit), *(("Motion", text) for text in motion_sentences(motions))]
     return SectionedPage(
         f"Identification of {result.title}",

@@ -99,6 +99,15 @@ class IdentifiedResult(Result):
         """Return the fit or the comparison for JSON, in SI."""
 
     @property
+    def title(self) -> str:
+        """Component, for headings."""
+        return self.component.title
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the fit or the comparison for JSON, in SI."""
+        return {"component": self.title, **self.fit_as_dict()}
+
+    @property
     def missing(self) -> list[str]:
         """Sentences on files that are not written, because their numbers are not complete."""
         return [
@@ -159,10 +168,6 @@ class FitResult(IdentifiedResult):
             "judgement": self.judgement.as_dict(),
         }
 
-    def as_json(self) -> dict[str, Any]:
-        """Return the fit for JSON, in SI."""
-        return {"component": self.title, **self.fit_as_dict()}
-
     def terminal(self) -> list[Table | str]:
         """Return the judgement, the values, and remarks."""
         fit, unit = self.fit, units_of(self.motions[0].loop.rotates).force_unit
@@ -196,10 +201,6 @@ class ComparisonResult(IdentifiedResult):
     def fit_as_dict(self) -> dict[str, Any]:
         """Return the comparison for JSON, in SI."""
         return self.comparison.as_dict()
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the comparison for JSON, in SI."""
-        return {"component": self.component.title, **self.fit_as_dict()}
 
     def terminal(self) -> list[Table | str]:
         """Return what the data say about the laws, their measures, and remarks."""

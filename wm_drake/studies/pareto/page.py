@@ -101,15 +101,14 @@ class DesignResult(Result):
         ]
         none = [] if has_front else ["No design meets all constraints."]
         shown = self.envelopes if has_front else None
+        chosen = [_chosen(front)] if has_front else []
+        promised = [_promises(self.promises)] if self.promises else []
         sections = [
             Section("front", "Front", body=_picker(front, shown)) if shown else None,
             Section("search", "Search", (_history(front),)),
+            Section("chosen", "Chosen designs", tables=chosen),
+            Section("robust", "Robust designs on fresh samples", tables=promised),
         ]
-        if has_front:
-            sections.append(Section("chosen", "Chosen designs", tables=(_chosen(front),)))
-        if self.promises:
-            promised = (_promises(self.promises),)
-            sections.append(Section("robust", "Robust designs on fresh samples", tables=promised))
         return SectionedPage(
             f"Designs of machine {designs.parameters.name}",
             summary(front, self.promises, self.envelopes),

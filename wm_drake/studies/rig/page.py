@@ -1,6 +1,7 @@
 """Page and tables of a bench test."""
 
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -181,8 +182,6 @@ def _pictures(run: RigRun) -> list[Picture]:
             f"and over velocity (form of [A] Figs. 5, 8, 12 and [C] Figs. 4, 5).{letters}",
         )
     ]
-    frequencies = _distinct(run.loops, frequency_text)
-    amplitudes = _distinct(run.loops, amplitude_text)
     if len(run.loops) > 1:
         pictures += [
             picture(
@@ -193,9 +192,9 @@ def _pictures(run: RigRun) -> list[Picture]:
             )
             for over in ("displacement", "velocity")
         ]
-    shared = [a for a in amplitudes if sum(amplitude_text(loop) == a for loop in run.loops) > 1]
-    if len(frequencies) > 1 and shared:
-        loops = [loop for loop in run.loops if amplitude_text(loop) in shared]
+    counts = Counter(map(amplitude_text, run.loops))
+    loops = [loop for loop in run.loops if counts[amplitude_text(loop)] > 1]
+    if loops and len(set(map(frequency_text, run.loops))) > 1:
         pictures.append(
             picture(
                 overlaid_figure(
@@ -217,10 +216,6 @@ def _pictures(run: RigRun) -> list[Picture]:
             )
         )
     return pictures
-
-
-def _distinct(loops: Sequence[ForceLoop], text: Callable[[ForceLoop], str]) -> list[str]:
-    return list(dict.fromkeys(map(text, loops)))
 
 
 def _summary(run: RigRun) -> str:

@@ -109,6 +109,7 @@ class ToleranceReport(Result):
         """Return the page: distributions, causes, limits, contact, tables."""
         result, settings = self.result, self.result.settings
         machine = result.machine.parameters
+        contact = result.contact
         sections = [
             Section("gap", "Smallest gap", _gap_picture(result, self.gaps_of_loads)),
             Section("distributions", "Distributions", _distributions(result)),
@@ -116,21 +117,17 @@ class ToleranceReport(Result):
                 "sensitivity", "What causes the scatter", _sobol_picture(result),
                 text=result.refused,
             ),
+            Section("limits", "Limits", tables=[limits_table(result)] if result.verdicts else ()),
+            Section(
+                "contact", "Contact", tables=[contact_table(result)] if contact else (),
+                text=rare_sentences(contact) if contact else "",
+            ),
+            Section("measures", "Distributions in numbers", tables=[measures_table(result)]),
+            Section(
+                "indices", "Sobol indices", tables=[sobol_table(result)] if result.indices else ()
+            ),
+            Section("quantities", "Quantities", tables=[quantities_table(result)]),
         ]  # fmt: skip
-        if result.verdicts:
-            shown = (limits_table(result),)
-            sections.append(Section("limits", "Limits", tables=shown))
-        if result.contact:
-            shown = (contact_table(result),)
-            text = rare_sentences(result.contact)
-            sections.append(Section("contact", "Contact", tables=shown, text=text))
-        shown = (measures_table(result),)
-        sections.append(Section("measures", "Distributions in numbers", tables=shown))
-        if result.indices:
-            shown = (sobol_table(result),)
-            sections.append(Section("indices", "Sobol indices", tables=shown))
-        shown = (quantities_table(result),)
-        sections.append(Section("quantities", "Quantities", tables=shown))
         made = [
             ("Machine", machine.name),
             ("Samples", f"{settings.samples}, scrambled Sobol sequence, seed {settings.seed}"),
