@@ -17,7 +17,7 @@ import pandas as pd
 from wm_drake import build_machine, load_machine, progress_bar, simulate_many
 from wm_drake.parameters import GASKET_FACTORS, SpinProfile, at_levels, levels_of, load_factors
 from wm_drake.simulation.cases import Case
-from wm_drake.studies.doe import Design, make_design
+from wm_drake.studies.doe.design import Design, make_design
 from wm_drake.studies.gasket.screening import Responses, analyse, contributions
 from wm_drake.studies.gasket.study import LOADS, GasketTrials
 

@@ -157,7 +157,7 @@ def write_spin_cycle(path):
 
 def write_design(path):
     """Write an orthogonal design of the factors of the gasket."""
-    from wm_drake.studies.doe import make_design
+    from wm_drake.studies.doe.design import make_design
 
     names = ("C_L", "C_T", "K_Lx", "K_Ly", "K_Lz", "K_Tx", "K_Ty", "K_Tz")
     design = make_design("orthogonal", names, trials=243)

@@ -30,7 +30,7 @@ from analysis_tools.validation_rows import (
 )
 
 from wm_drake.parameters import PublishedTerm
-from wm_drake.studies.doe import make_design
+from wm_drake.studies.doe.design import make_design
 from wm_drake.studies.gasket.screening import Responses, run_screening
 from wm_drake.studies.spin_cycle.study import SpinCycleResult
 

@@ -15,7 +15,7 @@ from wm_drake.report.figure import MARK, MEASURED, Axis, Figure, Line, Panel, Ru
 from wm_drake.report.page import picture, render
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.description.page import machine_page
-from wm_drake.studies.doe import make_design
+from wm_drake.studies.doe.design import make_design
 from wm_drake.studies.gasket.page import GasketResult
 from wm_drake.studies.gasket.screening import Meaning, Responses, run_screening
 from wm_drake.studies.gasket.study import GasketTrials

@@ -67,7 +67,7 @@ from wm_drake.parameters import load_machine, with_value
 from wm_drake.rigs import Harmonic, damper_bench, force_loops, measures_of
 from wm_drake.parameters.loop_files import MeasuredLoop
 from wm_drake.rigs.measured import measured_motion
-from wm_drake.studies.fitting import least_squares
+from wm_drake.studies.fitting.methods import least_squares
 from wm_drake.studies.identification.models import Given, damper_model
 from wm_drake.studies.identification.problem import fit_problem
 from both_engines import difference

@@ -11,7 +11,7 @@ from wm_drake.errors import InputError
 from wm_drake.parameters import GASKET_FACTORS, levels_of, load_factors
 from wm_drake.report.arrangement import arrange
 from wm_drake.simulation.cases import Case
-from wm_drake.studies.doe import make_design
+from wm_drake.studies.doe.design import make_design
 from wm_drake.studies.gasket import figures
 from wm_drake.studies.gasket.advice import advice
 from wm_drake.studies.gasket.findings import (

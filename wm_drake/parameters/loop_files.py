@@ -99,13 +99,13 @@ class _Column(NamedTuple):
     """Column of time, displacement or force.
 
     Attributes:
-        index: Its place in the file.
+        place: Its place in the file.
         head: Its cell of the header.
         unit: SI unit and display unit; those of an angle or a moment in a rotation.
         factor: Factor that converts it to SI units.
     """
 
-    index: int
+    place: int
     head: str
     unit: Unit
     factor: float
@@ -177,7 +177,7 @@ def _lab_loop(
     columns = _columns(head, units, str(path))
     if len({len(values) for values in table}) > 1:
         raise input_error("its channels have different numbers of samples", where=str(path))
-    samples = np.stack([table[column.index] for column in columns], axis=1)
+    samples = np.stack([table[column.place] for column in columns], axis=1)
     if len(samples) < FEWEST:
         message = f"has {len(samples)} samples; a loop needs at least {FEWEST}"
         raise input_error(message, where=str(path))
@@ -348,7 +348,7 @@ def _numbers(cells: list[str], width: int, columns: Sequence[_Column], place: st
         )
     values = []
     for column in columns:
-        cell = cells[column.index]
+        cell = cells[column.place]
         try:
             value = plain_number(cell)
         except ValueError:

@@ -10,8 +10,10 @@ from hypothesis import strategies as st
 from statsmodels.formula.api import ols
 from statsmodels.stats.anova import anova_lm
 
-from wm_drake.studies.doe import d_optimal_levels, level_matrix, orthogonal_levels
 from wm_drake.studies.doe.anova import SumCoding, anova
+from wm_drake.studies.doe.coding import level_matrix
+from wm_drake.studies.doe.exchange import d_optimal_levels
+from wm_drake.studies.doe.orthogonal import orthogonal_levels
 
 # Montgomery, Design and Analysis of Experiments, battery life data: hours by plate material (1-3)
 # and temperature (15, 70, 125 deg F), four batteries each; analysis of variance as printed there

@@ -11,16 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wm_drake.errors import InputError
-from wm_drake.studies.doe import (
-    MODELS,
-    d_optimal_levels,
-    efficiency,
-    level_matrix,
-    make_design,
-    orthogonal_levels,
-    read_design,
-    write_design,
-)
+from wm_drake.studies.doe.coding import MODELS, efficiency, level_matrix
+from wm_drake.studies.doe.design import make_design, read_design, write_design
+from wm_drake.studies.doe.exchange import d_optimal_levels
+from wm_drake.studies.doe.orthogonal import orthogonal_levels
 
 NAMES = ("C_L", "C_T", "K_Lx", "K_Ly", "K_Lz", "K_Tx", "K_Ty", "K_Tz")
 

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from wm_drake.studies.fitting import FitProblem, Measurement, Unknown, identify, left_out_errors
+from wm_drake.studies.fitting.assessment import left_out_errors
+from wm_drake.studies.fitting.methods import identify
+from wm_drake.studies.fitting.problem import FitProblem, Measurement, Unknown
 
 RNG = np.random.default_rng(2)
 TIME = np.linspace(0.1, 1.0, 30)

@@ -8,16 +8,10 @@ from scipy.optimize import curve_fit
 
 from wm_drake.errors import InputError
 from wm_drake.parameters.units import Unit
-from wm_drake.studies.fitting import (
-    METHODS,
-    FitProblem,
-    Measurement,
-    Unknown,
-    identify,
-    point_by_point,
-)
 from wm_drake.studies.fitting.assessment import assess, correlation_time
 from wm_drake.studies.fitting.fit import SearchLog
+from wm_drake.studies.fitting.methods import METHODS, identify
+from wm_drake.studies.fitting.problem import FitProblem, Measurement, Unknown, point_by_point
 from wm_drake.studies.fitting.surfaces import (
     QuadraticSurface,
     Region,

@@ -3,8 +3,14 @@
 import numpy as np
 import pytest
 
-from wm_drake.studies.fitting import FitProblem, Measurement, Unknown
-from wm_drake.studies.fitting.problem import NormProblem, PriorProblem, Residuals
+from wm_drake.studies.fitting.problem import (
+    FitProblem,
+    Measurement,
+    NormProblem,
+    PriorProblem,
+    Residuals,
+    Unknown,
+)
 
 PLAIN = (
     Unknown("a", -1.0, 3.0, start=0.5),

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 
-from wm_drake.studies.fitting import FitProblem, Measurement, Unknown, least_squares
+from wm_drake.studies.fitting.methods import least_squares
+from wm_drake.studies.fitting.problem import FitProblem, Measurement, Unknown
 
 TIME = np.linspace(0.0, 1.0, 60)
 

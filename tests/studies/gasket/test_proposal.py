@@ -6,7 +6,7 @@ import pytest
 
 from wm_drake.parameters import GASKET_FACTORS, levels_of, load_factors
 from wm_drake.simulation.measures.responses import GAP
-from wm_drake.studies.doe import make_design
+from wm_drake.studies.doe.design import make_design
 from wm_drake.studies.gasket.check import Check
 from wm_drake.studies.gasket.proposal import (
     ZERO,

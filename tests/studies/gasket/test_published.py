@@ -17,7 +17,7 @@ from wm_drake.parameters import (
     load_factors,
 )
 from wm_drake.simulation.cases import Case
-from wm_drake.studies.doe import make_design
+from wm_drake.studies.doe.design import make_design
 from wm_drake.studies.gasket import tables as texts
 from wm_drake.studies.gasket.findings import level_zero_text, summary
 from wm_drake.studies.gasket.level_zero import run_level_zero

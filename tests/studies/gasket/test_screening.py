@@ -25,7 +25,8 @@ from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import measure
 from wm_drake.simulation.measures.responses import chosen_responses, measures_of
 from wm_drake.simulation.runs import simulate
-from wm_drake.studies.doe import Design, level_matrix, make_design, read_design
+from wm_drake.studies.doe.coding import level_matrix
+from wm_drake.studies.doe.design import Design, make_design, read_design
 from wm_drake.studies.gasket.page import GasketResult
 from wm_drake.studies.gasket.screening import Responses, leading_terms, mean_at, run_screening
 from wm_drake.studies.gasket.study import GasketTrials, as_responses

@@ -18,7 +18,7 @@ from wm_drake.parameters import (
     place_of,
     quantities,
 )
-from wm_drake.studies.doe import make_design
+from wm_drake.studies.doe.design import make_design
 from wm_drake.studies.gasket.check import Check, Setting
 from wm_drake.studies.gasket.screening import Responses, run_screening
 from wm_drake.studies.gasket.surface import codes, model_row, surfaces

@@ -17,7 +17,7 @@ from wm_drake.parameters import (
 from wm_drake.rigs import Harmonic, bushing_bench, damper_bench
 from wm_drake.rigs.measured import RecordedMotion, measured_motion
 from wm_drake.studies.components import Target
-from wm_drake.studies.fitting import METHODS, identify, least_squares
+from wm_drake.studies.fitting.methods import METHODS, identify, least_squares
 from wm_drake.studies.identification.fragment import Destination, fragment
 from wm_drake.studies.identification.models import Given, TestedAxis, bushing_model, damper_model
 from wm_drake.studies.identification.problem import fit_problem

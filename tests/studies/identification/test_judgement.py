@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from wm_drake.parameters import CoulombDamper, MeasuredLoop, load_component, load_machine
 from wm_drake.rigs import Harmonic, bushing_bench, damper_bench, force_loops
 from wm_drake.rigs.measured import measured_motion
-from wm_drake.studies.fitting import least_squares
+from wm_drake.studies.fitting.methods import least_squares
 from wm_drake.studies.identification.judgement import judge, noise_of
 from wm_drake.studies.identification.models import Given, TestedAxis, bushing_model, damper_model
 from wm_drake.studies.identification.problem import fit_problem

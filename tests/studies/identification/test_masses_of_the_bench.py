@@ -8,7 +8,7 @@ from wm_drake.errors import InputError
 from wm_drake.parameters import MeasuredLoop, load_component
 from wm_drake.rigs import damper_bench
 from wm_drake.rigs.measured import inertia_share, measured_motion, without_inertia
-from wm_drake.studies.fitting import identify
+from wm_drake.studies.fitting.methods import identify
 from wm_drake.studies.identification.models import Given, damper_model
 from wm_drake.studies.identification.problem import fit_problem
 

@@ -8,7 +8,7 @@ from wm_drake.errors import InputError
 from wm_drake.parameters import load_machine
 from wm_drake.parameters.elements import BushingType
 from wm_drake.rigs import Harmonic, bushing_bench, force_loop, measures_of
-from wm_drake.studies.fitting import identify
+from wm_drake.studies.fitting.methods import identify
 from wm_drake.studies.identification.models import TestedAxis, bushing_model
 from wm_drake.studies.identification.problem import fit_problem
 

@@ -15,7 +15,7 @@ from wm_drake.report.page import Picture, as_json, fragment, picture
 from wm_drake.report.sections import Section, SectionedPage
 from wm_drake.report.table import Table
 from wm_drake.report.terminal import Console
-from wm_drake.studies.doe import write_design
+from wm_drake.studies.doe.design import write_design
 from wm_drake.studies.gasket import figures, tables
 from wm_drake.studies.gasket.advice import OTHER_GOALS, advice, answer, before_and_after, in_short
 from wm_drake.studies.gasket.findings import (

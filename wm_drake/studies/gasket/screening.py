@@ -14,8 +14,9 @@ import pandas as pd
 from wm_drake.errors import input_error
 from wm_drake.parameters import FactorLevels
 from wm_drake.report.formatting import significant
-from wm_drake.studies.doe import Design, efficiency
 from wm_drake.studies.doe.anova import AnovaTable, Term, anova
+from wm_drake.studies.doe.coding import efficiency
+from wm_drake.studies.doe.design import Design
 
 LEADING_MAIN_PERCENT = 10.0
 """Contribution above which a main effect is a leading term ([B] Table 5). [%]"""

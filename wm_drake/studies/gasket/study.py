@@ -17,7 +17,7 @@ from wm_drake.parameters import FactorLevels, MachineParameters, at_levels
 from wm_drake.parameters.units import Unit
 from wm_drake.simulation.cases import Case, load_of
 from wm_drake.simulation.measures.responses import Response, chosen_responses, measures_of
-from wm_drake.studies.doe import Design
+from wm_drake.studies.doe.design import Design
 from wm_drake.studies.gasket.screening import Meaning, Responses
 
 LOADS = ("middle", "counter")

@@ -10,8 +10,9 @@ from wm_drake.parameters import FactorLevels
 from wm_drake.parameters.published import CONSTANT, INTERACTIONS, MAIN, RANGE
 from wm_drake.report.formatting import MISSING, number, percent, plain, significant
 from wm_drake.report.table import Column, Group, Row, Table, line, table_of
-from wm_drake.studies.doe import MODELS, Design
 from wm_drake.studies.doe.anova import AnovaTable, Term
+from wm_drake.studies.doe.coding import MODELS
+from wm_drake.studies.doe.design import Design
 from wm_drake.studies.gasket.check import Check
 from wm_drake.studies.gasket.level_zero import LevelZero
 from wm_drake.studies.gasket.proposal import NOT_COMPARED, Compared

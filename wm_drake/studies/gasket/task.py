@@ -24,7 +24,8 @@ from wm_drake.parameters import (
     published_results,
 )
 from wm_drake.simulation.cases import Case, is_as_measured
-from wm_drake.studies.doe import DESIGNS, MODELS, Design, make_design, read_design
+from wm_drake.studies.doe.coding import MODELS
+from wm_drake.studies.doe.design import DESIGNS, Design, make_design, read_design
 from wm_drake.studies.gasket.check import Check, Setting, run_check
 from wm_drake.studies.gasket.level_zero import run_level_zero
 from wm_drake.studies.gasket.options import GasketOptions

@@ -13,17 +13,10 @@ from wm_drake.errors import InputError, Problem
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report.formatting import plain
 from wm_drake.rigs.measured import MeasuredMotion
-from wm_drake.studies.fitting import (
-    Fit,
-    FitProblem,
-    Progress,
-    TestError,
-    evaluated,
-    identify,
-    left_out_errors,
-    refined,
-)
-from wm_drake.studies.fitting.assessment import correlation_time
+from wm_drake.studies.fitting.assessment import correlation_time, evaluated, left_out_errors
+from wm_drake.studies.fitting.fit import Fit, TestError
+from wm_drake.studies.fitting.methods import identify, refined
+from wm_drake.studies.fitting.problem import FitProblem, Progress
 from wm_drake.studies.identification.judgement import Judgement, judge, per_cent
 from wm_drake.studies.identification.models import ComponentModel
 from wm_drake.studies.identification.problem import computed_forces, fit_problem
@@ -65,14 +58,12 @@ class LawResult(FittedLaw):
             `FEWEST_LEFT_OUT` tests. [N; N m]
         criterion: Bayesian information criterion with the number of independent samples; smaller is
             better, only differences count.
-        prediction: Evaluation at the fitted numbers of tests that no fit has seen; None without.
-        predicted: Judgement of the prediction.
+        prediction: The law at the fitted numbers on tests that no fit has seen; None without.
     """
 
     left_out: FloatArray
     criterion: float
-    prediction: Fit | None
-    predicted: Judgement | None
+    prediction: FittedLaw | None
 
     @property
     def left_out_rmse(self) -> float:
@@ -173,12 +164,12 @@ class Comparison:
     def _blind(self) -> list[str]:
         if not self.validation:
             return []
-        ranked = sorted(self.results, key=lambda r: r.prediction.rmse if r.prediction else np.inf)
+        blind = [r.prediction for r in self.results if r.prediction]
+        ranked = sorted(blind, key=lambda seen: seen.fit.rmse)
         texts = [
-            f"{r.law} {r.prediction.rmse:.3g} {self.unit}, "
-            f"lack of fit {per_cent(r.predicted.missed)}"
-            for r in ranked
-            if r.prediction and r.predicted
+            f"{seen.law} {seen.fit.rmse:.3g} {self.unit}, "
+            f"lack of fit {per_cent(seen.judgement.missed)}"
+            for seen in ranked
         ]
         count = len(self.validation)
         sentences = [
@@ -209,14 +200,14 @@ class Comparison:
     @property
     def tested(self) -> "Iterator[TestedLoop]":
         """Fitted tests, then blind ones, each with its index and the fit of each law."""
+        blind = {r.law: r.prediction.fit for r in self.results if r.prediction}
         groups = (
             ("fitted", self.motions, {r.law: r.fit for r in self.results}),
-            ("blind", self.validation, {r.law: r.prediction for r in self.results}),
+            ("blind", self.validation, blind),
         )
         for kind, motions, fits in groups:
-            known = {law: fit for law, fit in fits.items() if fit is not None}
             for index, measured in enumerate(motions):
-                yield TestedLoop(measured, kind, index, known)
+                yield TestedLoop(measured, kind, index, fits)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the comparison for JSON, in SI."""
@@ -261,12 +252,11 @@ def _law_as_dict(r: LawResult) -> dict[str, Any]:
         "judgement": r.judgement.as_dict(),
         "rmse_left_out": plain(r.left_out_rmse),
         "bayesian_information_criterion": plain(r.criterion),
-        "prediction": None
-        if r.prediction is None or r.predicted is None
-        else {
-            "rmse": r.prediction.rmse,
-            "missed": r.predicted.missed,
-            "tests": r.prediction.as_dict()["tests"],
+        "prediction": r.prediction
+        and {
+            "rmse": r.prediction.fit.rmse,
+            "missed": r.prediction.judgement.missed,
+            "tests": r.prediction.fit.as_dict()["tests"],
         },
     }
 
@@ -349,26 +339,19 @@ def _result(model: ComponentModel, fit: Fit, tests: SplitTests, independent: flo
         left_out = left_out_errors(
             fit, lambda chosen: fit_problem(model, [motions[k] for k in chosen])
         )
+    criterion = information_criterion(fit, independent)
     prediction = _prediction(model, fit, tests.predicted) if tests.predicted else None
-    return LawResult(
-        model,
-        fit,
-        judge(fit, motions),
-        left_out,
-        information_criterion(fit, independent),
-        prediction,
-        judge(prediction, tests.predicted) if prediction else None,
-    )
+    return LawResult(model, fit, judge(fit, motions), left_out, criterion, prediction)
 
 
-def _prediction(model: ComponentModel, fit: Fit, motions: Sequence[MeasuredMotion]) -> Fit:
+def _prediction(model: ComponentModel, fit: Fit, motions: Sequence[MeasuredMotion]) -> FittedLaw:
     """Return the evaluation of tests at fitted numbers."""
     values = fit.values[None]
     seen = fit_problem(model, motions)
-    blind = FitProblem(
-        (), seen.measurements, lambda points: computed_forces(model, motions, values)
+    blind = evaluated(
+        FitProblem((), seen.measurements, lambda points: computed_forces(model, motions, values))
     )
-    return evaluated(blind)
+    return FittedLaw(model, blind, judge(blind, motions))
 
 
 def information_criterion(fit: Fit, independent: float) -> float:

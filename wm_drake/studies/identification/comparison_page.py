@@ -85,8 +85,8 @@ def laws_table(comparison: Comparison) -> pd.DataFrame:
                 "lack_of_fit_by_rms_force": r.judgement.missed,
                 f"rmse_left_out_{unit}": r.left_out_rmse,
                 "bayesian_information_criterion": r.criterion,
-                f"rmse_blind_{unit}": r.prediction.rmse if r.prediction else np.nan,
-                "lack_of_fit_blind": r.predicted.missed if r.predicted else np.nan,
+                f"rmse_blind_{unit}": r.prediction.fit.rmse if r.prediction else np.nan,
+                "lack_of_fit_blind": r.prediction.judgement.missed if r.prediction else np.nan,
                 "as_good_as_best": r in comparison.as_good,
                 "supported": r is comparison.supported,
             }

@@ -18,7 +18,7 @@ from wm_drake.parameters.components import COMPONENTS_FOLDER
 from wm_drake.parameters.damper_laws import DamperNumbers
 from wm_drake.rigs import Harmonic, damper_bench, force_loops
 from wm_drake.rigs.measured import HarmonicMotion, measured_motion
-from wm_drake.studies.fitting import least_squares
+from wm_drake.studies.fitting.methods import least_squares
 from wm_drake.studies.identification.models import Given, damper_model
 from wm_drake.studies.identification.problem import fit_problem
 

@@ -8,7 +8,7 @@ import numpy as np
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report.figure import MEASURED, OURS, Figure, Line, Mark, Panel, Points, in_grid
 from wm_drake.rigs.measured import HarmonicMotion, MeasuredMotion
-from wm_drake.studies.fitting import Fit
+from wm_drake.studies.fitting.fit import Fit
 from wm_drake.studies.identification.comparison import TestedLoop
 from wm_drake.studies.rig.figures import loop_panel
 from wm_drake.studies.rig.units import units_of

@@ -20,7 +20,7 @@ from wm_drake.parameters import (
 )
 from wm_drake.parameters.units import Unit
 from wm_drake.studies.components import Target
-from wm_drake.studies.fitting import Fit
+from wm_drake.studies.fitting.fit import Fit
 from wm_drake.studies.fitting.page import unit_text
 from wm_drake.studies.identification.models import ComponentModel
 from wm_drake.studies.identification.scales import ANGLE, FORCE, LENGTH, TORQUE

@@ -9,7 +9,7 @@ from wm_drake.parameters.units import Unit
 from wm_drake.report.terminal import say
 from wm_drake.rigs.measured import MeasuredMotion, inertia_share, measured_motion, without_inertia
 from wm_drake.studies.components import Target, existing_files
-from wm_drake.studies.fitting import METHODS
+from wm_drake.studies.fitting.methods import METHODS
 from wm_drake.studies.identification.models import (
     Given,
     fields_of_law,

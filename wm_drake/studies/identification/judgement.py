@@ -9,8 +9,8 @@ from scipy.stats import f as fisher
 
 from wm_drake.parameters.types import FloatArray
 from wm_drake.rigs.measured import HarmonicMotion, MeasuredMotion
-from wm_drake.studies.fitting import Fit, Verdict, rmse, verdict_of
-from wm_drake.studies.fitting.fit import FAIR
+from wm_drake.studies.fitting.fit import FAIR, Fit, Verdict, verdict_of
+from wm_drake.studies.fitting.problem import rmse
 
 CHANCE = 0.01
 """Probability that noise alone shows as lack of fit."""

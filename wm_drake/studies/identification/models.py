@@ -22,7 +22,7 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.rigs import AXES, Bench, bushing_bench, damper_bench
 from wm_drake.rigs.measured import HarmonicMotion, MeasuredMotion
-from wm_drake.studies.fitting import Unknown
+from wm_drake.studies.fitting.problem import Unknown
 from wm_drake.studies.identification.scales import (
     ABOUT,
     ALONG,

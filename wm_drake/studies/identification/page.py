@@ -10,7 +10,7 @@ from wm_drake.report.page import picture
 from wm_drake.report.sections import Section, SectionedPage
 from wm_drake.report.table import Column, Table, table_of
 from wm_drake.rigs.measured import HarmonicMotion, MeasuredMotion, RecordedMotion
-from wm_drake.studies.fitting import Fit
+from wm_drake.studies.fitting.fit import Fit
 from wm_drake.studies.fitting.page import (
     correlations_table,
     history_picture,

@@ -12,7 +12,7 @@ from wm_drake.rigs.integration import PHASE
 from wm_drake.rigs.loops import steady_deformations
 from wm_drake.rigs.measured import HarmonicMotion, MeasuredMotion, RecordedMotion, sines_of
 from wm_drake.rigs.recorded import recorded_forces
-from wm_drake.studies.fitting import FitProblem, Measurement
+from wm_drake.studies.fitting.problem import FitProblem, Measurement
 from wm_drake.studies.identification.models import ComponentModel
 
 MOST_ROWS = 32

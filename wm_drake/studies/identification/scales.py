@@ -10,7 +10,7 @@ from wm_drake.parameters.damper_laws import Search
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.rigs.measured import MeasuredMotion
-from wm_drake.studies.fitting import Unknown
+from wm_drake.studies.fitting.problem import Unknown
 
 FORCE, TORQUE = Unit("N", "N"), Unit("N*m", "N*mm")
 STIFFNESS, DAMPING, SPEED = Unit("N/m", "N/mm"), Unit("N*s/m", "N*s/mm"), Unit("m/s", "mm/s")

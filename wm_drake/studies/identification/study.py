@@ -15,7 +15,7 @@ from wm_drake.errors import input_error
 from wm_drake.parameters.units import Unit
 from wm_drake.rigs.measured import MeasuredMotion
 from wm_drake.studies.components import axes_of, existing_files, mass_of, target_of
-from wm_drake.studies.fitting import Fit
+from wm_drake.studies.fitting.fit import Fit
 from wm_drake.studies.fitting.page import estimates_frame, undetermined_sentences, values_table
 from wm_drake.studies.identification.comparison import (
     Comparison,

@@ -28,16 +28,9 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.unbalance_cases import UnbalanceCase
 from wm_drake.parameters.variation import number_at, range_of
 from wm_drake.simulation.cases import Case
-from wm_drake.studies.fitting import (
-    Fit,
-    FitProblem,
-    Measurement,
-    Progress,
-    Unknown,
-    Verdict,
-    least_squares,
-    verdict_of,
-)
+from wm_drake.studies.fitting.fit import Fit, Verdict, verdict_of
+from wm_drake.studies.fitting.methods import least_squares
+from wm_drake.studies.fitting.problem import FitProblem, Measurement, Progress, Unknown
 from wm_drake.studies.inputs import channels_of, runnable_profile
 from wm_drake.studies.run import Executor
 from wm_drake.studies.spin_cycle.measured import rms_table
