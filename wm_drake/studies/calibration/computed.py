@@ -1,7 +1,8 @@
 """Computed values at points: amplitudes, other responses, and what is known of the springs."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -55,11 +56,11 @@ class Evaluation:
     parameter_map: ParameterMap
     targets: Targets
     workers: int | None = None
-    _responses: ComputedResponses = field(init=False)
 
-    def __post_init__(self) -> None:
-        """Build what the other responses need."""
-        self._responses = ComputedResponses(self.machine, self.targets.responses, self.workers)
+    @cached_property
+    def _responses(self) -> ComputedResponses:
+        """Function that computes the other responses."""
+        return ComputedResponses(self.machine, self.targets.responses, self.workers)
 
     def __call__(self, points: FloatArray) -> Computed:
         """Return the values at points (point, quantity), in SI units."""

@@ -1,7 +1,8 @@
 """Targets of a calibration that are no amplitudes of sensors, such as the forces of the gasket."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -237,12 +238,11 @@ class ComputedResponses:
     machine: Machine
     targets: tuple[ResponseTarget, ...]
     workers: int | None = None
-    _design: "_Design | None" = field(init=False, default=None)
 
-    def __post_init__(self) -> None:
-        """Build the machine of the design's trials, if a target is a mean over the design."""
-        if any(target.of_design for target in self.targets):
-            self._design = _Design.of(self.machine.parameters)
+    @cached_property
+    def _design(self) -> "_Design":
+        """The machine of the design's trials, built when a target is a mean over the design."""
+        return _Design.of(self.machine.parameters)
 
     def __call__(self, machines: Sequence[MachineParameters]) -> FloatArray:
         """Return the responses (machine, target) of machines. [unit for reading]
@@ -250,17 +250,18 @@ class ComputedResponses:
         They are NaN where a run diverged.
         """
         result = np.full((len(machines), len(self.targets)), np.nan)
-        if self._design is not None:
+        if any(target.of_design for target in self.targets):
             self._fill(result, machines, self._design)
         if not all(target.of_design for target in self.targets):
-            self._fill(result, machines, _Itself(self.machine))
+            self._fill(result, machines, _Design(self.machine))
         return result
 
     def _fill(
-        self, result: FloatArray, machines: Sequence[MachineParameters], way: "_Itself | _Design"
+        self, result: FloatArray, machines: Sequence[MachineParameters], way: "_Design"
     ) -> None:
         """Write the responses that are evaluated in one way."""
-        places = [i for i, t in enumerate(self.targets) if t.of_design == way.is_design]
+        is_design = way.levels is not None
+        places = [i for i, t in enumerate(self.targets) if t.of_design == is_design]
         evaluated = [self.targets[i] for i in places]
         loads = list(dict.fromkeys((t.load, t.gasket) for t in evaluated))
         cases = (
@@ -280,30 +281,17 @@ class ComputedResponses:
 
 
 @dataclass(frozen=True)
-class _Itself:
-    """Evaluation of a response at the machine itself."""
-
-    machine: Machine
-    is_design: bool = False
-
-    def trials(self, parameters: MachineParameters) -> Iterable[MachineParameters]:
-        return [parameters]
-
-    def statistic(self, _target: ResponseTarget, runs: FloatArray) -> FloatArray:
-        """Return the value of each machine from its one run (machine, trial)."""
-        return np.asarray(runs[:, 0])
-
-
-@dataclass(frozen=True)
 class _Design:
-    """Evaluation of a response over the trials of the gasket study of [B].
+    """Evaluation of a response over the trials of the gasket study of [B], or at a machine itself.
 
     Stiffness tables are replaced by their slopes at rest, as in [B] section 4.
+
+    Attributes:
+        levels: Levels of the factors in each trial; None for the machine itself.
     """
 
     machine: Machine
-    levels: Levels
-    is_design: bool = True
+    levels: Levels | None = None
 
     @classmethod
     def of(cls, parameters: MachineParameters) -> "_Design":
@@ -316,6 +304,8 @@ class _Design:
         return levels_of(parameters, load_factors(GASKET_FACTORS), "linear")
 
     def trials(self, parameters: MachineParameters) -> Iterable[MachineParameters]:
+        if self.levels is None:
+            return [parameters]
         factors = self._factors(parameters)
         return (at_levels(parameters, factors, row.tolist()) for row in self.levels)
 
@@ -325,7 +315,7 @@ class _Design:
         Of an orthogonal array, the sum of squares of a factor is that of its effects.
         """
         mean = runs.mean(axis=1)
-        if not target.factor:
+        if not target.factor or self.levels is None:
             return np.asarray(mean)
         levels = self.levels[:, list(load_factors(GASKET_FACTORS)).index(target.factor)]
         effects = [runs[:, levels == level].mean(axis=1) - mean for level in (-1, 0, 1)]

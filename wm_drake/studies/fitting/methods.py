@@ -28,6 +28,9 @@ from wm_drake.studies.fitting.surfaces import response_surface
 AGREEING = 2
 """Searches from different starts with the same least end that are enough: no more are made."""
 
+MEMBERS, MOST_GENERATIONS = 8, 120
+"""Members of an evolution for each unknown, and its generations at most."""
+
 POLISHED_EVERY = 5
 """Generations of an evolution between two searches by least squares from its best point."""
 
@@ -74,8 +77,6 @@ def evolution(
     problem: FitProblem,
     *,
     seed: int = 0,
-    population: int = 8,
-    generations: int = 120,
     progress: Progress = silent,
 ) -> Fit:
     """Search by differential evolution, with least squares from its best point now and then.
@@ -84,25 +85,30 @@ def evolution(
     best points of two generations come to the same least RMSE.
 
     Args:
-        population: Members for each unknown.
-        generations: Generations at most.
         progress: Called after every generation.
     """
     search = Search(problem)
-    polish = _Polish(problem, search)
+    ends: list[Optimum] = []
+    last: FloatArray = np.full(len(problem.unknowns), np.nan)
+
+    def agrees_from(point: FloatArray) -> bool:
+        """Search from one more point unless enough searches agree; return whether they do."""
+        nonlocal last
+        if agreeing(problem, ends) < AGREEING and not np.array_equal(point, last):
+            last = point.copy()
+            ends.append(descended(search.residuals, point))
+        return agreeing(problem, ends) >= AGREEING
 
     def generation_done(intermediate_result: optimize.OptimizeResult) -> bool:
         search.round_done()
         progress(underway(intermediate_result.nit, 2 * POLISHED_EVERY), search.least)
-        return intermediate_result.nit % POLISHED_EVERY == 0 and polish.agrees_from(
-            intermediate_result.x
-        )
+        return intermediate_result.nit % POLISHED_EVERY == 0 and agrees_from(intermediate_result.x)
 
     end = optimize.differential_evolution(
         lambda points: search.costs(points.T),
         [(0.0, 1.0)] * len(problem.unknowns),
-        popsize=population,
-        maxiter=generations,
+        popsize=MEMBERS,
+        maxiter=MOST_GENERATIONS,
         tol=0.01,
         polish=False,
         updating="deferred",
@@ -111,45 +117,15 @@ def evolution(
         callback=generation_done,
         rng=np.random.default_rng(seed),
     )
-    polish.agrees_from(end.x)
+    agrees_from(end.x)
     search.round_done()
     progress(1.0, search.least)
     note = (
-        f"least squares from the best of {len(polish.ends)} of {end.nit} generations: "
-        f"{polish.agreeing} came to the same least RMSE"
+        f"least squares from the best of {len(ends)} of {end.nit} generations: "
+        f"{agreeing(problem, ends)} came to the same least RMSE"
     )
-    return assess(problem, polish.best, search.log("evolution", seed, note))
-
-
-class _Polish:
-    """Least squares from the best points of an evolution, until two searches agree."""
-
-    def __init__(self, problem: FitProblem, search: Search[FitProblem]) -> None:
-        self._problem, self._search = problem, search
-        self._last: FloatArray | None = None
-        self.ends: list[Optimum] = []
-
-    def agrees_from(self, point: FloatArray) -> bool:
-        """Search from one more point, and return whether enough searches agree.
-
-        There is no search if enough agree already, or if the point is the last one again.
-        """
-        if self.agreeing < AGREEING and not (
-            self._last is not None and np.array_equal(point, self._last)
-        ):
-            self._last = point.copy()
-            self.ends.append(descended(self._search.residuals, point))
-        return self.agreeing >= AGREEING
-
-    @property
-    def agreeing(self) -> int:
-        """Number of searches that came to the least end."""
-        return agreeing(self._problem, self.ends)
-
-    @property
-    def best(self) -> FloatArray:
-        """Point of the least end."""
-        return min(self.ends, key=lambda end: end.cost).point
+    best = min(ends, key=lambda end: end.cost)
+    return assess(problem, best.point, search.log("evolution", seed, note))
 
 
 def refined(problem: FitProblem, fit: Fit, note: str) -> Fit:
