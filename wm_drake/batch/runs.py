@@ -366,7 +366,8 @@ class LaneRun(Run):
     @functools.cached_property
     def filtered(self) -> FloatArray:
         if self.good == len(self.lane.of_batch):
-            return self.lane.of_batch
+            # in the order of a record: sums are then rounded as those of a record
+            return np.ascontiguousarray(self.lane.of_batch)
         return super().filtered
 
     @functools.cached_property
