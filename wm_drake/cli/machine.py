@@ -65,13 +65,7 @@ def machine_check(
 
 
 def _check(file: str, strict: bool, draw: Callable[[str], None] | None) -> None:
-    """Check a machine file and say what is unusual.
-
-    Args:
-        file: Name or path.
-        strict: Whether unusual values are errors.
-        draw: Called with the page of the machine.
-    """
+    """Check a machine file and say what is unusual."""
     parameters = load_parameters(file, None)
     machine, unusual = built_with_problems(file, parameters)
     if draw is not None:

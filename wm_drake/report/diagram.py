@@ -4,11 +4,7 @@ from pydrake.systems.framework import Diagram
 
 
 def mermaid(diagram: Diagram) -> str:
-    """Return a Mermaid flow chart of the systems of a diagram and the signals between them.
-
-    Args:
-        diagram: Diagram of a built machine.
-    """
+    """Return a Mermaid flow chart of the systems of a diagram and the signals between them."""
     systems = diagram.GetSystems()
     lines = ["flowchart LR"]
     for system in systems:

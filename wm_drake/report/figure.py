@@ -374,7 +374,6 @@ def boxes(places: Numbers, samples: Sequence[FloatArray], half: float, **style: 
         places: Middles of the boxes (n,).
         samples: Values of each box; a box without values is left out.
         half: Half of the width of a box.
-        style: Fields of marks, such as the colour.
     """
     pairs = [
         (at, np.percentile(v, (0, 25, 50, 75, 100)))

@@ -58,11 +58,7 @@ def shape_name(name: str) -> str:
 
 
 def plain(value: Any) -> Any:
-    """Return data for JSON: arrays as lists, None for NaN and infinity, which JSON does not have.
-
-    Args:
-        value: Texts, numbers, arrays, and mappings and sequences of them.
-    """
+    """Return data for JSON: arrays as lists, NaN and infinity as None, which it lacks."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if hasattr(value, "tolist"):  # numbers and arrays of numpy

@@ -86,12 +86,7 @@ def _outer_labels(figure: fig.Figure) -> list[Plain]:
 
 
 def _note(text: str, size: float, color: str, *, is_bold: bool = False, **place: Any) -> Plain:
-    """Return a text in a picture.
-
-    Args:
-        size: Its size. [px]
-        place: Where it is, in the words of Plotly.
-    """
+    """Return a text in a picture."""
     font = {"size": size, "color": color, "weight": 700 if is_bold else 400}
     return {"text": escaped(text), "showarrow": False, "borderpad": 0, "font": font, **place}
 
@@ -280,13 +275,7 @@ def packed(values: Any) -> Plain:
 
 
 def thinned(x: FloatArray, y: FloatArray, most: int) -> tuple[FloatArray, FloatArray]:
-    """Return at most about `most` points of a curve, among them the extremes of each interval.
-
-    Args:
-        x: (n,) abscissae.
-        y: (n,) ordinates.
-        most: Number of points from which on a curve is thinned.
-    """
+    """Return at most about `most` points of a curve, among them the extremes of each interval."""
     if len(x) <= most:
         return x, y
     length = -(-len(x) // (most // 2))

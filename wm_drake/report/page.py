@@ -95,9 +95,6 @@ def sections(body: str) -> list[tuple[str, Markup]]:
     """Return anchor and heading of each section of a page, for its table of contents.
 
     A heading is cut at its first colon.
-
-    Args:
-        body: HTML text of the page, with headings that are already escaped.
     """
     headings = re.findall(r'<section id="([^"]+)">\s*<h2>(.*?)</h2>', body, re.DOTALL)
     return [(anchor, Markup(heading.split(":")[0])) for anchor, heading in headings]

@@ -49,7 +49,6 @@ def write_figures(figures: list[tuple[Figure, str]], folder: Path) -> None:
 
     Args:
         figures: Figures and their alternative texts, which name the files.
-        folder: Folder that exists.
     """
     from matplotlib import rc_context  # slow to import: only for --figures
 

@@ -80,11 +80,7 @@ def runner_of(machine: OpenMachine) -> Runner:
 
 
 def picture(machine: OpenMachine, runner: Runner, state: State) -> dict[str, Any]:
-    """Run what a page has chosen and return the motion, and the gap with each load.
-
-    Args:
-        runner: From `picture_runner_of`.
-    """
+    """Run what a page has chosen and return the motion, and the gap with each load."""
     with machine.lock:
         case = machine.case(state)
         assert case.parameters is not None  # a page's case has parameters of its own
@@ -132,7 +128,6 @@ def numbers(
     """Run what a page has chosen and return measures, forces and arrows.
 
     Args:
-        runner: From `runner_of`.
         keys: Key paths of up to `LANES` numbers to turn slightly.
     """
     turned, results = _run_turned(machine, runner, state, keys)
@@ -153,11 +148,7 @@ def _friction_that_jumps(parameters: MachineParameters) -> list[Problem]:
 def arrows(
     machine: OpenMachine, runner: Runner, state: State, keys: Sequence[str]
 ) -> list[dict[str, Any]]:
-    """Return the arrow of each of up to `LANES` numbers, without the answer itself.
-
-    Args:
-        runner: From `runner_of`.
-    """
+    """Return the arrow of each of up to `LANES` numbers, without the answer itself."""
     return _arrows(machine, *_run_turned(machine, runner, state, keys))
 
 

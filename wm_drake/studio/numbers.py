@@ -63,11 +63,7 @@ class Slider:
         return (self.high - self.low) / 100.0 / self.unit.from_si(1.0)
 
     def for_page(self, places: Mapping[str, tuple[str, str]]) -> dict[str, Any]:
-        """Return the number as the page shows it; `short` is unique enough for a narrow column.
-
-        Args:
-            places: From `studio.parts.places_of`.
-        """
+        """Return the number as the page shows it; `short` is unique enough for a narrow column."""
         part, group = part_and_group(self.key, places)
         *parents, name = self.key.split(".")
         if self.is_entry:

@@ -52,12 +52,7 @@ _OF_BUSHING = {
 
 
 def part_and_group(key: str, places: Mapping[str, tuple[str, str]]) -> tuple[str, str]:
-    """Return the part of the machine of a number, and the words of its group in that part.
-
-    Args:
-        key: Key path.
-        places: From `places_of`.
-    """
+    """Return the part of the machine of a number, and the words of its group in that part."""
     first, *rest = key.split(".")
     if first == "frames" and rest[0] in places:
         return places[rest[0]]
@@ -75,12 +70,7 @@ def part_and_group(key: str, places: Mapping[str, tuple[str, str]]) -> tuple[str
 
 
 def places_of(parameters: MachineParameters, plant: MultibodyPlant) -> dict[str, tuple[str, str]]:
-    """Return part and words of each frame that an element, a sensor or a joint has.
-
-    Args:
-        parameters: The machine.
-        plant: Plant of a machine with the same elements.
-    """
+    """Return part and words of each frame that an element, a sensor or a joint has."""
     places = {}
     for joint in map(plant.get_joint, plant.GetJointIndices()):
         body = joint.child_body().name()

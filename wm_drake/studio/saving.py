@@ -29,7 +29,6 @@ def save_machine(
     """Write what a page has chosen as a machine file into the folder of the machines.
 
     Args:
-        machines: Where the base of the file and the folder come from.
         name: Name of the new machine, without a suffix.
         overwrite: Whether a file of this name is replaced.
 
@@ -81,10 +80,7 @@ def write_machine(
     The file is read again before it gets its name, and must give the same machine.
 
     Args:
-        path: The new file.
         base: Name of a shipped machine, or path of the file to extend.
-        parameters: The new machine.
-        machine: The open machine of `base`.
     """
     extends = base if isinstance(base, str) else os.path.relpath(base.resolve(), path.parent)
     about = f"{machine.parameters.name}, changed in wm-drake studio"[:LONGEST_ABOUT]

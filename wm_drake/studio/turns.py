@@ -96,11 +96,7 @@ class SharedValues(Generic[Value]):
     """
 
     def __init__(self, most: int) -> None:
-        """Begin empty.
-
-        Args:
-            most: Largest number of values that are kept.
-        """
+        """Begin empty."""
         self._most = most
         self._futures: dict[Hashable, Future[Value]] = {}
         self._lock = threading.Lock()

@@ -219,12 +219,7 @@ def oscillating_mass(setup: Setup) -> float:
 
 
 def _sag(setup: Setup, bodies: dict[str, Any]) -> float:
-    """Return by how much the centre of mass of tub and drum is below its place as drawn. [m]
-
-    Args:
-        setup: The machine at rest.
-        bodies: Its described bodies: T and W coincide as drawn.
-    """
+    """Return by how much the centre of mass of tub and drum is below its place as drawn. [m]"""
     context, lost = setup.plant_context, 0.0
     for body in oscillating_bodies(setup.machine.plant):
         centre = body.EvalPoseInWorld(context) @ body.CalcCenterOfMassInBodyFrame(context)

@@ -247,7 +247,6 @@ def estimate_unbalance(
     """Return the unbalance of loads as the drive sees it at a constant speed.
 
     Args:
-        parameters: Machine with a motor.
         speed: Speed of the hold, reached by a ramp. [rad/s]
         inertia: Inertia of drum and rotor about the axis, without load. [kg m^2]
     """

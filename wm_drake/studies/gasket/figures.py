@@ -301,7 +301,6 @@ def _of_pair(
     """Return a panel of two factors: the first on the axis, the second, by colour, above it.
 
     Args:
-        y: Axis of the response.
         more: Text after the values of the second factor.
     """
     first, second = factors

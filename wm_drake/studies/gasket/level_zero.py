@@ -87,7 +87,6 @@ def run_level_zero(
 
     Args:
         levels: Levels of the factors by treatment of tables, all of `TABLES`.
-        tables: Treatment in the study.
 
     Returns:
         The responses; None if no factor has a table, so that both treatments are the same.

@@ -163,13 +163,7 @@ NOT_PUBLISHED = Published()
 def published_for(
     results: PublishedResults, labels: Iterable[Label], source: str = ""
 ) -> Published:
-    """Return those published results that belong to some loads and responses.
-
-    Args:
-        results: Published results of a study.
-        labels: Loads and responses that are compared.
-        source: Where the results are from, for reading.
-    """
+    """Return those published results that belong to some loads and responses."""
     compared = set(labels)
     kept = {label: terms for label, terms in results.items() if label in compared}
     return Published(kept, source if kept else "")

@@ -82,8 +82,6 @@ def as_responses(table: xr.Dataset, loads: Sequence[str], chosen: Sequence[Respo
 
     Args:
         table: Table of runs; the loads of one trial follow each other.
-        loads: Names of the loads, in the order of the runs.
-        chosen: The responses.
     """
     columns = {response.name: response.values(table) for response in chosen}
     values = {

@@ -93,11 +93,7 @@ class Surfaces:
         return float(row @ self.coefficients[label])
 
     def half_width(self, label: Label, places: Sequence[float], *, of_run: bool) -> float:
-        """Return the half width of the interval of a new run, or of the mean.
-
-        Args:
-            of_run: Whether the interval is that of a single run.
-        """
+        """Return the half width of the interval of a new run, or of the mean."""
         row = model_row(places, interactions=self.interactions)
         return self._half_width(label, row, of_run=of_run)
 

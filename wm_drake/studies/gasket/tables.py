@@ -150,9 +150,6 @@ def runs_frame(screening: Screening, physical: pd.DataFrame | None = None) -> pd
 
     The columns are trial, load, levels, physical values, responses, whether the tub touches the
     housing, the springs that go slack, and the reason if the run failed.
-
-    Args:
-        physical: Physical values of each trial, from `physical_values`.
     """
     design, responses = screening.design, screening.responses
     parts = []
@@ -401,10 +398,6 @@ def variance(
     """Return mean, range, explained variance and R2 of each response, as [B] Table 4.
 
     The published mean is beside ours if there is one.
-
-    Args:
-        short: Whether the table is for a terminal.
-        has_terms: Whether the leading terms are in the table.
     """
     frame, labels = variance_frame(screening), list(screening.tables)
     if published.has_means:

@@ -60,10 +60,7 @@ def with_gasket(
     the other sign than that of x with the angle about z.
 
     Args:
-        machine: Machine with a gasket, whose two frames stay.
-        stiffness: Tables and coupling.
         damping: Damping of an axis by its stiffness. [s]
-        source: Source of the numbers.
     """
     assert machine.gasket is not None
     axes = {"x": (RADIAL, TILT), "y": (AXIAL, TWIST), "z": (RADIAL, TILT)}

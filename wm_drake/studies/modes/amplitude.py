@@ -78,9 +78,6 @@ def amplitude_modes(
     """Follow each stuck mode over its amplitude.
 
     Args:
-        setup: Machine at rest, with friction.
-        stuck: Its modes with stuck friction.
-        modes: The same, named.
         amplitudes: Rising amplitudes at which values are wanted; steps between them are as short as
             convergence needs. [m]
 

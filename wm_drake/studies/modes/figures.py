@@ -63,7 +63,6 @@ def _campbell(result: MachineModes, name: str, scale: fig.Scale, top: float) -> 
     """Return the diagram of one linearisation.
 
     Args:
-        scale: Colours of the damping ratios.
         top: Highest frequency. [Hz]
     """
     diagram = result.diagrams[name]

@@ -95,7 +95,6 @@ class Linearisation:
         """Pack a machine.
 
         Args:
-            setup: Machine at the rest pose of the empty machine.
             loaded: Whether there is a load, which moves the equilibrium.
 
         Raises:

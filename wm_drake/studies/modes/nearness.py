@@ -61,11 +61,7 @@ def nearness(
 
 
 def about_nearness(near: Nearness) -> str:
-    """Return the sentence that says which mode brings the tub to the housing.
-
-    Args:
-        near: Gaps of the modes while friction slides.
-    """
+    """Return the sentence that says which mode brings the tub to the housing."""
     gap = near.of_mode[near.nearest]
     amplitude, left, rest = (
         number(MM_PER_M * value, 1)

@@ -64,7 +64,6 @@ def sensitivities(
     """Return the sensitivity of modes to every number, without those that cannot be changed.
 
     Args:
-        spectrum: Modes of its matrix.
         matrix_of: Returns the matrix of a machine with a number changed.
         loads: Whether the matrix depends on a load.
     """

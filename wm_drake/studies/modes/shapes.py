@@ -67,7 +67,6 @@ def modes_of(spectrum: Spectrum, wrench_slopes: FloatArray) -> list[Mode]:
     """Return named modes.
 
     Args:
-        spectrum: Eigenvalues of the free numbers of the state.
         wrench_slopes: Slopes of the wrench of each element on the tub. (elements, 6, n)
     """
     shares = participation(spectrum)

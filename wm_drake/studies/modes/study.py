@@ -234,12 +234,6 @@ def three_linearisations(
 ) -> NaturalModes:
     """Return the natural modes of a machine with a load, without anything that takes seconds.
 
-    Args:
-        load: Point masses in the drum, or the name of one of the machine's loads.
-        parameters: Numbers to use; those it was built from if None.
-        gasket: False removes the gasket.
-        amplitude: Amplitude of the third linearisation, as for `modes`. [m]
-
     Raises:
         InputError: the cabinet moves, or the machine cannot be set up.
     """

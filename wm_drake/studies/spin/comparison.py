@@ -184,9 +184,6 @@ def measures_of(case: CaseResult) -> dict[tuple[str, str, str], float]:
 def difference_table(variants: Sequence[Variant]) -> pd.DataFrame:
     """Return the differences of all measures between each variant and the first one.
 
-    Args:
-        variants: At least two; see `check_comparable`.
-
     Returns:
         Columns load, measure, name, unit, reference and variant (names of variants),
         reference_value, value, difference (value - reference_value) and percent (of the absolute

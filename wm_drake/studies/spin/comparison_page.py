@@ -81,11 +81,7 @@ def overlaid_envelopes_figure(
 
 
 def differences(table: pd.DataFrame, load: str) -> Table:
-    """Return the differences of all measures of one load as a table for a page.
-
-    Args:
-        table: Result of `difference_table`.
-    """
+    """Return the differences of all measures of one load as a table for a page."""
     rows = table[table["load"] == load]
     reference = rows["reference"].iloc[0]
     names = list(dict.fromkeys(rows["variant"]))
@@ -118,11 +114,7 @@ def signed(value: float, decimals: int) -> str:
 
 
 def amplitudes(variants: Sequence[Variant], table: pd.DataFrame) -> Table:
-    """Return the amplitudes of all variants, load by load, with the differences in percent.
-
-    Args:
-        table: Result of `difference_table` for them.
-    """
+    """Return the amplitudes of all variants, load by load, with the differences in percent."""
     sensors = common_sensors([variant.result.parameters for variant in variants])
     groups = []
     for index, case in enumerate(variants[0].result.results):

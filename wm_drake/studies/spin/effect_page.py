@@ -145,7 +145,6 @@ def _pair_table(effect: pd.DataFrame, lines: list[tuple[str, str]], caption: str
     """Return a table of amplitudes: rows without, with and difference, a column per sensor.
 
     Args:
-        effect: Result of `effects`.
         lines: Prefix of the columns and name of the source, for each source.
     """
     groups = []
@@ -168,9 +167,6 @@ def records_picture(
     effect: pd.DataFrame, without: CaseResult, with_gasket: CaseResult
 ) -> Picture | None:
     """Return the records of both runs of a case at the sensors with the largest difference.
-
-    Args:
-        effect: Rows of `effect_table` of one machine.
 
     Returns:
         The picture; None if a run diverged or is too short.

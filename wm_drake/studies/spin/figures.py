@@ -70,9 +70,6 @@ def gasket_figure(record: Record) -> fig.Figure:
     """Return force (upper row) and moment (lower row) of the gasket on the housing over time.
 
     A band shows the smallest to the largest value in each drum revolution.
-
-    Args:
-        record: A record of a run with gasket.
     """
     panels = []
     for letter, variable, label in (

@@ -182,11 +182,7 @@ def _pictures(cases: list[CaseResult]) -> tuple[Picture, ...]:
 
 
 def floor_figure(cases: list[CaseResult]) -> Figure:
-    """Return smallest load of a foot, margin of sliding and margin of turning over time.
-
-    Args:
-        cases: Cases with feet and at least two samples.
-    """
+    """Return smallest load of a foot, margin of sliding and margin of turning over time."""
     marks: list[list[Mark]] = [[Rule(0.0, color=MARK)] for _ in HEADS[:3]]
     for index, case in enumerate(cases):
         time, smallest = windows(case.record.time.values, foot_loads_of(case.record).margins)
@@ -285,12 +281,7 @@ def walk_pictures(cases: list[CaseResult]) -> tuple[Picture, ...]:
 
 
 def walk_figure(cases: list[CaseResult], farthest: CaseResult) -> Figure:
-    """Return the path of the feet of one case, and distance and turn over time of all.
-
-    Args:
-        cases: Cases whose cabinet moves, with at least two samples.
-        farthest: The case whose feet are drawn.
-    """
+    """Return the path of the feet of one case, and distance and turn over time of all."""
     last = max(float(case.record.time[-1]) for case in cases)
     panels = [_floor(farthest)]
     texts = ("distance, mm", "turn, degrees")

@@ -60,9 +60,6 @@ def steady_amplitudes(record: Record, window: tuple[float, float]) -> xr.DataArr
 def effect_table(without: SpinResult, with_gasket: SpinResult) -> pd.DataFrame:
     """Return the amplitudes of each load and sensor without and with gasket.
 
-    Args:
-        with_gasket: Result with gasket, with the same loads in the same order.
-
     Returns:
         Columns load, sensor, without_mm, with_mm, percent ([B] Eq. (1)); experiment_without_mm,
         experiment_with_mm, experiment_percent, which are NaN where nothing was measured or compared

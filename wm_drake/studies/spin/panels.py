@@ -71,13 +71,7 @@ def time_figure(panels: Sequence[fig.Panel | None]) -> fig.Figure:
 def time_panel(
     record: Record, name: str, marks: Sequence[fig.Mark], label: str, limits: tuple[float, float]
 ) -> fig.Panel:
-    """Return a panel over time, with the drum speed along the top.
-
-    Args:
-        name: Name, which is written at the top left.
-        label: Quantity and unit.
-        limits: Ends of the vertical axis.
-    """
+    """Return a panel over time, with the drum speed along the top."""
     end = float(record.time[-1])
     marks = _lowered(name, marks)
     at = {"in_data": (False, False), "across": "left", "up": "top", "is_bold": True}
@@ -140,10 +134,6 @@ def revolution_band(
     """Return times and the smallest and the largest value of a signal in each drum revolution.
 
     The first and the last value reach to the ends of the record.
-
-    Args:
-        record: A record with at least one sample.
-        values: (n,) the signal.
     """
     starts, time = revolution_starts(record), record.time.values
     middle = 0.5 * (time[starts] + np.append(time[starts[1:]], time[-1]))
@@ -160,7 +150,6 @@ def largest_marks(
     """Return a dot at the largest absolute value, and that value with its drum speed at the top.
 
     Args:
-        values: (n,) the signal.
         line: Number of the line of text, counted from the top of the panel.
     """
     index = int(np.argmax(np.abs(values)))

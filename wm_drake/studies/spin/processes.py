@@ -34,7 +34,6 @@ def map_in_processes(
     Args:
         function: Function of a module, called with an item and a callable for its progress.
         items: Arguments, which can be pickled.
-        count: Number of processes.
         progress: Called here with the index of an item and the fraction of it that is done.
 
     Raises:

@@ -42,11 +42,7 @@ ON_MAP = "#fefefe"
 
 
 def vibration_pictures(result: SpinResult, case: CaseResult) -> list[Picture | None]:
-    """Return mount forces, accelerations and spectra of a case; None where there is nothing.
-
-    Args:
-        case: A case with at least two samples.
-    """
+    """Return mount forces, accelerations and spectra of a case; None where there is nothing."""
     accelerations = sensor_accelerations(case.record, result.sensors_of(case))
     return [
         _mounts_picture(case),
@@ -174,7 +170,6 @@ def _map(
 
     Args:
         values: Amplitudes (time, dimension).
-        scale: Colours of the amplitudes.
         highest: Upper end of the frequencies; 0 for the largest order. [Hz]
     """
     times = np.arange(float(values.time[0]), float(values.time[-1]) + 0.5 * PERIOD, PERIOD)

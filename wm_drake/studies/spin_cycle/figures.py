@@ -66,12 +66,6 @@ def bars_figure(
 
     There is one panel for each sensor (rows) and axis (columns). All displacements are those of one
     case and have the shape (region, accelerometer, axis). [m]
-
-    Args:
-        computed: Displacements computed directly.
-        integrated: Displacements from integrated acceleration, or None to omit them.
-        measured: Measured displacements, or None if there are none.
-        name: Name of the measurement in the legend.
     """
     sensors, directions = (
         list(map(str, computed[dim].values)) for dim in ("accelerometer", "axis")

@@ -37,9 +37,6 @@ def rms_table(displacement: xr.DataArray) -> pd.DataFrame:
 def read_rms(path: Path, labels: Mapping[str, Sequence[str]]) -> xr.DataArray:
     """Read measured RMS displacements from a CSV file with the columns `RMS_COLUMNS`.
 
-    Args:
-        labels: Names of the study along each dimension, from `labels_of`.
-
     Returns:
         (case, region, accelerometer, axis); NaN where the file has no value. [m]
 
@@ -87,8 +84,6 @@ def read_accelerations(
     bias of each sensor is estimated by a mean with a Hann window and subtracted.
 
     Args:
-        folder: Folder with the files.
-        labels: Names of the study along each dimension, from `labels_of`.
         channels: Name in the files of ``time`` or of an accelerometer's axis, such as ``S1_x``. A
             CSV may have the unit in its header then: ``Acc 1 [g]``.
 

@@ -82,12 +82,7 @@ def forces_measured(parameters: MachineParameters) -> tuple[str, ...]:
 def forces_of(
     parameters: MachineParameters, table: xr.Dataset, labels: dict[str, list[str]]
 ) -> xr.Dataset:
-    """Return the forces of a table of runs, with cases and regions by name.
-
-    Args:
-        table: Table of runs with the measures of `measures_of`.
-        labels: From `labels_of`.
-    """
+    """Return the forces of a table of runs, with cases and regions by name."""
     coordinates = {name: labels[name] for name in ("case", "region", "axis")}
     coordinates["mount"] = list(mount_names(parameters))
     if parameters.cabinet:

@@ -228,11 +228,7 @@ MARGIN_COLUMNS = list(SHOWN_FEET)[1:-1]
 
 
 def feet_frame(result: SpinCycleResult) -> pd.DataFrame:
-    """Return a row for each case and region, and one for the whole run: loads and margins.
-
-    Args:
-        result: Result of a machine with a cabinet.
-    """
+    """Return a row for each case and region, and one for the whole run: loads and margins."""
     rows: list[dict[str, Any]] = []
     for case in result.cases:
         feet = as_json(result.forces.sel(case=case.name))["feet"]

@@ -130,11 +130,7 @@ def compiled_runs(machine: Machine) -> Evaluate:
 def drake_runs(
     parameters: MachineParameters, *, progress: Callable[[int], None] = lambda done: None
 ) -> Evaluate:
-    """Return a function that runs cases with the Drake engine in processes; a case takes minutes.
-
-    Args:
-        progress: Called with the number of finished cases.
-    """
+    """Return a function that runs cases with the Drake engine in processes, minutes a case."""
 
     def evaluate(cases: Iterable[Case]) -> xr.Dataset:
         runs = list(cases)

@@ -51,8 +51,6 @@ class Corrections:
         """Factor the system.
 
         Args:
-            balance: The machine.
-            at: Its balance at a motion.
             row: Coefficients of the last equation, 0 for velocities. (2 N + 1, n)
             row_speed: Coefficient of the speed in it.
 
@@ -105,7 +103,6 @@ def condense(
 
     Args:
         slopes, speed, held, hold: As for `write_derivative`.
-        partition: Which numbers are positions, velocities, others.
         borders: Columns of spin rates and of the speed. (2 N + 1, n, b)
         matrix: The first (2 N + 1) m rows are written, for m numbers that are no positions.
 
@@ -151,9 +148,7 @@ def add_shifts(
         v_cos i = i Omega p_sin i,     v_sin i = -i Omega p_cos i
 
     Args:
-        by_velocity: As in `Condensed`.
         speed: Omega. [rad/s]
-        partition: Which numbers are positions, velocities, others.
         matrix: Changed. Columns of numbers that are no velocities.
     """
     p, m, places = len(partition.positions), len(partition.others), partition.places
@@ -172,10 +167,7 @@ def subtract_turns(
     """Subtract the part of the angular velocities of a body.
 
     Args:
-        by_velocity: As in `Condensed`.
         rates: Minus the angular velocities by the angles. (3 (2 N + 1), 3 (2 N + 1))
-        b: Number of the body.
-        partition: Which numbers are positions, velocities, others.
         matrix: Changed. Columns of numbers that are no velocities.
     """
     p, m, places = len(partition.positions), len(partition.others), partition.places
@@ -197,8 +189,6 @@ def rates_of(values: FloatArray, partition: Partition, by_rates: FloatArray) -> 
 
     Args:
         values: (2 N + 1, n), of which the rows of positions are read.
-        partition: Which numbers are positions.
-        by_rates: As in `Condensed`.
     """
     size, p, bodies = len(values), len(partition.positions), len(by_rates)
     rates = np.empty((size, p))
@@ -229,9 +219,6 @@ def right_side(
 
     Args:
         residual: Residual of the balance. (2 N + 1, n)
-        last: Right side of the last equation.
-        partition: Which numbers are positions, velocities, others.
-        condensed: `Condensed`.
     """
     rows = len(condensed.by_velocity)
     right = np.zeros(rows + condensed.rates.shape[1])
@@ -255,8 +242,6 @@ def whole_change(
         solved: Solution of the condensed system.
         residual: Residual of the balance. (2 N + 1, n)
         speed: Omega. [rad/s]
-        partition: Which numbers are positions, velocities, others.
-        condensed: `Condensed`.
     """
     size, m, p = len(residual), len(partition.others), len(partition.positions)
     change, values = np.empty(residual.shape), residual.copy()

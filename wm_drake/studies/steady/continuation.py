@@ -118,11 +118,8 @@ def follow(
     """Return the periodic motions along the branch through a first one.
 
     Args:
-        balance: The machine.
         speeds: Speeds in rising or falling order, at least two; the branch is followed from the
             first to the last. [rad/s]
-        first: Coefficients of the motion at the first speed.
-        progress: Called with the fraction done.
 
     Returns:
         A point at each crossing of a speed, and some between them where the branch bends. Behind a
@@ -225,7 +222,6 @@ def _step(
     """Return the next place along a branch, and whether it was found at once; None if not found.
 
     Args:
-        balance, metric: The machine, and the size of a step.
         place: Where the step begins.
         length: Arc length of the step.
         begin, speed: First guess of the motion and its speed.
@@ -256,7 +252,6 @@ def _solved(
     """Return a motion, its speed, factors near it, and the number of corrections; None if none.
 
     Args:
-        balance: The machine.
         begin, speed: First guess of the motion and its speed.
         row: Last equation of the corrections.
     """
@@ -315,8 +310,6 @@ def _turned(
     """Return the next place, and the cosine of the bend; None if the branch bends too much.
 
     Args:
-        metric: Size of a step.
-        place: The place before.
         coefficients, speed: The next motion.
         solve: Factors near it.
     """
@@ -344,7 +337,6 @@ def _share(
     that whole corrections go to and fro across the bend for ever.
 
     Args:
-        balance: The machine.
         coefficients, speed, residual: The motion before the correction.
         change, faster: Correction of the coefficients and of the speed.
     """

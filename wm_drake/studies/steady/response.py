@@ -262,10 +262,7 @@ def settled_trajectory(
     It is an independent check of harmonic balance, and a first guess without a better one.
 
     Args:
-        setup: Machine at rest with its load.
         speed: Of the drum. [rad/s]
-        samples: Number of samples of a revolution.
-        revolutions: Number of drum revolutions.
 
     Returns:
         `samples` samples at equal distances; none if the run diverged.
