@@ -20,8 +20,7 @@ from wm_drake.studies.inputs import (
 )
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
-    from wm_drake.errors import Problem
-    from wm_drake.model.machine import Machine
+    pass
 
 app = typer.Typer(no_args_is_help=True)
 
@@ -69,7 +68,9 @@ def _check(file: str, strict: bool, draw: Callable[[str], None] | None) -> None:
     parameters = load_parameters(file, None)
     machine, unusual = built_with_problems(file, parameters)
     if draw is not None:
-        draw(machine_page_of(machine, unusual))
+        from wm_drake.studies.description.page import machine_page
+
+        draw(machine_page(machine, [str(problem) for problem in unusual]))
     if unusual and strict:
         raise InputError(unusual)
     for problem in unusual:
@@ -100,13 +101,6 @@ def _pages_in(folder: Path, files: Sequence[str]) -> dict[str, Path]:
                 f"{' and '.join(same)} would have the same page, {path}", where="--page"
             )
     return paths
-
-
-def machine_page_of(machine: "Machine", unusual: "Sequence[Problem]") -> str:
-    """Return the page of a machine with its unusual values."""
-    from wm_drake.studies.description.page import machine_page
-
-    return machine_page(machine, [str(problem) for problem in unusual])
 
 
 def _write_page(path: Path, text: str) -> None:

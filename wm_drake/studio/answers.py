@@ -23,7 +23,7 @@ from wm_drake.errors import InputError, Problem
 from wm_drake.model.machine import Setup
 from wm_drake.model.plausibility import unusual_springs
 from wm_drake.model.scene import Gap
-from wm_drake.parameters import MachineParameters, SpinProfile
+from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.plausibility import unusual_numbers
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
@@ -97,7 +97,7 @@ def picture(machine: OpenMachine, runner: Runner, state: State) -> dict[str, Any
             *(Problem("", "profile.band", text) for text in band_warnings(profile, period)),
             *unusual_numbers(setup.parameters, state.values),
             *unusual_springs(setup),
-            *_friction_that_jumps(setup.parameters),
+            *(Problem("", "damper_types", text) for text in friction_warnings(setup.parameters)),
         ]
     runs = sorted((run for batch in batches for run in runner.run(*batch)), key=lambda r: r.number)
     main = runs[0]
@@ -138,11 +138,6 @@ def numbers(
         "forces": _forces(record) if record.sizes["time"] > 1 else None,
         "arrows": _arrows(machine, turned, results),
     }
-
-
-def _friction_that_jumps(parameters: MachineParameters) -> list[Problem]:
-    """Return the warning of friction that no fixed step resolves."""
-    return [Problem("", "damper_types", text) for text in friction_warnings(parameters)]
 
 
 def arrows(
@@ -291,14 +286,9 @@ def _arrow(
     up = math.copysign(1.0, step)
     unit = machine.sliders[key].unit
     before, after = (_rows_of(machine, one) for one in (main, run))
-    changes = [
-        _difference(now["value"], was["value"], up) for now, was in zip(after, before, strict=True)
-    ]
+    pairs = [(now["value"], was["value"]) for now, was in zip(after, before, strict=True)]
+    changes = [None if now is None or was is None else up * (now - was) for now, was in pairs]
     return {"key": key, "step": unit.from_si(abs(step)), "changes": changes}
-
-
-def _difference(after: float | None, before: float | None, up: float) -> float | None:
-    return None if after is None or before is None else up * (after - before)
 
 
 def _motion(run: RunResult, setup: Setup) -> dict[str, Any]:

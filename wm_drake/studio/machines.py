@@ -5,7 +5,7 @@ from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 from wm_drake.batch.work_items import Preparation
 from wm_drake.errors import InputError, Problem, input_error, nearest_names
@@ -253,7 +253,7 @@ class OpenMachine:
         if not self._measured:  # reading the files takes as long as a third of a run
             by_load: _Measured = defaultdict(list)
             for row in measured_amplitudes(self.parameters).to_dict("records"):
-                amplitude = _by_sensor(row, self.parameters)
+                amplitude = {name: float(row[name]) for name in self.parameters.sensors}
                 by_load[row["load"], row["gasket"]].append(
                     {"source": str(row["source"]), "amplitude": amplitude}
                 )
@@ -294,10 +294,6 @@ def _shape(name: str, outline: Outline) -> dict[str, object]:
         "half": outline.half.tolist(),
         "round": outline.is_round,
     }
-
-
-def _by_sensor(row: Mapping[Any, Any], parameters: MachineParameters) -> dict[str, float]:
-    return {name: float(row[name]) for name in parameters.sensors}
 
 
 def is_same(built: Machine, parameters: MachineParameters) -> bool:

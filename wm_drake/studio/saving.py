@@ -51,7 +51,8 @@ def save_machine(
             f"'{name}' is the machine that the new one extends; choose another name", key="name"
         )
     if path.exists() and not overwrite:
-        raise _exists(name)
+        message = f"'{name}' exists already; save it under another name, or replace it"
+        raise ExistsAlreadyError(input_error(message, key="name").problems)
     write_machine(path, machines.name_or_path(state.machine), chosen(machine, state), machine)
     return path
 
@@ -112,8 +113,3 @@ def _check_same(read: MachineParameters, expected: MachineParameters) -> None:
             "a file with only what differs cannot hold this change; write the machine file by hand",
             key=differ[0],
         )
-
-
-def _exists(name: str) -> ExistsAlreadyError:
-    message = f"'{name}' exists already; save it under another name, or replace it"
-    return ExistsAlreadyError(input_error(message, key="name").problems)

@@ -13,7 +13,6 @@ from wm_drake.studies.balancer.page import BalancerResult, answer, facts_of, loc
 from wm_drake.studies.balancer.study import (
     HOLD,
     Curve,
-    Findings,
     Pair,
     Release,
     capacities_of,
@@ -43,7 +42,7 @@ def pair_of(free, held, mass=0.5, **factors):
 def findings_of(loads, releases=()):
     parameters = load_machine("ball_rings")
     base = loads[0]
-    return Findings(
+    return BalancerResult(
         parameters,
         2.0,
         40.0,
@@ -180,7 +179,7 @@ def test_the_words_follow_the_numbers():
     bad = findings_of([pair_of((4.0, 2.0, 1.0, 3.0), (1.0, 1.0, 2.0, 2.0))], releases[:1])
     assert "No speed to release them" in answer(bad)
     assert "none of the tried" in dict(facts_of(bad))["Release"]
-    assert BalancerResult(bad).as_json()["lock_below_rpm"] is None
+    assert bad.as_json()["lock_below_rpm"] is None
     calm = findings_of([pair_of((0.5, 0.5, 1.0, 0.1), (1.0, 1.0, 2.0, 2.0))])
     assert "larger with none of them" in answer(calm)
     assert "Release" not in dict(facts_of(calm))

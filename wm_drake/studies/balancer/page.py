@@ -1,22 +1,21 @@
 """Show the study of rings of balls: the answer in words, curves, tables, CSV and JSON."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from wm_drake.parameters import MachineParameters
 from wm_drake.report import figure as fig
 from wm_drake.report.formatting import GM_PER_KGM, MM_PER_M, RPM_PER_RAD_S, number, plain
 from wm_drake.report.page import Picture, picture
 from wm_drake.report.sections import Section, SectionedPage
 from wm_drake.report.table import Column, Table, table_of
-from wm_drake.studies.balancer.study import SWING, Curve, Findings, Pair, picked_up_from
+from wm_drake.report.terminal import Printed
+from wm_drake.studies.balancer.study import SWING, Curve, Pair, Release, is_within, picked_up_from
 from wm_drake.studies.study import Facts, Result
-
-if TYPE_CHECKING:
-    from rich.table import Table as TerminalTable
 
 COLUMNS = {
     "mass_kg": Column("mass", "kg", 2),
@@ -48,81 +47,108 @@ MODEL = (
 
 @dataclass(frozen=True)
 class BalancerResult(Result):
-    """Result of the study."""
+    """Result of the study.
 
-    findings: Findings
+    Attributes:
+        rate, high: Rate of the run-up, and its end. [rad/s^2, rad/s]
+        loads: Over unbalance mass and place.
+        base: The load of the other runs: the largest mass of `loads` that the balls can balance, in
+            the middle of the places.
+        rings: Over ball mass and damping, with the load of `base`.
+        releases: At different speeds, with the load of `base`.
+        plain: Curve of the load of `base` in the machine without rings.
+        capacities: Largest first moment of the balls in each plane, by its place. [kg m, m]
+        radius: Radius at which the unbalance lies. [m]
+    """
+
+    machine: MachineParameters
+    rate: float
+    high: float
+    loads: tuple[Pair, ...]
+    base: Pair
+    rings: tuple[Pair, ...]
+    releases: tuple[Release, ...]
+    plain: Curve
+    capacities: dict[float, float]
+    radius: float
+    runs: int
+
+    @property
+    def capacity(self) -> float:
+        """Return the first moment of all balls, side by side. [kg m]"""
+        return sum(self.capacities.values())
+
+    def can_balance(self, pair: Pair) -> bool:
+        """Return whether the balls in each plane can cancel the share of a load there."""
+        return is_within(self.capacities, pair.mass * self.radius, pair.y)
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """Return loads, rings, releases, and the curves of the load with which rings are varied."""
-        f = self.findings
         return {
-            "loads": loads_frame(f),
-            "rings": rings_frame(f),
-            "releases": releases_frame(f),
-            "curve": curve_frame(f),
+            "loads": loads_frame(self),
+            "rings": rings_frame(self),
+            "releases": releases_frame(self),
+            "curve": curve_frame(self),
         }
 
     def as_json(self) -> dict[str, Any]:
         """Return the findings for JSON."""
-        f = self.findings
         shown = {
-            "machine": f.machine.name,
-            "rate_rpm_per_s": RPM_PER_RAD_S * f.rate,
-            "highest_speed_rpm": RPM_PER_RAD_S * f.high,
-            "capacity_gm": GM_PER_KGM * f.capacity,
-            "picked_up_from_rpm": RPM_PER_RAD_S * picked_up_from(f.machine),
-            "answer": answer(f),
-            "lock_below_rpm": RPM_PER_RAD_S * lock_below(f),
+            "machine": self.machine.name,
+            "rate_rpm_per_s": RPM_PER_RAD_S * self.rate,
+            "highest_speed_rpm": RPM_PER_RAD_S * self.high,
+            "capacity_gm": GM_PER_KGM * self.capacity,
+            "picked_up_from_rpm": RPM_PER_RAD_S * picked_up_from(self.machine),
+            "answer": answer(self),
+            "lock_below_rpm": RPM_PER_RAD_S * lock_below(self),
             **{name: frame.to_dict("records") for name, frame in self.tables().items()},
-            "runs": f.runs,
+            "runs": self.runs,
         }
         return plain(shown)
 
-    def terminal(self) -> "Iterable[TerminalTable | str]":
+    def terminal(self) -> Printed:
         """Yield the answer, then the loads."""
-        yield answer(self.findings)
-        for word, text in facts_of(self.findings):
+        yield answer(self)
+        for word, text in facts_of(self):
             yield f"{word}: {text}"
-        yield loads_table(self.findings).terminal("Free and locked balls")
+        yield loads_table(self).terminal("Free and locked balls")
 
     def page(self, facts: Facts) -> str:
         """Return the page."""
-        f = self.findings
         made = [
-            ("Machine", f.machine.name),
-            ("Runs", f"{f.runs} in {facts.wall_s:.0f} s"),
-            ("Run-up", f"{number(RPM_PER_RAD_S * f.rate, 0)} rpm/s to {_rpm(f.high)}"),
+            ("Machine", self.machine.name),
+            ("Runs", f"{self.runs} in {facts.wall_s:.0f} s"),
+            ("Run-up", f"{number(RPM_PER_RAD_S * self.rate, 0)} rpm/s to {_rpm(self.high)}"),
             *facts.rows(),
         ]
         return SectionedPage(
-            f"Rings of balls of machine {f.machine.name}",
-            answer(f),
+            f"Rings of balls of machine {self.machine.name}",
+            answer(self),
             [
-                Section("curve", "Over the drum speed", (curve_picture(f),)),
-                Section("loads", "Unbalance and its place", (loads_picture(f),)),
-                Section("rings", "Mass of the balls and damping", (rings_picture(f),)),
-                Section("each", "Each load", tables=(loads_table(f),)),
-                Section("each-ring", "Each ball mass and damping", tables=(rings_table(f),)),
-                Section("releases", "Release of locked balls", tables=(releases_table(f),)),
+                Section("curve", "Over the drum speed", (curve_picture(self),)),
+                Section("loads", "Unbalance and its place", (loads_picture(self),)),
+                Section("rings", "Mass of the balls and damping", (rings_picture(self),)),
+                Section("each", "Each load", tables=(loads_table(self),)),
+                Section("each-ring", "Each ball mass and damping", tables=(rings_table(self),)),
+                Section("releases", "Release of locked balls", tables=(releases_table(self),)),
             ],
             made,
-            f.machine,
+            self.machine,
             facts.warnings,
             method=MODEL,
-            advice=Section("answer", "In short", facts=facts_of(f)),
+            advice=Section("answer", "In short", facts=facts_of(self)),
         ).html()
 
     def failures(self) -> list[str]:
         """Return a line for each pair with a run that diverged."""
-        f = self.findings
         return [
             f"{_load(pair)}: a run diverged"
-            for pair in (*f.loads, *f.rings)
+            for pair in (*self.loads, *self.rings)
             if not np.isfinite([pair.free.level, pair.locked.level]).all()
         ]
 
 
-def lock_below(f: Findings) -> float:
+def lock_below(f: BalancerResult) -> float:
     """Return the speed from which free balls pay with each load that they can balance. [rad/s]
 
     It is NaN if they do not pay with one of them, or can balance none.
@@ -131,7 +157,7 @@ def lock_below(f: Findings) -> float:
     return max(speeds) if speeds and np.isfinite(speeds).all() else float("nan")
 
 
-def answer(f: Findings) -> str:
+def answer(f: BalancerResult) -> str:
     """Return the answer in a few sentences."""
     hurt = [pair for pair in f.loads if pair.free.peak > pair.locked.peak]
     pays = [pair for pair in f.loads if pair.free.level < pair.locked.level]
@@ -161,7 +187,7 @@ def answer(f: Findings) -> str:
     return " ".join(sentences)
 
 
-def facts_of(f: Findings) -> list[tuple[str, str]]:
+def facts_of(f: BalancerResult) -> list[tuple[str, str]]:
     """Return the rest of the answer as pairs of word and text."""
     worst = max(f.loads, key=lambda pair: pair.worst[0])
     quotient, speed = worst.worst
@@ -184,7 +210,7 @@ def facts_of(f: Findings) -> list[tuple[str, str]]:
     return rows
 
 
-def _pick_up_text(f: Findings) -> str:
+def _pick_up_text(f: BalancerResult) -> str:
     """Return from which speed the drum carries the balls round, and what that means."""
     speed = picked_up_from(f.machine)
     if not np.isfinite(speed):
@@ -199,7 +225,7 @@ def _pick_up_text(f: Findings) -> str:
     return f"{text}, above the resonance at {_rpm(peak)}"
 
 
-def _capacity_text(f: Findings) -> str:
+def _capacity_text(f: BalancerResult) -> str:
     """Return what the balls can balance, and what is beyond it."""
     heaviest = f.capacity / f.radius
     text = f"{number(GM_PER_KGM * f.capacity, 0)} g m, that of {number(heaviest, 2)} kg at the wall"
@@ -217,7 +243,7 @@ HARMLESS = 1.02
 """Largest amplitude with free balls over that with locked ones, up to which they do not hurt."""
 
 
-def _rings_text(f: Findings) -> str:
+def _rings_text(f: BalancerResult) -> str:
     """Return which variants of the rings pay at the highest speed and do not hurt in the run-up."""
     paying = [pair for pair in f.rings if pair.free.level < pair.locked.level]
     if not paying:
@@ -239,7 +265,7 @@ def _rings_text(f: Findings) -> str:
     )
 
 
-def _release_text(f: Findings) -> str:
+def _release_text(f: BalancerResult) -> str:
     """Return the lowest release after which free balls are never worse than locked ones."""
     good = [r.free <= r.locked and r.free_level < r.locked_level for r in f.releases]
     if not good[-1]:
@@ -286,7 +312,7 @@ def _numbers(pair: Pair) -> dict[str, float]:
     }
 
 
-def loads_frame(f: Findings) -> pd.DataFrame:
+def loads_frame(f: BalancerResult) -> pd.DataFrame:
     """Return the numbers of each load."""
     return pd.DataFrame(
         [
@@ -301,7 +327,7 @@ def loads_frame(f: Findings) -> pd.DataFrame:
     )
 
 
-def rings_frame(f: Findings) -> pd.DataFrame:
+def rings_frame(f: BalancerResult) -> pd.DataFrame:
     """Return the numbers of each ball mass and damping."""
     return pd.DataFrame(
         [
@@ -315,7 +341,7 @@ def rings_frame(f: Findings) -> pd.DataFrame:
     )
 
 
-def releases_frame(f: Findings) -> pd.DataFrame:
+def releases_frame(f: BalancerResult) -> pd.DataFrame:
     """Return the amplitudes after each release."""
     return pd.DataFrame(
         [
@@ -331,7 +357,7 @@ def releases_frame(f: Findings) -> pd.DataFrame:
     )
 
 
-def curve_frame(f: Findings) -> pd.DataFrame:
+def curve_frame(f: BalancerResult) -> pd.DataFrame:
     """Return amplitude over speed of the load with which rings are varied."""
     return pd.DataFrame(
         {
@@ -343,7 +369,7 @@ def curve_frame(f: Findings) -> pd.DataFrame:
     )
 
 
-def loads_table(f: Findings) -> Table:
+def loads_table(f: BalancerResult) -> Table:
     """Return the numbers of each load."""
     caption = (
         "Each unbalance with free and with locked balls: largest amplitude of the run-up, largest "
@@ -353,13 +379,13 @@ def loads_table(f: Findings) -> Table:
     return table_of(loads_frame(f), caption, COLUMNS, _alarms(f.loads))
 
 
-def rings_table(f: Findings) -> Table:
+def rings_table(f: BalancerResult) -> Table:
     """Return the numbers of each ball mass and damping."""
     caption = f"The same with {_load(f.base)}, over ball mass and race damping in parts of the file"
     return table_of(rings_frame(f), f"{caption}.", COLUMNS, _alarms(f.rings))
 
 
-def releases_table(f: Findings) -> Table:
+def releases_table(f: BalancerResult) -> Table:
     """Return the amplitudes after each release."""
     caption = (
         f"Runs with {_load(f.base)} that begin at a speed, with the balls evenly spread, as if "
@@ -374,7 +400,7 @@ def _alarms(pairs: Sequence[Pair]) -> list[str]:
     return ["alarm" if not pair.free.level < pair.locked.level else "" for pair in pairs]
 
 
-def curve_picture(f: Findings) -> Picture:
+def curve_picture(f: BalancerResult) -> Picture:
     """Return amplitude over speed of the load with which rings are varied."""
     marks: list[fig.Mark] = []
     for name, curve, color in (
@@ -415,7 +441,7 @@ QUANTITIES: tuple[tuple[str, Callable[[Curve], float]], ...] = (
 """Panels of the pictures over loads and rings."""
 
 
-def loads_picture(f: Findings) -> Picture:
+def loads_picture(f: BalancerResult) -> Picture:
     """Return both amplitudes over the place of the unbalance, a line for each mass."""
     panels = []
     for label, value in QUANTITIES:
@@ -443,7 +469,7 @@ def loads_picture(f: Findings) -> Picture:
     return picture(fig.Figure(panels=fig.in_grid(panels, 2), height=320.0), words, caption)
 
 
-def rings_picture(f: Findings) -> Picture:
+def rings_picture(f: BalancerResult) -> Picture:
     """Return both amplitudes and the speed of release over damping, a line for each ball mass."""
     panels = []
     masses = list(dict.fromkeys(pair.ball_mass for pair in f.rings))

@@ -132,44 +132,6 @@ class Release:
     locked_level: float
 
 
-@dataclass(frozen=True)
-class Findings:
-    """Findings of the study.
-
-    Attributes:
-        rate, high: Rate of the run-up, and its end. [rad/s^2, rad/s]
-        loads: Over unbalance mass and place.
-        base: The load of the other runs: the largest mass of `loads` that the balls can balance, in
-            the middle of the places.
-        rings: Over ball mass and damping, with the load of `base`.
-        releases: At different speeds, with the load of `base`.
-        plain: Curve of the load of `base` in the machine without rings.
-        capacities: Largest first moment of the balls in each plane, by its place. [kg m, m]
-        radius: Radius at which the unbalance lies. [m]
-    """
-
-    machine: MachineParameters
-    rate: float
-    high: float
-    loads: tuple[Pair, ...]
-    base: Pair
-    rings: tuple[Pair, ...]
-    releases: tuple[Release, ...]
-    plain: Curve
-    capacities: dict[float, float]
-    radius: float
-    runs: int
-
-    @property
-    def capacity(self) -> float:
-        """Return the first moment of all balls, side by side. [kg m]"""
-        return sum(self.capacities.values())
-
-    def can_balance(self, pair: Pair) -> bool:
-        """Return whether the balls in each plane can cancel the share of a load there."""
-        return is_within(self.capacities, pair.mass * self.radius, pair.y)
-
-
 def run_up(high: float, rate: float) -> SpinProfile:
     """Return a run-up from standstill with a region for each range of speed and one at its end.
 
@@ -445,19 +407,17 @@ class BalancerTask(Task):
         releases = trials.releases(mass, y, self.release)
         plain = trials.plain(mass, y)
         return BalancerResult(
-            Findings(
-                parameters,
-                self.rate,
-                self.high,
-                tuple(loads),
-                base,
-                tuple(rings),
-                tuple(releases),
-                plain,
-                capacities,
-                self.radius,
-                executor.runs,
-            )
+            parameters,
+            self.rate,
+            self.high,
+            tuple(loads),
+            base,
+            tuple(rings),
+            tuple(releases),
+            plain,
+            capacities,
+            self.radius,
+            executor.runs,
         )
 
     def _base(self, capacities: dict[float, float]) -> tuple[float, float]:

@@ -1,7 +1,7 @@
 """Show the drive study: smallest torque limits, map, estimated unbalance."""
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -13,6 +13,7 @@ from wm_drake.report.formatting import GM_PER_KGM, MISSING, RPM_PER_RAD_S, numbe
 from wm_drake.report.page import Picture, picture
 from wm_drake.report.sections import Section, SectionedPage
 from wm_drake.report.table import Column, Table, line, table_of
+from wm_drake.report.terminal import Printed
 from wm_drake.studies.drive.study import (
     PASSES,
     Estimation,
@@ -21,9 +22,6 @@ from wm_drake.studies.drive.study import (
     motor_with_limit,
 )
 from wm_drake.studies.study import Facts, Result
-
-if TYPE_CHECKING:
-    from rich.table import Table as TerminalTable
 
 rpm = Unit("rad/s", "rpm").from_si
 
@@ -64,7 +62,7 @@ class DriveResult(Result):
         }
         return plain(shown)
 
-    def terminal(self) -> "list[TerminalTable | str]":
+    def terminal(self) -> Printed:
         """Return the smallest torque limits and a summary."""
         title = f"Smallest torque limit of machine '{self.parameters.name}'"
         return [thresholds_table(self).terminal(title), summary(self)]

@@ -14,7 +14,7 @@ does: m r = |T_1 - J w'_1| / g. An appliance knows T from its current and w' fro
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -171,7 +171,11 @@ def find_thresholds(
     def tried(torques: FloatArray, which: Iterable[int], what: str) -> dict[int, bool]:
         numbers = list(which)
         cases = [
-            _with(loads[i], with_torque(parameters, torques[i]), f"{loads[i].name} {torques[i]:g}")
+            replace(
+                loads[i],
+                name=f"{loads[i].name} {torques[i]:g}",
+                parameters=with_torque(parameters, torques[i]),
+            )
             for i in numbers
         ]
         table = run(cases, what)
@@ -202,10 +206,6 @@ def find_thresholds(
         Threshold(case.name, float(low[i]), float(high[i]), *map(float, caught[i]))
         for i, case in enumerate(loads)
     )
-
-
-def _with(case: Case, parameters: MachineParameters, name: str) -> Case:
-    return Case(name, case.load, case.profile, case.gasket, parameters)
 
 
 def torque_map(

@@ -1,5 +1,6 @@
 """Advice of a gasket study: what to do with each factor, and the proposed setting with its runs."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -87,7 +88,8 @@ def advice(
     groups = []
     for factor in [f for f in factors if f.name in screening.design.factors]:
         wishes = _wishes(screening, words, factor.name)
-        levels = sorted({wish.level for wish in wishes}, key=lambda x: (-_count(wishes, x), x))
+        counts = Counter(wish.level for wish in wishes)
+        levels = sorted(counts, key=lambda x: (-counts[x], x))
         cells = [MISSING, "little influence", ""]
         if wishes:
             first, *others = levels
@@ -104,11 +106,6 @@ def advice(
         groups.append(Group(words.factor(factor.name), (Row((keys, *cells, last)),)))
     columns = ("factor", "key", Column("best value"), "gain", "conflict", "proposed")
     return Table(CAPTION, columns, tuple(groups), text_columns=6)
-
-
-def _count(wishes: Sequence[_Wish], level: int) -> int:
-    """Return how many responses and loads a level is best for."""
-    return sum(wish.level == level for wish in wishes)
 
 
 def _direction(words: Words, factor: str, level: int) -> str:
@@ -135,11 +132,6 @@ MOST_COSTS = 3
 """Largest number of costs that are named."""
 
 
-def setting_text(proposal: Proposal, words: Words) -> str:
-    """Return the proposed setting in words."""
-    return listed([_change_text(change, words) for change in proposal.changes])
-
-
 def _change_text(change: Change, words: Words) -> str:
     nominal = next(iter(change.factor.nominal.values()))
     if change.text.endswith("%"):
@@ -158,7 +150,8 @@ def answer(proposal: Proposal, words: Words) -> str:
             f"No setting of these factors is clearly better than {name} without raising another "
             f"response by more than {100 * MOST_LOSS:g} %.{gap}"
         )
-    opening = f"Proposed setting: {setting_text(proposal, words)}."
+    changes = listed([_change_text(change, words) for change in proposal.changes])
+    opening = f"Proposed setting: {changes}."
     after = proposal.gaps("after")
     if not after or not before:
         return f"{opening} The table below has its responses by runs."

@@ -109,7 +109,8 @@ def spread_figure(
     """
     rng = np.random.default_rng(0)  # for the horizontal spread, which has no meaning
     smallest = min(v[name].min() for v in screening.responses.values.values() for name in names)
-    x = fig.Axis(ticks=fig.named(map(words.response, names)), range=(-0.6, len(names) - 0.4))
+    ticks = fig.named(map(words.response, names))
+    x = fig.Axis(ticks=ticks, range=(-0.6, len(names) - 0.4), has_grid=False)
     y = fig.Axis(
         label=f"{what}, {screening.responses.units[names[0]]}",
         range=(None if smallest < 0.0 else 0.0, None),
@@ -122,13 +123,8 @@ def spread_figure(
             at = place + rng.uniform(-0.28, 0.28, len(values))
             marks.append(fig.Points(at, values, size=3.0, opacity=0.35))
         marks += fig.boxes(range(len(names)), every, 0.34, color=fig.MARK)
-        panels.append(fig.Panel(title=f"load {load}", marks=tuple(marks), x=_plain(x), y=y))
+        panels.append(fig.Panel(title=f"load {load}", marks=tuple(marks), x=x, y=y))
     return fig.Figure(panels=fig.in_grid(panels, len(panels), share="y"), height=260.0)
-
-
-def _plain(axis: fig.Axis) -> fig.Axis:
-    """Return an axis without lines at its ticks."""
-    return replace(axis, has_grid=False)
 
 
 def pareto_figure(screening: Screening, load: str, words: Words) -> fig.Figure:
@@ -217,7 +213,7 @@ def main_effects_figure(
                 marks.append(fig.Points(x, y, symbol=symbol, color=color, size=size, key=key))
         is_first = screening.names.index(label[1]) % COLUMNS == 0
         y_axis = fig.Axis(ticks=titles, range=(len(names) - 0.5, -0.5), size=10.5)
-        y_axis = replace(_plain(y_axis), has_numbers=is_first)
+        y_axis = replace(y_axis, has_grid=False, has_numbers=is_first)
         return fig.Panel(marks=tuple(marks), x=_axis_of(screening, label, words), y=y_axis)
 
     return _panels(screening, load, panel_of, 31.0 * len(names) + 10.0)
@@ -257,7 +253,7 @@ def combinations_figure(screening: Screening, load: str, words: Words) -> fig.Fi
     """
 
     def panel_of(label: Label) -> fig.Panel:
-        first, second = two_most_influential(screening, label)
+        first, second = (term.name for term in main_effects(screening.tables[label])[:2])
         columns = [screening.design.factors.index(name) for name in (first, second)]
         levels = screening.design.levels[:, columns]
         values = screening.responses.values[label[0]][label[1]].to_numpy()
@@ -270,12 +266,6 @@ def combinations_figure(screening: Screening, load: str, words: Words) -> fig.Fi
         return _of_pair(tuple(marks), (first, second), words, _axis_of(screening, label, words))
 
     return _panels(screening, load, panel_of, 160.0)
-
-
-def two_most_influential(screening: Screening, label: Label) -> tuple[str, str]:
-    """Return the factors of the two largest main effects."""
-    first, second = main_effects(screening.tables[label])[:2]
-    return first.name, second.name
 
 
 def residuals_figure(screening: Screening, load: str, words: Words) -> fig.Figure:

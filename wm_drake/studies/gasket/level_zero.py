@@ -91,7 +91,8 @@ def run_level_zero(
     Returns:
         The responses; None if no factor has a table, so that both treatments are the same.
     """
-    if not has_tables(levels):
+    linear, scaled = ([factor.settings for factor in levels[name]] for name in TABLES)
+    if linear == scaled:
         return None
     variants = {MACHINE: machine}
     for name in TABLES:
@@ -108,9 +109,3 @@ def run_level_zero(
     return LevelZero(
         tables, as_responses(table, [case.name for case in trials.loads], trials.chosen)
     )
-
-
-def has_tables(levels: Mapping[str, tuple[FactorLevels, ...]]) -> bool:
-    """Return whether the treatments of tables give different machines at any level."""
-    first, *others = ([factor.settings for factor in levels[name]] for name in TABLES)
-    return any(other != first for other in others)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -14,7 +14,7 @@ from wm_drake.report.interactive import packed
 from wm_drake.report.page import Picture, as_json, fragment, picture
 from wm_drake.report.sections import Section, SectionedPage
 from wm_drake.report.table import Table
-from wm_drake.report.terminal import Console
+from wm_drake.report.terminal import Console, Printed
 from wm_drake.studies.doe.design import write_design
 from wm_drake.studies.gasket import figures, tables
 from wm_drake.studies.gasket.advice import OTHER_GOALS, advice, answer, before_and_after, in_short
@@ -30,9 +30,6 @@ from wm_drake.studies.gasket.screening import Label, Screening, Words
 from wm_drake.studies.gasket.study import GasketTrials
 from wm_drake.studies.gasket.surface import Surfaces, surfaces
 from wm_drake.studies.study import Facts, Result
-
-if TYPE_CHECKING:
-    from rich import table as terminal
 
 WIDE = 100
 """Width of a terminal from which on its table has the leading terms. [characters]"""
@@ -73,7 +70,7 @@ class GasketResult(Result):
         """Return the result for JSON."""
         return tables.as_plain_data(self.screening, self.compared)
 
-    def terminal(self) -> "list[terminal.Table | str]":
+    def terminal(self) -> Printed:
         """Return percentages of the variance, the check, a summary and the proposed setting."""
         design, published = self.screening.design, self.compared.published
         about = f"{design.kind}, {design.trials} trials, D-efficiency {design.efficiency():.2f} %"
@@ -82,7 +79,7 @@ class GasketResult(Result):
             self.screening, self.words, published, short=True, has_terms=is_wide
         )
         title = f"Percent of the variance explained ({about})"
-        shown: list[terminal.Table | str] = [variance.terminal(title)]
+        shown: list[Any] = [variance.terminal(title)]
         if published.has_terms:
             shown.append(
                 "In parentheses: the published percentage of a leading term;"

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -17,6 +17,7 @@ from wm_drake.report.formatting import MM_PER_M, MPA_PER_PA, number, percent, pl
 from wm_drake.report.page import Picture, picture
 from wm_drake.report.sections import Section, SectionedPage
 from wm_drake.report.table import Column, Table, line
+from wm_drake.report.terminal import Printed
 from wm_drake.solid.curves import AXIAL, RADIAL, TILT, TWIST, Curve, Mesh, Motion
 from wm_drake.studies.gasket_curves.figures import (
     curves_figure,
@@ -28,9 +29,6 @@ from wm_drake.studies.gasket_curves.machine import coupling
 from wm_drake.studies.gasket_curves.study import Checked
 from wm_drake.studies.rig.units import units_of
 from wm_drake.studies.study import Facts, Result
-
-if TYPE_CHECKING:
-    from rich.table import Table as TerminalTable
 
 METHOD = (
     "Finite elements of the rubber in large deformation, nearly incompressible. The rim at the "
@@ -105,7 +103,7 @@ class CurvesResult(Result):
         }
         return plain(shown)
 
-    def terminal(self) -> "Iterable[TerminalTable | str]":
+    def terminal(self) -> Printed:
         """Return stiffness and damping."""
         return [values_shown(self).terminal(f"Gasket {self.name}"), summary(self)]
 

@@ -1,9 +1,9 @@
 """Show the study of drawings of a gasket: tables, page, the best drawing as a file."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -17,12 +17,10 @@ from wm_drake.report.formatting import number, plain, significant
 from wm_drake.report.page import Picture, picture
 from wm_drake.report.sections import Section, SectionedPage
 from wm_drake.report.table import Column, Table, line
+from wm_drake.report.terminal import Printed
 from wm_drake.studies.gasket_geometry.drawings import Factor
 from wm_drake.studies.gasket_geometry.study import GAP, RESPONSES, Surface, excess, ranked
 from wm_drake.studies.study import Facts, Result
-
-if TYPE_CHECKING:
-    from rich.table import Table as TerminalTable
 
 METHOD = (
     "The drawings are a Latin hypercube of the factors. Finite elements give the curves of each, "
@@ -108,7 +106,7 @@ class GeometryResult(Result):
         }
         return plain(shown)
 
-    def terminal(self) -> "Iterable[TerminalTable | str]":
+    def terminal(self) -> Printed:
         """Return what the factors contribute, and the best drawing."""
         return [contributions_shown(self).terminal(f"Gasket {self.name}"), summary(self)]
 

@@ -202,7 +202,10 @@ def _follow(
             break
         before, here, amplitude = (amplitude, here), moved, ahead
         factor = min(factor * 1.3, 2.0)
-    shapes = [_shape(coefficients, amplitude) for amplitude, coefficients, _, _ in points]
+    shapes = [
+        (coefficients[1, :6] - 1j * coefficients[2, :6]) / amplitude
+        for amplitude, coefficients, _, _ in points
+    ]
     return AmplitudeMode(
         name,
         np.array([entry[0] for entry in points]),
@@ -231,7 +234,3 @@ def _guess(
         here[1] + 0.5 * share * (here[1] - before[1][1]),
         here[2] + 0.5 * share * (here[2] - before[1][2]),
     )
-
-
-def _shape(coefficients: FloatArray, amplitude: float) -> FloatArray:
-    return np.asarray((coefficients[1, :6] - 1j * coefficients[2, :6]) / amplitude)

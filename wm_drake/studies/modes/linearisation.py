@@ -72,15 +72,11 @@ class Spectrum:
 def spectrum_of(matrix: FloatArray) -> Spectrum:
     """Return the oscillating eigenvalues of a matrix."""
     values, vectors = np.linalg.eig(matrix)
-    left = np.linalg.pinv(vectors) if _is_defective(vectors) else np.linalg.inv(vectors)
+    is_invertible = np.linalg.cond(vectors) < 1e13
+    left = np.linalg.inv(vectors) if is_invertible else np.linalg.pinv(vectors)
     oscillating = np.flatnonzero(values.imag > max(SLOWEST, 1e-6 * np.abs(values).max()))
     order = oscillating[np.argsort(np.abs(values[oscillating]))]
     return Spectrum(values[order], vectors[:, order], left[order])
-
-
-def _is_defective(vectors: FloatArray) -> bool:
-    """Return whether eigenvectors are too close to dependent to be inverted."""
-    return not np.linalg.cond(vectors) < 1e13
 
 
 class Linearisation:
@@ -88,6 +84,7 @@ class Linearisation:
 
     Attributes:
         derivative: Compiled right-hand side.
+        equilibrium: State at equilibrium.
         names: Name of each element on the tub: springs, dampers, bushings, telescopic dampers.
     """
 
@@ -115,12 +112,7 @@ class Linearisation:
             for name in kind
         ]
         self._loaded = loaded
-        self._equilibrium = self._equilibrium_at() if loaded else self.derivative.rest
-
-    @property
-    def equilibrium(self) -> FloatArray:
-        """Return the state at equilibrium."""
-        return self._equilibrium
+        self.equilibrium = self._equilibrium_at() if loaded else self.derivative.rest
 
     def matrix(self, speed: float = 0.0) -> FloatArray:
         """Return A of the free numbers of the state at a speed of the drum [rad/s]. (n, n)"""
@@ -132,10 +124,10 @@ class Linearisation:
 
     def wrench_slopes(self) -> FloatArray:
         """Return the slopes of the wrench of each element on the tub. (elements, 6, n)"""
-        return self.derivative.wrench_slopes(self._equilibrium)
+        return self.derivative.wrench_slopes(self.equilibrium)
 
     def _revolution(self, speed: float) -> FloatArray:
-        states = np.tile(self._equilibrium, (ANGLES, 1))
+        states = np.tile(self.equilibrium, (ANGLES, 1))
         states[:, DRUM_ANGLE] = 2.0 * np.pi * np.arange(ANGLES) / ANGLES
         states[:, DRUM_RATE] = speed
         return states
@@ -146,7 +138,7 @@ class Linearisation:
         A step is a least-squares solution, so that a tube that can spin freely stays where it is.
         The branches of rubber stay relaxed: vibration takes the mean of their friction away.
         """
-        self._equilibrium = self.derivative.rest
+        self.equilibrium = self.derivative.rest
         free, still = self.derivative.free, ~self.derivative.is_velocity
         still &= ~np.isin(free, self.derivative.layout.states.indices(FRICTION, MAXWELL))
         for _ in range(20):
@@ -154,11 +146,11 @@ class Linearisation:
             rates = self.derivative(states).mean(axis=0)[free]
             slopes = self.derivative.jacobian(states).mean(axis=0)[:, still]
             change = np.linalg.lstsq(slopes, -rates, rcond=1e-12)[0]
-            self._equilibrium = self._equilibrium.copy()
-            self._equilibrium[free[still]] += change
+            self.equilibrium = self.equilibrium.copy()
+            self.equilibrium[free[still]] += change
             if np.max(np.abs(change)) < 1e-12:
                 break
-        return self._equilibrium
+        return self.equilibrium
 
 
 def drake_spectrum(setup: Setup) -> Spectrum:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pandas as pd
 
@@ -15,6 +15,7 @@ from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, listed, number, 
 from wm_drake.report.page import Picture, picture
 from wm_drake.report.sections import Section, SectionedPage
 from wm_drake.report.table import Column, Group, Row, Table, line, table_of
+from wm_drake.report.terminal import Printed
 from wm_drake.studies.modes.figures import (
     TITLES,
     amplitude_figure,
@@ -34,9 +35,6 @@ from wm_drake.studies.modes.study import (
     NaturalModes,
 )
 from wm_drake.studies.study import Facts, Result
-
-if TYPE_CHECKING:
-    from rich import table as terminal
 
 
 def damping_text(ratio: float) -> str:
@@ -132,7 +130,7 @@ class ModesResult(Result):
         }
         return plain(shown)
 
-    def terminal(self) -> "list[terminal.Table | str]":
+    def terminal(self) -> Printed:
         """Return natural frequencies and damping ratios, and a summary."""
         result = self.modes
         frame = linearisations(result).replace({AMPLITUDE: f"{MM_PER_M * result.amplitude:g} mm"})
@@ -160,6 +158,7 @@ class ModesResult(Result):
             "Share of each element in the strain energy and in the dissipated energy of each mode. "
             "Negative shares, which preload can cause, are not drawn; modes.csv has them.",
         )
+        links = [(replay_file(name), f"Animation of {name} in 3D") for name in self.replays]
         over_speed = (_campbell_picture(result), _amplitude_picture(result))
         causes = [_sensitivity_picture(result, name) for name in ("frequency", "damping")]
         tables = (natural_modes_table(result), _critical_table(result), _participation(result))
@@ -168,7 +167,7 @@ class ModesResult(Result):
             self.summary(),
             [
                 Section("campbell", "Frequencies over speed and amplitude", over_speed),
-                Section("shapes", "Mode shapes", [*shapes, energy], links=self._links()),
+                Section("shapes", "Mode shapes", [*shapes, energy], links=links),
                 Section("sensitivity", "Sensitivity: what moves a mode", causes),
                 Section("modes", "Modes", tables=tables[:1]),
                 Section("critical", "Critical speeds", tables=tables[1:2]),
@@ -220,10 +219,6 @@ class ModesResult(Result):
         )
         columns = ("linearisation", "mode", "between", Column("smallest gap", "mm", 2))
         return [Table(caption, columns, groups, text_columns=3)] if groups else []
-
-    def _links(self) -> list[tuple[str, str]]:
-        """Return the files of the animations, and their titles."""
-        return [(replay_file(name), f"Animation of {name} in 3D") for name in self.replays]
 
 
 def replay_file(name: str) -> str:

@@ -177,7 +177,10 @@ def modes(
     diagrams = _diagrams(linear, spectra, max(parameters.profile.speed))
     progress(0.4)
     bars = _sensitivities(machine, load, gasket, spectra, lambda part: progress(0.4 + 0.5 * part))
-    peaks = _run_up_peaks(machine, gasket) if run_up and parameters.loads else None
+    peaks = None
+    if run_up and parameters.loads:
+        cases = [case_of(parameters, name, gasket=gasket) for name in parameters.loads]
+        peaks = simulate_many(machine, cases, measures=["amplitudes"])
     progress(1.0)
     return MachineModes(
         parameters,
@@ -214,13 +217,6 @@ def _diagrams(
         name: campbell(one.spectrum, speeds, len(spectra[name].values))
         for name, one in linear.items()
     }
-
-
-def _run_up_peaks(machine: Machine, gasket: bool) -> xr.Dataset:
-    """Return the amplitudes of all loads of the machine over its spin profile."""
-    parameters = machine.parameters
-    cases = [case_of(parameters, name, gasket=gasket) for name in parameters.loads]
-    return simulate_many(machine, cases, measures=["amplitudes"])
 
 
 @on_one_thread

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import pandas as pd
@@ -11,14 +11,12 @@ import pandas as pd
 from wm_drake.errors import input_error
 from wm_drake.parameters import MachineParameters
 from wm_drake.report.formatting import plain
+from wm_drake.report.terminal import Printed
 from wm_drake.simulation.measures import MEASURES, Variable
 from wm_drake.simulation.measures.as_json import labelled_values
 from wm_drake.simulation.measures.registry import tabulated
 from wm_drake.studies.spin.study import CaseResult, SpinResult
 from wm_drake.studies.study import PAGE, Facts, Result
-
-if TYPE_CHECKING:
-    from rich.table import Table
 
 MOST_VARIANTS = 6
 """Largest number of variants that a figure can tell apart."""
@@ -112,7 +110,7 @@ class ComparisonResult(Result):
             tree["steady_window_s"] = steady_window(first.results[0].case.profile)
         return dict(plain(tree))  # JSON has no NaN
 
-    def terminal(self) -> "list[Table | str]":
+    def terminal(self) -> Printed:
         """Return the amplitudes, the effect of the gasket, and the smallest gaps."""
         from wm_drake.studies.spin.effect_page import effect_summary, terminal_table
         from wm_drake.studies.spin.tables import amplitude_lines, gap_text
@@ -124,7 +122,7 @@ class ComparisonResult(Result):
             for case in variant.result.results
             if (text := gap_text(case))
         ]
-        shown: list[Table | str] = [
+        shown: list[Any] = [
             amplitude_lines("Displacement amplitudes, in mm", amplitudes),
             *gaps,
         ]

@@ -8,7 +8,7 @@ import pandas as pd
 
 from wm_drake.parameters import quantities
 from wm_drake.report.figure import MEASURED, OURS, Figure, Mark
-from wm_drake.report.formatting import MISSING, MM_PER_M, number, percent
+from wm_drake.report.formatting import MISSING, MM_PER_M, listed, number, percent
 from wm_drake.report.page import Picture, picture, versions_of
 from wm_drake.report.sections import Section, SectionedPage
 from wm_drake.report.table import Group, Row, Table, line, readable
@@ -24,7 +24,7 @@ from wm_drake.studies.spin.panels import (
     time_figure,
     time_panel,
 )
-from wm_drake.studies.spin.study import CaseResult, SpinResult, band_text
+from wm_drake.studies.spin.study import CaseResult, band_text
 from wm_drake.studies.study import Facts
 
 COLOURS = (OURS, MEASURED, "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
@@ -264,8 +264,12 @@ def _amplitude_sections(comparison: ComparisonResult) -> list[Section]:
     """Return the amplitudes of all variants, and the effect of the gasket if that is compared."""
     variants, effect = comparison.variants, comparison.effect
     shown = (amplitudes(variants, comparison.differences),)
-    measured = [variant.result for variant in variants if _is_measured(variant.result)]
-    against = tuple(tables.comparison(r, tables.amplitude_table(r)) for r in measured)
+    of_variants = [(v.result, tables.amplitude_table(v.result)) for v in variants]
+    against = tuple(
+        tables.comparison(result, table)
+        for result, table in of_variants
+        if any(tables.experiment_mm(table, case) for case in result.results)
+    )
     sections = [
         Section("amplitudes", "Amplitudes", tables=shown),
         Section("experiment", "Against the experiment", tables=against),
@@ -277,15 +281,9 @@ def _amplitude_sections(comparison: ComparisonResult) -> list[Section]:
     return [Section("gasket", "Effect of the gasket", tables=effects), *sections]
 
 
-def _is_measured(result: SpinResult) -> bool:
-    """Return whether a case of a result is compared with measured amplitudes."""
-    table = tables.amplitude_table(result)
-    return any(tables.experiment_mm(table, case) for case in result.results)
-
-
 def title(variants: Sequence[Variant]) -> str:
     """Return the title of the page: the machine, if there is only one, and the variants."""
-    names, machine = _listed([variant.name for variant in variants]), variants[0].result.parameters
+    names, machine = listed([variant.name for variant in variants]), variants[0].result.parameters
     if all(variant.result.parameters.name == machine.name for variant in variants):
         return f"Comparison of machine {machine.name}: {names}"
     return f"Comparison of machines {names}"
@@ -345,7 +343,3 @@ def facts_of_comparison(variants: Sequence[Variant], made: Facts) -> list[tuple[
     versions = versions_of(first.results[0].record.attrs)
     made = replace(made, step=0.0)  # the lines of the variants have it
     return [*facts, ("Engine", first.engine), ("Versions", versions), *made.rows()]
-
-
-def _listed(names: Sequence[str]) -> str:
-    return f"{', '.join(names[:-1])} and {names[-1]}"

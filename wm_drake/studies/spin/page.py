@@ -10,6 +10,7 @@ from wm_drake.parameters.plausibility import unusual_numbers
 from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number, percent, slack_warning
 from wm_drake.report.page import Picture, picture, versions_of
 from wm_drake.report.sections import Section, SectionedPage
+from wm_drake.simulation.measures.registry import tabulated
 from wm_drake.simulation.spring_tension import slack_springs
 from wm_drake.studies.modes.page import natural_modes_table
 from wm_drake.studies.spin import tables
@@ -58,6 +59,7 @@ def spin_page(result: SpinResult, facts: Facts | None = None) -> str:
     gaps = _gaps_pictures(result)
     drive, floor, modes = drive_section(result), floor_section(result), result.modes
     balance = balance_section(result)
+    more = tuple(tables.variable_table(result, variable) for variable in tabulated())
     sections = [
         *_case_sections(result, table),
         Section("gap", "Smallest gaps", gaps, text=VERDICT * bool(gaps)),
@@ -80,7 +82,7 @@ def spin_page(result: SpinResult, facts: Facts | None = None) -> str:
         replace(floor, pictures=(), is_folded=True),
         replace(drive, pictures=(), text=drive.text * (not drive.pictures)),
         Section("springs", "Springs", tables=(tables.smallest_tensions(result),)),
-        Section("more", "More measures", tables=tuple(tables.more_measures(result))),
+        Section("more", "More measures", tables=more),
     ]
     if modes:
         shown = (natural_modes_table(modes),)

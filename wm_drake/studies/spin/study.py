@@ -23,6 +23,7 @@ from wm_drake.parameters import MachineParameters, Sensor
 from wm_drake.parameters.measured import measured_notes
 from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number
+from wm_drake.report.terminal import Printed
 from wm_drake.simulation.balance import balance_of, rings_of
 from wm_drake.simulation.cases import Case, is_as_measured, notice_jumping_friction
 from wm_drake.simulation.displacements import band_of
@@ -37,7 +38,6 @@ from wm_drake.studies.study import Facts, Result
 
 if TYPE_CHECKING:
     import pandas as pd
-    from rich.table import Table
 
     from wm_drake.studies.modes.study import NaturalModes
 
@@ -104,13 +104,6 @@ class Comparison(Enum):
     AS_MEASURED = "as measured"
     ALL = "all"
     NONE = "none"
-
-
-def compared_cases(measured: Sequence[Path] | None, sets: Sequence[str] | None) -> Comparison:
-    """Return which cases are compared with measured amplitudes, from the options of a command."""
-    if measured:
-        return Comparison.ALL
-    return Comparison.NONE if sets else Comparison.AS_MEASURED
 
 
 @dataclass(frozen=True)
@@ -187,7 +180,7 @@ class SpinResult(Result):
         ]
         return {"machine": self.parameters.name, "engine": self.engine, "cases": cases}
 
-    def terminal(self) -> "list[Table | str]":
+    def terminal(self) -> Printed:
         """Return the amplitudes, and lines with the other measures of each case."""
         from wm_drake.studies.spin.tables import amplitude_lines, case_lines
 

@@ -186,11 +186,6 @@ def critical_speeds(result: SpinResult) -> Table:
     return replace(variable_table(result, variable, 0), caption=caption)
 
 
-def more_measures(result: SpinResult) -> list[Table]:
-    """Return a table for each measure that has none of its own, from its declaration."""
-    return [variable_table(result, variable) for variable in tabulated()]
-
-
 def variable_table(result: SpinResult, variable: Variable, decimals: int | None = None) -> Table:
     """Return one variable of a measure for each case.
 

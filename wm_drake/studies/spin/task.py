@@ -20,7 +20,7 @@ from wm_drake.studies.spin.comparison import (
 )
 from wm_drake.studies.spin.gasket_effect import effects
 from wm_drake.studies.spin.options import SpinOptions
-from wm_drake.studies.spin.study import Files, SpinResult, compared_cases, run_spin
+from wm_drake.studies.spin.study import Comparison, Files, SpinResult, run_spin
 from wm_drake.studies.study import Task
 
 if TYPE_CHECKING:
@@ -98,8 +98,9 @@ class SpinTask(Task):
     def run(self, executor: "Executor") -> SpinResult | ComparisonResult:
         """Run all cases of all variants."""
         is_one, options = len(self.planned) == 1, self.options
-        changes = options.sets or ((options.drive,) if options.drive else ())
-        comparison = compared_cases(options.measured, changes)
+        is_changed = options.sets or options.drive
+        comparison = Comparison.NONE if is_changed else Comparison.AS_MEASURED
+        comparison = Comparison.ALL if options.measured else comparison
         names = [
             case.name if is_one else f"{planned.name}: {case.name}"
             for planned in self.planned

@@ -124,7 +124,8 @@ def spectra_figure(record: Record, signals: Sequence[tuple[str, str, FloatArray]
     by_frequency, by_order = frequency_map(columns, time), order_map(columns, angle, time)
     if not by_frequency.sizes["time"] or not by_order.sizes["time"]:
         return None
-    highest = _highest_hz(record)
+    fastest = float(np.abs(record.drum_speed.values).max()) / (2.0 * np.pi)
+    highest = max(LOWEST_LIMIT_HZ, (ORDERS_SHOWN[-1] + 0.5) * fastest)  # a little above the third
     panels = []
     for row, (name, unit, _) in enumerate(signals):
         frequencies, orders = by_frequency.isel(signal=row), by_order.isel(signal=row)
@@ -147,12 +148,6 @@ def _in_rows(panel: Panel, rows: int) -> Panel:
     if panel.row < rows - 1:
         x = replace(x, has_numbers=False, label="")
     return replace(panel, x=x, top=None if panel.row else panel.top)
-
-
-def _highest_hz(record: Record) -> float:
-    """Return the upper end of the frequencies that are shown: a little above the third order."""
-    fastest = float(np.abs(record.drum_speed.values).max()) / (2.0 * np.pi)
-    return max(LOWEST_LIMIT_HZ, (ORDERS_SHOWN[-1] + 0.5) * fastest)
 
 
 def _spectrum(frequencies: xr.DataArray, highest: float, scale: Scale, label: str) -> Panel:

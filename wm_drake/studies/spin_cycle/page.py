@@ -10,6 +10,7 @@ from wm_drake.parameters.unbalance_cases import UnbalanceCase
 from wm_drake.report.formatting import MM_PER_M, number, plain, slack_warning
 from wm_drake.report.page import Picture, picture
 from wm_drake.report.sections import Section, SectionedPage
+from wm_drake.report.terminal import Printed
 from wm_drake.simulation.measures.as_json import as_json
 from wm_drake.simulation.spring_tension import slack_springs
 from wm_drake.studies.spin_cycle import tables
@@ -34,7 +35,6 @@ from wm_drake.studies.study import Facts, Result
 
 if TYPE_CHECKING:
     import pandas as pd
-    from rich.table import Table
 
 SHOWN_MASSES = ((0.4, 0.0, 0.0), (0.0, 0.4, 0.0), (0.4, 0.4, 180.0))
 """Front mass, rear mass and phase of the cases of [A] Figs. 24 to 26. [kg, kg, deg]"""
@@ -86,7 +86,7 @@ class SpinCycleReport(Result):
             }
         return plain(shown)
 
-    def terminal(self) -> "list[Table]":
+    def terminal(self) -> Printed:
         """Return the table of the cases."""
         title = f"Spin cycle of machine '{self.result.parameters.name}'"
         return [tables.cases(self.result).terminal(title)]

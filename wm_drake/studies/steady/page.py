@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -15,6 +15,7 @@ from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number, percent,
 from wm_drake.report.page import Picture, picture
 from wm_drake.report.sections import Section, SectionedPage
 from wm_drake.report.table import Column, Group, Row, Table, table_of
+from wm_drake.report.terminal import Printed
 from wm_drake.simulation.mounts import KINDS
 from wm_drake.studies.steady.figures import (
     deflection_figure,
@@ -25,9 +26,6 @@ from wm_drake.studies.steady.figures import (
 )
 from wm_drake.studies.steady.study import SteadyCase, SteadyStudy
 from wm_drake.studies.study import Facts, Result
-
-if TYPE_CHECKING:
-    from rich import table as terminal
 
 DEG_PER_RAD = Unit("rad/s", "deg/s").from_si(1.0)
 
@@ -95,7 +93,7 @@ class ResponseResult(Result):
         }
         return plain(shown)
 
-    def terminal(self) -> "list[terminal.Table | str]":
+    def terminal(self) -> Printed:
         """Return the largest amplitude of each sensor, and a summary."""
         title = f"Largest steady amplitudes of machine '{self.study.parameters.name}', in mm"
         return [largest_table(self.study).terminal(title), summary(self.study)]

@@ -1,12 +1,12 @@
 """What the verdict shows: terminal, JSON, files, and a page whose first screen is the answer."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from wm_drake.parameters import MachineParameters
 from wm_drake.report import figure as fig
 from wm_drake.report.formatting import (
     MM_PER_M,
@@ -20,12 +20,10 @@ from wm_drake.report.formatting import (
 from wm_drake.report.page import Picture, picture
 from wm_drake.report.sections import Section, SectionedPage
 from wm_drake.report.table import Column, Table, table_of
-from wm_drake.simulation.measures.responses import GAP
+from wm_drake.report.terminal import Printed
+from wm_drake.simulation.measures.responses import GAP, Response
 from wm_drake.studies.study import Facts, Result
-from wm_drake.studies.verdict.study import Findings, Influence, Laundry, Outcome
-
-if TYPE_CHECKING:
-    from rich.table import Table as TerminalTable
+from wm_drake.studies.verdict.study import Influence, Laundry, Outcome
 
 MOST_NAMED = 3
 """Number of quantities that the answer names."""
@@ -50,92 +48,139 @@ HOW_OTHERS_DIFFER = (
 
 @dataclass(frozen=True)
 class VerdictResult(Result):
-    """Result of a verdict."""
+    """Result of a verdict.
 
-    findings: Findings
+    Attributes:
+        clearance: Gap that must remain. [m]
+        change: Change of a part that was tried. [%]
+        base: Runs of the machine as it is.
+        influences: Of each part, the strongest first.
+        single: Best single change; None if none helps.
+        combination: Best combination of at least two changes; None if none is better.
+        laundry: Random laundry in the machine as it is.
+        laundry_changed: The same laundry with the best change; None without one.
+        about: Description of the laundry.
+        responses: Responses of the tables, with words and unit.
+        command: Command that gives a verdict on the machine again.
+    """
+
+    machine: MachineParameters
+    loads: tuple[str, ...]
+    clearance: float
+    change: float
+    base: Outcome
+    influences: tuple[Influence, ...]
+    single: Outcome | None
+    combination: Outcome | None
+    laundry: Laundry
+    laundry_changed: Laundry | None
+    about: str
+    responses: tuple[Response, ...]
+    command: str
+    runs: int
+
+    @property
+    def best(self) -> Outcome | None:
+        """Return the best change; None if none helps."""
+        return self.combination or self.single
+
+    @property
+    def is_clear(self) -> bool:
+        """Return whether all loads and all samples of the laundry keep the clearance."""
+        return self.smallest > self.clearance
+
+    @property
+    def smallest(self) -> float:
+        """Return the smallest gap of all loads and all samples of the laundry. [m]"""
+        return min(self.base.gap, float(self.laundry.gaps.min()))
+
+    @property
+    def word(self) -> str:
+        """Return the verdict in one or two words."""
+        if self.is_clear:
+            return "clear"
+        return "touches" if self.smallest <= 0.0 else "too near"
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """Return gaps of the loads, influences, and the samples of the laundry."""
         return {
-            "loads": loads_frame(self.findings),
-            "influences": influences_frame(self.findings),
-            "laundry": pd.DataFrame({"smallest_gap_mm": MM_PER_M * self.findings.laundry.gaps}),
+            "loads": loads_frame(self),
+            "influences": influences_frame(self),
+            "laundry": pd.DataFrame({"smallest_gap_mm": MM_PER_M * self.laundry.gaps}),
         }
 
     def as_json(self) -> dict[str, Any]:
         """Return the verdict for JSON."""
-        f = self.findings
-        estimate, lower, upper = f.laundry.probability
-        changes = {"best_single_change": f.single, "best_combination": f.combination}
+        estimate, lower, upper = self.laundry.probability
+        changes = {"best_single_change": self.single, "best_combination": self.combination}
         shown = {
-            "machine": f.machine.name,
-            "verdict": f.word,
-            "clearance_mm": MM_PER_M * f.clearance,
-            "smallest_gap_mm": MM_PER_M * f.base.gap,
-            "margin_mm": MM_PER_M * (f.base.gap - f.clearance),
-            "loads": loads_frame(f).to_dict("records"),
+            "machine": self.machine.name,
+            "verdict": self.word,
+            "clearance_mm": MM_PER_M * self.clearance,
+            "smallest_gap_mm": MM_PER_M * self.base.gap,
+            "margin_mm": MM_PER_M * (self.base.gap - self.clearance),
+            "loads": loads_frame(self).to_dict("records"),
             "laundry": {
-                "samples": len(f.laundry.gaps),
+                "samples": len(self.laundry.gaps),
                 "probability": estimate,
                 "lower": lower,
                 "upper": upper,
-                "smallest_gap_mm": MM_PER_M * float(f.laundry.gaps.min()),
+                "smallest_gap_mm": MM_PER_M * float(self.laundry.gaps.min()),
             },
-            "deciding": influences_frame(f)[:MOST_NAMED].to_dict("records"),
+            "deciding": influences_frame(self)[:MOST_NAMED].to_dict("records"),
             **{
                 name: outcome
                 and {"set": dict(outcome.changes), "smallest_gap_mm": MM_PER_M * outcome.gap}
                 for name, outcome in changes.items()
             },
-            "line_to_copy": line_to_copy(f),
-            "runs": f.runs,
+            "line_to_copy": line_to_copy(self),
+            "runs": self.runs,
         }
         return plain(shown)
 
-    def terminal(self) -> "Iterable[TerminalTable | str]":
+    def terminal(self) -> Printed:
         """Yield the answer, then the loads."""
-        yield answer(self.findings)
-        for word, text in facts_of(self.findings):
+        yield answer(self)
+        for word, text in facts_of(self):
             yield f"{word}: {text}"
-        yield loads_table(self.findings).terminal("Smallest gap of each load")
+        yield loads_table(self).terminal("Smallest gap of each load")
 
     def page(self, facts: Facts) -> str:
         """Return the page."""
-        f = self.findings
         made = [
-            ("Machine", f.machine.name),
-            ("Runs", f"{f.runs} in {facts.wall_s:.0f} s"),
-            ("Laundry", f"{f.about}; {len(f.laundry.gaps)} samples"),
+            ("Machine", self.machine.name),
+            ("Runs", f"{self.runs} in {facts.wall_s:.0f} s"),
+            ("Laundry", f"{self.about}; {len(self.laundry.gaps)} samples"),
             *facts.rows(),
         ]
         return SectionedPage(
-            f"Verdict on machine {f.machine.name}",
-            answer(f),
+            f"Verdict on machine {self.machine.name}",
+            answer(self),
             [
-                Section("gaps", "Smallest gaps", (gaps_picture(f),)),
-                Section("influences", "What decides the gap", (influences_picture(f),)),
-                Section("loads", "Each load", tables=(loads_table(f),)),
-                Section("cost", "What the changes cost", tables=(cost_table(f),)),
+                Section("gaps", "Smallest gaps", (gaps_picture(self),)),
+                Section("influences", "What decides the gap", (influences_picture(self),)),
+                Section("loads", "Each load", tables=(loads_table(self),)),
+                Section("cost", "What the changes cost", tables=(cost_table(self),)),
                 Section("others", "Other commands with a smallest gap", text=HOW_OTHERS_DIFFER),
             ],
             made,
-            f.machine,
+            self.machine,
             facts.warnings,
-            advice=Section("answer", "In short", facts=list(facts_of(f))),
+            advice=Section("answer", "In short", facts=list(facts_of(self))),
         ).html()
 
     def failures(self) -> list[str]:
         """Return one line if the tub touches, which makes the exit code 1."""
-        if self.findings.is_clear:
+        if self.is_clear:
             return []
-        return [f"verdict: {self.findings.word}"]
+        return [f"verdict: {self.word}"]
 
 
 LINE = "Line to copy"
 """Words before the command that runs the machine with the best change."""
 
 
-def answer(findings: Findings) -> str:
+def answer(findings: VerdictResult) -> str:
     """Return the answer in a sentence or two."""
     base, laundry = findings.base, findings.laundry
     if not np.isfinite(base.gap):
@@ -158,7 +203,7 @@ def answer(findings: Findings) -> str:
     return f"{opening}: {text}"
 
 
-def _where(findings: Findings, outcome: Outcome) -> str:
+def _where(findings: VerdictResult, outcome: Outcome) -> str:
     """Return the smallest gap of all loads with its place, load and speed."""
     index = int(np.argmin(outcome.gaps))
     pair, speed = outcome.place(index)
@@ -180,7 +225,7 @@ def _mm(value: float) -> str:
     return f"{number(MM_PER_M * value)}\u00a0mm"
 
 
-def facts_of(findings: Findings) -> list[tuple[str, str]]:
+def facts_of(findings: VerdictResult) -> list[tuple[str, str]]:
     """Return the rest of the answer as pairs of word and text."""
     f, named_influences = findings, findings.influences[:MOST_NAMED]
     margin = f.base.gap - f.clearance
@@ -243,7 +288,7 @@ def influence_text(influence: Influence) -> str:
     return f"{words_of(influence.key)} ({ends})"
 
 
-def change_text(findings: Findings, outcome: Outcome) -> str:
+def change_text(findings: VerdictResult, outcome: Outcome) -> str:
     """Return a change with what it does to the smallest gap of all loads."""
     parts = []
     for key, text in outcome.changes.items():
@@ -255,7 +300,7 @@ def change_text(findings: Findings, outcome: Outcome) -> str:
     return f"{listed(parts)}: {gap}, verified by runs of all loads"
 
 
-def line_to_copy(findings: Findings) -> str:
+def line_to_copy(findings: VerdictResult) -> str:
     """Return the command that runs the machine with the best change; "" without one."""
     if findings.best is None:
         return ""
@@ -263,7 +308,7 @@ def line_to_copy(findings: Findings) -> str:
     return " ".join([findings.command, *changes])
 
 
-def loads_frame(findings: Findings) -> pd.DataFrame:
+def loads_frame(findings: VerdictResult) -> pd.DataFrame:
     """Return gap, place and speed of each load, before and after the best change."""
     best = findings.best
     rows = []
@@ -281,7 +326,7 @@ def loads_frame(findings: Findings) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def loads_table(findings: Findings) -> Table:
+def loads_table(findings: VerdictResult) -> Table:
     """Return gap, place and speed of each load."""
     caption = (
         "Smallest gap between the parts that move with the tub and the housing. 0 and below: "
@@ -296,7 +341,7 @@ def loads_table(findings: Findings) -> Table:
     return table_of(loads_frame(findings), caption, columns, alarm)
 
 
-def influences_frame(findings: Findings) -> pd.DataFrame:
+def influences_frame(findings: VerdictResult) -> pd.DataFrame:
     """Return the smallest gap of all loads with less and more of each number."""
     return pd.DataFrame(
         [
@@ -312,7 +357,7 @@ def influences_frame(findings: Findings) -> pd.DataFrame:
     )
 
 
-def cost_table(findings: Findings) -> Table:
+def cost_table(findings: VerdictResult) -> Table:
     """Return the largest values of all loads, before and after the changes."""
     outcomes = {
         "as it is": findings.base,
@@ -321,8 +366,10 @@ def cost_table(findings: Findings) -> Table:
     }
     rows = []
     for response in findings.responses:
+        worst = np.min if response.name == GAP else np.max
         values = [
-            _largest(response, outcome) if outcome else np.nan for outcome in outcomes.values()
+            float(worst(response.values(outcome.table))) if outcome else np.nan
+            for outcome in outcomes.values()
         ]
         rows.append([f"{response.title}, {response.unit_text}", *values])
     caption = (
@@ -333,12 +380,7 @@ def cost_table(findings: Findings) -> Table:
     return table_of(pd.DataFrame(rows, columns=["quantity", *outcomes]), caption, columns)
 
 
-def _largest(response: Any, outcome: Outcome) -> float:
-    values = response.values(outcome.table)
-    return float(np.min(values) if response.name == GAP else np.max(values))
-
-
-def gaps_picture(findings: Findings) -> Picture:
+def gaps_picture(findings: VerdictResult) -> Picture:
     """Return the gaps of the loads and of the laundry, before and after the best change."""
     f, best = findings, findings.best
     sets = [(f.base, f.laundry, fig.OURS, "as it is", 0.13)]
@@ -372,7 +414,7 @@ def gaps_picture(findings: Findings) -> Picture:
     return picture(figure, f"Smallest gaps; the smallest one is {_mm(f.base.gap)}.", caption)
 
 
-def influences_picture(findings: Findings) -> Picture:
+def influences_picture(findings: VerdictResult) -> Picture:
     """Return the smallest gap of all loads with less and more of each part."""
     drawn = findings.influences[:MOST_DRAWN]
     at = np.arange(len(drawn), dtype=float)[::-1]

@@ -26,7 +26,6 @@ from wm_drake.simulation.cases import Case, load_of
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.measures.responses import (
     GAP,
-    Response,
     has_gap,
     known_responses,
     measures_of,
@@ -148,62 +147,6 @@ class Laundry:
         share = share_of(self.gaps <= self.clearance)
         upper = share.upper if share.count else bound_if_none(share.samples)
         return share.estimate, share.lower, upper
-
-
-@dataclass(frozen=True)
-class Findings:
-    """Findings of a verdict.
-
-    Attributes:
-        clearance: Gap that must remain. [m]
-        change: Change of a part that was tried. [%]
-        base: Runs of the machine as it is.
-        influences: Of each part, the strongest first.
-        single: Best single change; None if none helps.
-        combination: Best combination of at least two changes; None if none is better.
-        laundry: Random laundry in the machine as it is.
-        laundry_changed: The same laundry with the best change; None without one.
-        about: Description of the laundry.
-        responses: Responses of the tables, with words and unit.
-        command: Command that gives a verdict on the machine again.
-    """
-
-    machine: MachineParameters
-    loads: tuple[str, ...]
-    clearance: float
-    change: float
-    base: Outcome
-    influences: tuple[Influence, ...]
-    single: Outcome | None
-    combination: Outcome | None
-    laundry: Laundry
-    laundry_changed: Laundry | None
-    about: str
-    responses: tuple[Response, ...]
-    command: str
-    runs: int
-
-    @property
-    def best(self) -> Outcome | None:
-        """Return the best change; None if none helps."""
-        return self.combination or self.single
-
-    @property
-    def is_clear(self) -> bool:
-        """Return whether all loads and all samples of the laundry keep the clearance."""
-        return self.smallest > self.clearance
-
-    @property
-    def smallest(self) -> float:
-        """Return the smallest gap of all loads and all samples of the laundry. [m]"""
-        return min(self.base.gap, float(self.laundry.gaps.min()))
-
-    @property
-    def word(self) -> str:
-        """Return the verdict in one or two words."""
-        if self.is_clear:
-            return "clear"
-        return "touches" if self.smallest <= 0.0 else "too near"
 
 
 @dataclass(frozen=True)
@@ -380,22 +323,20 @@ class VerdictTask(Task):
             better = build_machine(with_values(parameters, steps[-1].changes))
             changed = self._samples(self._laundry(better), executor)
         return VerdictResult(
-            Findings(
-                parameters,
-                tuple(case.name for case in self.cases),
-                self.clearance,
-                self.options.change,
-                base,
-                tuple(influences),
-                steps[0] if steps else None,
-                steps[-1] if len(steps) > 1 else None,
-                laundry,
-                changed,
-                self.laundry.tolerances.about,
-                self.responses,
-                self._command,
-                executor.runs,
-            )
+            parameters,
+            tuple(case.name for case in self.cases),
+            self.clearance,
+            self.options.change,
+            base,
+            tuple(influences),
+            steps[0] if steps else None,
+            steps[-1] if len(steps) > 1 else None,
+            laundry,
+            changed,
+            self.laundry.tolerances.about,
+            self.responses,
+            self._command,
+            executor.runs,
         )
 
     def _samples(self, task: ToleranceTask, executor: "Executor") -> Laundry:
