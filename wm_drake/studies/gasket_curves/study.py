@@ -4,12 +4,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from wm_drake.errors import WmDrakeError, input_error
 from wm_drake.model.machine import Machine
+from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.gasket_drawing import load_gasket_drawing
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
@@ -61,16 +62,9 @@ class CurvesTask(Task):
     def __init__(self, options: CurvesOptions, machine: Machine) -> None:
         """Read the drawing and the ranges, and mesh the gasket."""
         self.options, self.machine = options, machine.parameters
-        if self.machine.gasket is None:
-            raise input_error(
-                "the machine has no gasket, whose frames the new one takes", key="machine"
-            )
+        check_gasket(self.machine)
         self.drawing = load_gasket_drawing(options.file)
-        self.values = {
-            motion.name: curve_values(getattr(options, motion.name), motion.rotates, options.points,
-                                 f"--{motion.name}")
-            for motion in MOTIONS
-        }  # fmt: skip
+        self.values = curve_values(options, options.points)
         self.frequency = positive(options.frequency, Unit("Hz", "Hz"), "--frequency")
         self.mesh = Mesh(options.elements, options.around)
         self.gasket = Gasket(self.drawing, self.mesh)
@@ -122,12 +116,22 @@ def _first(values: FloatArray, holds: Sequence[bool]) -> FloatArray:
     return np.array([side[0] if len(side) else math.nan for side in sides])
 
 
-def curve_values(text: str, rotates: bool, points: int, option: str) -> list[float]:
-    """Return the values of a curve above 0. [m or rad]"""
-    unit = Unit("rad", "deg") if rotates else Unit("m", "mm")
-    largest = positive(text, unit, option)
+def check_gasket(machine: MachineParameters) -> None:
+    """Raise InputError if a machine has no gasket."""
+    if machine.gasket is None:
+        message = "the machine has no gasket, whose frames the new one takes"
+        raise input_error(message, key="machine")
+
+
+def curve_values(options: Any, points: int) -> dict[str, list[float]]:
+    """Return the values of each curve above 0, by the option of its motion. [m or rad]"""
     parts = np.append(NEAR_REST, np.arange(1, points + 1) / points)
-    return (largest * parts).tolist()
+    values = {}
+    for motion in MOTIONS:
+        unit = Unit("rad", "deg") if motion.rotates else Unit("m", "mm")
+        largest = positive(getattr(options, motion.name), unit, f"--{motion.name}")
+        values[motion.name] = (largest * parts).tolist()
+    return values
 
 
 def positive(text: str, unit: Unit, option: str) -> float:

@@ -113,6 +113,17 @@ def with_folds(drawing: GasketDrawing, times: int) -> GasketDrawing:
         raise input_error(message, key="meridian") from None
 
 
+def values_at(factors: Sequence[Factor], levels: FloatArray) -> dict[str, float]:
+    """Return the values of factors by name, at levels from -1 to 1. (factors,)"""
+    return {f.name: f.value(float(level)) for f, level in zip(factors, levels, strict=True)}
+
+
+def text_at(factors: Sequence[Factor], levels: FloatArray) -> str:
+    """Return the values of factors at levels from -1 to 1 as text."""
+    values = values_at(factors, levels)
+    return ", ".join(f"{f.name} {values[f.name]:.3g} {f.unit}" for f in factors)
+
+
 def changed(
     drawing: GasketDrawing, factors: tuple[Factor, ...], coded: FloatArray
 ) -> GasketDrawing:
@@ -126,10 +137,10 @@ def changed(
     Raises:
         InputError: the drawing cannot be built there.
     """
-    values = [factor.value(float(level)) for factor, level in zip(factors, coded, strict=True)]
-    if len(values) > 4:
-        drawing = with_folds(drawing, round(values[4]))
-    thickness, depth, fillet = (0.01 * value for value in values[:3])
+    values = values_at(factors, coded)
+    if FOLDS in values:
+        drawing = with_folds(drawing, round(values[FOLDS]))
+    thickness, depth, fillet = (0.01 * values[name] for name in ("thickness", "depth", "fillet"))
     places = np.array([(point.radius, point.y) for point in drawing.meridian])
     along = places[-1] - places[0]
     along /= np.linalg.norm(along)
@@ -146,11 +157,8 @@ def changed(
         for (radius, y), point in zip(places, drawing.meridian, strict=True)
     )
     try:
-        rubber = Rubber.model_validate({**dict(drawing.rubber), "shore_a": values[3]})
+        rubber = Rubber.model_validate({**dict(drawing.rubber), "shore_a": values["hardness"]})
         return GasketDrawing.model_validate({**dict(drawing), "meridian": points, "rubber": rubber})
     except ValidationError as error:
-        texts = ", ".join(
-            f"{factor.name} {value:.3g} {factor.unit}"
-            for factor, value in zip(factors, values, strict=True)
-        )
-        raise input_error(f"at {texts}: {error.errors()[0]['msg']}", key="meridian") from None
+        where = text_at(factors, coded)
+        raise input_error(f"at {where}: {error.errors()[0]['msg']}", key="meridian") from None

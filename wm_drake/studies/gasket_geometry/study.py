@@ -26,11 +26,13 @@ from wm_drake.studies.gasket_curves.machine import (
     stiffness_of,
     with_gasket,
 )
-from wm_drake.studies.gasket_curves.study import curve_values, positive
+from wm_drake.studies.gasket_curves.study import check_gasket, curve_values, positive
 from wm_drake.studies.gasket_geometry.drawings import (
     FOLDS,
     changed,
     factors_of,
+    text_at,
+    values_at,
     with_folds,
 )
 from wm_drake.studies.gasket_geometry.options import GeometryOptions
@@ -202,22 +204,14 @@ class GeometryTask(Task):
         from scipy.stats.qmc import LatinHypercube
 
         self.options, self.machine = options, machine.parameters
-        if self.machine.gasket is None:
-            raise input_error(
-                "the machine has no gasket, whose frames the new one takes", key="machine"
-            )
+        check_gasket(self.machine)
         self.drawing, self.limits = load_gasket_drawing(options.file), limits_of(options.limit)
         self.factors = factors_of(self.drawing, options.folds)
         if len(set(options.folds)) == 1:
             self.drawing = with_folds(self.drawing, options.folds[0])
         self.cases = selected_cases(self.machine, options.load, True, options.profile)
         self.frequency = positive(options.frequency, Unit("Hz", "Hz"), "--frequency")
-        self.values = {
-            motion.name: curve_values(
-                getattr(options, motion.name), motion.rotates, POINTS, f"--{motion.name}"
-            )
-            for motion in MOTIONS
-        }
+        self.values = curve_values(options, POINTS)
         self.mesh = Mesh(options.elements, options.around)
         sampler = LatinHypercube(len(self.factors), rng=options.seed)
         parts = [sampler.random(count) for count in (options.drawings, options.fresh, CANDIDATES)]
@@ -232,8 +226,7 @@ class GeometryTask(Task):
 
     def _mesh(self, levels: FloatArray) -> Mesh:
         """Return the mesh of a drawing: more elements along the meridian for more folds."""
-        values = {factor.name: factor.value(float(level))
-                  for factor, level in zip(self.factors, levels, strict=True)}  # fmt: skip
+        values = values_at(self.factors, levels)
         times = round(values.get(FOLDS, max(self.options.folds)))
         return replace(self.mesh, meridian=times * self.mesh.meridian)
 
@@ -320,9 +313,10 @@ class GeometryTask(Task):
         progress(done)
         for place, made in executor.each(computed_curves, [works[number] for number in missing]):
             if isinstance(made, str):
+                where = text_at(self.factors, levels[missing[place]])
                 raise WmDrakeError(
-                    f"{made}, in the drawing with {self._text(levels[missing[place]])}; choose "
-                    "smaller ranges of motion. Finished drawings are kept"
+                    f"{made}, in the drawing with {where}; choose smaller ranges of motion. Finished "
+                    "drawings are kept"
                 )
             ledger.put(keys[missing[place]], made)
             done += 1
@@ -335,12 +329,6 @@ class GeometryTask(Task):
         tables = {motion.name: _table(motion.rotates, values[motion.name]) for motion in MOTIONS}
         stiffness = GasketStiffness(tables, float(values["coupling"]))
         return Computed(stiffness, float(values["stretch"]))
-
-    def _text(self, levels: FloatArray) -> str:
-        return ", ".join(
-            f"{factor.name} {factor.value(level):.3g} {factor.unit}"
-            for factor, level in zip(self.factors, levels.tolist(), strict=True)
-        )
 
     def _responses(
         self, executor: Executor, levels: FloatArray, computed: Sequence[Computed]
