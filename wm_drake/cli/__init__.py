@@ -37,20 +37,26 @@ COMMANDS = {
         "Open a page on this computer that runs a machine again at each move of a slider.",
     ),
     "export": ("wm_drake.cli.export:app", "Export a machine to other programs."),
-    "gasket": ("wm_drake.cli.gasket:app", "Compute a gasket from its drawing."),
+    "gasket": (
+        "wm_drake.studies.gasket_curves.options:GASKET_CURVES",
+        "Compute a gasket from its drawing.",
+    ),
     "identify": (
-        "wm_drake.cli.identify:app",
+        "wm_drake.studies.identification.options:IDENTIFY",
         "Find the numbers of a component from measured loops.",
     ),
     "machine": ("wm_drake.cli.machine:app", "List, start, check and show machine files."),
-    "record": ("wm_drake.cli.record:app", "Look at records of runs and at measurements."),
+    "record": (
+        "wm_drake.studies.orders.options:ORDERS",
+        "Look at records of runs and at measurements.",
+    ),
     "rig": (
-        "wm_drake.cli.rig:app",
+        "wm_drake.studies.rig.options:RIG",
         "Test a component on a bench: harmonic motion, steady force loops.",
     ),
     "study": ("wm_drake.cli.study:app", "Run a study of many runs and write a report."),
 }
-"""Home and line of help of each command: a function, a declared study, or a group of commands."""
+"""Home and line of help of each command: a function, declared studies, or a group of commands."""
 
 
 class Commands(TyperGroup):
@@ -80,6 +86,7 @@ class Commands(TyperGroup):
 @functools.cache
 def _command(name: str) -> Any:
     """Import a command."""
+    from wm_drake.cli.components import group_of
     from wm_drake.cli.options import command_of
     from wm_drake.cli.quiet import give_quiet
     from wm_drake.studies.study import Study
@@ -87,10 +94,15 @@ def _command(name: str) -> Any:
     home, text = COMMANDS[name]
     declared = pkgutil.resolve_name(home)
     single = typer.Typer(add_completion=False)
-    if isinstance(declared, typer.Typer):
+    if isinstance(declared, Study) and not declared.group:
+        single.command(name)(command_of(declared))
+    elif isinstance(declared, typer.Typer):
         single.add_typer(declared, name=name, help=text)
+    elif callable(declared):
+        single.command(name)(declared)
     else:
-        single.command(name)(command_of(declared) if isinstance(declared, Study) else declared)
+        studies = (declared,) if isinstance(declared, Study) else declared
+        single.add_typer(group_of(studies), name=name, help=text)
     give_quiet(single)
     return typer.main.get_group(single).commands[name]
 

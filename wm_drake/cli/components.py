@@ -1,8 +1,13 @@
-"""Commands of components: help that names the damper laws, and files after `--validate`."""
+"""Groups of commands of studies: help that names the damper laws, files after `--validate`."""
 
+from collections.abc import Iterable
 from typing import Any
 
+import typer
 from typer.core import TyperCommand
+
+from wm_drake.cli.options import command_of
+from wm_drake.studies.study import Study
 
 
 class DamperCommand(TyperCommand):
@@ -44,3 +49,13 @@ class ValidatingCommand(DamperCommand):
         if args and args[-1] == "--validate":
             spread.append("--validate")  # click says that its value is missing
         return super().parse_args(ctx, spread)
+
+
+def group_of(studies: Iterable[Study]) -> typer.Typer:
+    """Return a group with the commands of studies."""
+    group = typer.Typer(no_args_is_help=True)
+    group.callback()(lambda: None)  # else a single command would have no name
+    for study in studies:
+        cls = ValidatingCommand if study.group in ("identify", "rig") else None
+        group.command(study.name, cls=cls)(command_of(study))
+    return group

@@ -9,6 +9,7 @@ from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
     Progress,
+    ProgressColumn,
     TextColumn,
     TimeElapsedColumn,
     TimeRemainingColumn,
@@ -42,6 +43,11 @@ class ProgressLines:
         typer.echo(f"{text}, {now - self._begin:.0f} s", err=True)
 
 
+def _bars(*columns: ProgressColumn) -> Progress:
+    console = Console(stderr=True)
+    return Progress(*columns, console=console, transient=True, disable=not has_bars(console))
+
+
 @contextmanager
 def progress_bar(total: int, what: str = "runs") -> Iterator[Callable[..., None]]:
     """Show progress on standard error, with the elapsed and the remaining time.
@@ -68,9 +74,8 @@ def progress_bar(total: int, what: str = "runs") -> Iterator[Callable[..., None]
         TextColumn("remaining"),
         TimeRemainingColumn(),
     )
-    console, lines = Console(stderr=True), ProgressLines()
-    shown = has_bars(console)
-    with Progress(*columns, console=console, transient=True, disable=not shown) as bar:
+    lines = ProgressLines()
+    with _bars(*columns) as bar:
         task = bar.add_task(what, total=total, note="")
 
         def update(done: int, note: str = "") -> None:
@@ -93,9 +98,8 @@ def progress_bars(names: Sequence[str]) -> Iterator[Callable[[int, float], None]
         TextColumn("{task.percentage:3.0f} %"),
         TimeRemainingColumn(),
     )
-    console, lines = Console(stderr=True), ProgressLines()
-    shown = has_bars(console)
-    with Progress(*columns, console=console, transient=True, disable=not shown) as bar:
+    lines = ProgressLines()
+    with _bars(*columns) as bar:
         tasks = [bar.add_task(name, total=1.0) for name in names]
 
         def update(index: int, fraction: float) -> None:

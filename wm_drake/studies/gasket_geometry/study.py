@@ -315,8 +315,8 @@ class GeometryTask(Task):
             if isinstance(made, str):
                 where = text_at(self.factors, levels[missing[place]])
                 raise WmDrakeError(
-                    f"{made}, in the drawing with {where}; choose smaller ranges of motion. Finished "
-                    "drawings are kept"
+                    f"{made}, in the drawing with {where}; choose smaller ranges of motion. "
+                    "Finished drawings are kept"
                 )
             ledger.put(keys[missing[place]], made)
             done += 1

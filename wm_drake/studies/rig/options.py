@@ -39,8 +39,8 @@ class AxisRigOptions(RigOptions):
     arm: str | None = ARM
 
 
-RIG = {
-    kind: Study(
+RIG = tuple(
+    Study(
         kind,
         about,
         options,
@@ -60,5 +60,5 @@ RIG = {
         ("bushing", "One axis of a six-component bushing.", AxisRigOptions),
         ("gasket", "One axis of the gasket.", AxisRigOptions),
     )
-}
-"""Commands by kind of component."""
+)
+"""Commands of components."""
