@@ -9,6 +9,7 @@ import typer
 import yaml
 from documents import CHECKOUT, HOW_TO, README, blocks, commands, name_of
 from drag_damper import DRAG_DAMPER
+from pydrake.systems.framework import Diagram
 
 import wm_drake as wm
 from wm_drake.cli import app
@@ -19,7 +20,6 @@ from wm_drake.parameters.free import FreeFile, load_free
 from wm_drake.parameters.gasket_drawing import load_gasket_drawing
 from wm_drake.parameters.tolerances import load_limits, load_tolerances
 from wm_drake.parameters.variation import number_at
-from wm_drake.report.diagram import mermaid
 from wm_drake.simulation.measures import measure
 from wm_drake.simulation.runs import simulate
 from wm_drake.studies.calibration.parameter_map import parameter_map_of
@@ -48,6 +48,28 @@ def parsed(arguments):
     if rest:
         command.make_context(command.name, rest, parent=context)
     return command
+
+
+def mermaid(diagram: Diagram) -> str:
+    """Return a Mermaid flow chart of the systems of a diagram and the signals between them."""
+    systems = diagram.GetSystems()
+    lines = ["flowchart LR"]
+    for system in systems:
+        kind = type(system).__name__.split("_")[0]
+        if hasattr(system, "kind"):  # one system serves elements of all kinds
+            kind = system.kind.title
+        lines.append(
+            f'  {system.get_name()}["{system.get_name().replace("_", " ")}<br/><i>{kind}</i>"]'
+        )
+    arrows = []
+    for (to_system, to_port), (from_system, from_port) in diagram.connection_map().items():
+        port = from_system.get_output_port(from_port)
+        into = to_system.get_input_port(to_port).get_name().replace("_", " ")
+        label = (
+            port.get_name().replace("_", " ") if port.get_name().startswith("generalized") else into
+        )
+        arrows.append(f"  {from_system.get_name()} -- {label} --> {to_system.get_name()}")
+    return "\n".join(lines + sorted(arrows))
 
 
 def test_the_picture_is_the_diagrams_own_graph(machine):

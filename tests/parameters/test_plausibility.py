@@ -3,7 +3,7 @@
 import pytest
 
 from wm_drake.model.build import build_machine
-from wm_drake.model.plausibility import unusual_springs, unusual_values
+from wm_drake.model.expectations import unusual_springs, unusual_values
 from wm_drake.parameters import load_machine, quantities, with_values
 from wm_drake.parameters.files import shipped_machines
 from wm_drake.parameters.plausibility import RANGES, unusual_numbers, usual_range

@@ -31,9 +31,14 @@ from wm_drake.errors import input_error, nearest_names, shortened
 from wm_drake.export.description import IDENTIFIER, Identity, model_description
 from wm_drake.export.kernel import kernel_code
 from wm_drake.export.model import ExportedModel, Variable, exported_model
-from wm_drake.export.object_code import PLATFORMS, Platform, object_files
+from wm_drake.export.object_code import (
+    PLATFORMS,
+    Platform,
+    build_description,
+    object_files,
+    sources_in_c,
+)
 from wm_drake.export.options import FmuOptions
-from wm_drake.export.sources import build_description, sources_in_c
 from wm_drake.parameters import MachineParameters
 from wm_drake.simulation.outputs import variables_of
 

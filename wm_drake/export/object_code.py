@@ -1,11 +1,15 @@
 """Object files from compiled functions: machine code for a platform, without Python in it."""
 
 import functools
+import json
 import re
-from collections.abc import Mapping
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import llvmlite.binding as llvm
+
+from wm_drake.export.description import IDENTIFIER
 
 
 @dataclass(frozen=True)
@@ -203,3 +207,40 @@ def _entry(module: llvm.ModuleRef, name: str) -> str:
         and not function.name.startswith("cfunc.")
     )
     return str(entry)
+
+
+LEFT_OUT = ("\t.file", "\t.ident")
+"""Beginnings of lines that the compiler writes itself."""
+
+
+def sources_in_c(code: Mapping[str, str], platform: Platform) -> dict[str, bytes]:
+    """Return the C files with the functions of a platform, by file name.
+
+    Each function has its own file, because labels of an assembler are valid in a whole file.
+
+    Args:
+        code: LLVM's text of the functions, as for `assembly`.
+        platform: The platform; elsewhere the files are empty.
+    """
+    texts = assembly(code, platform)
+    return {f"{symbol}_{platform.name}.c": _in_c(text, platform) for symbol, text in texts.items()}
+
+
+def _in_c(text: str, platform: Platform) -> bytes:
+    lines = [line for line in text.splitlines() if not line.startswith(LEFT_OUT)]
+    body = "\n".join(["__asm__(", *(json.dumps(f"{line}\n") for line in lines), ");"])
+    head = f"/* Machine code of the washing machine for {platform.name}. */"
+    empty = "typedef int wm_other_platform;"
+    return f"{head}\n#if {platform.condition}\n{body}\n#else\n{empty}\n#endif\n".encode()
+
+
+def build_description(names: Iterable[str]) -> bytes:
+    """Return `buildDescription.xml` of FMI 3.0 for the files that are compiled."""
+    root = ET.Element("fmiBuildDescription", fmiVersion="3.0")
+    configuration = ET.SubElement(root, "BuildConfiguration", modelIdentifier=IDENTIFIER)
+    files = ET.SubElement(configuration, "SourceFileSet", language="C11")
+    for name in names:
+        ET.SubElement(files, "SourceFile", name=name)
+    ET.SubElement(configuration, "Library", name="m", external="true")
+    ET.indent(root)
+    return bytes(ET.tostring(root, encoding="utf-8", xml_declaration=True))

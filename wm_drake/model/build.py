@@ -1,7 +1,7 @@
 """Add a machine to a diagram, or build a diagram of it alone."""
 
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, NoReturn, TypeAlias, TypeVar
 
 import numpy as np
 from pydrake.geometry import Meshcat
@@ -10,13 +10,12 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from wm_drake.elements.cabinet import FEET, FEET_SIZE, SLIP_SIZE
 from wm_drake.elements.motor import DRUM_FRICTION, packed_controller, packed_friction, packed_limit
+from wm_drake.errors import input_error
 from wm_drake.model.bodies import add_bodies
-from wm_drake.model.frame_poses import FramePoses
+from wm_drake.model.frame_poses import FramePoses, measured_points, tub_points
 from wm_drake.model.machine import Machine, MachineSystems, MotorSystems
 from wm_drake.model.placed_elements import PlacedElements, placed_elements
-from wm_drake.model.ports import Inputs, Outputs
 from wm_drake.model.state_layout import state_layout_of
-from wm_drake.model.tub_points import measured_points, tub_points
 from wm_drake.model.visualization import add_visualizer
 from wm_drake.model.wiring import Link, Wiring
 from wm_drake.parameters import MachineParameters, MotorDrive, load_machine
@@ -239,3 +238,45 @@ def _element_outputs(label: str, system: Any) -> dict[str, OutputPort]:
         for port in ports
         if port.get_name() not in ("generalized_force", "state")
     }
+
+
+Port = TypeVar("Port")
+
+OF_OTHER_DRIVES = {
+    "drum_acceleration": "it belongs to a drive that prescribes the speed",
+    "drum_speed_reference": "it needs a drive with a motor, as in load_machine('motor')",
+    "drum_torque": "it needs a drive with a motor, as in load_machine('motor')",
+    "drum_friction_torque": "it needs a drive with a motor, as in load_machine('motor')",
+    "tub_in_cabinet": "it needs a cabinet that moves",
+    "feet_floor_force": "it needs a cabinet that moves",
+}
+"""Why a machine may lack a port."""
+
+
+class Ports(dict[str, Port]):
+    """Ports by name."""
+
+    kind = "port"
+
+    def __missing__(self, name: str) -> NoReturn:
+        """Refuse a name that no port has.
+
+        Raises:
+            InputError: always; it lists the ports.
+        """
+        reason = f"; {OF_OTHER_DRIVES[name]}" if name in OF_OTHER_DRIVES else ""
+        raise input_error(
+            f"no {self.kind} '{name}'{reason}. The {self.kind}s are {', '.join(sorted(self))}"
+        )
+
+
+class Inputs(Ports[Port]):
+    """Input ports by name."""
+
+    kind = "input"
+
+
+class Outputs(Ports[Port]):
+    """Output ports by name."""
+
+    kind = "output"

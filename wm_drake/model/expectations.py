@@ -15,6 +15,7 @@ from wm_drake.model.equilibrium import spring_force
 from wm_drake.model.machine import Setup
 from wm_drake.model.scene import Outline, Scene
 from wm_drake.parameters.elements import ForceTable, TorqueTable
+from wm_drake.parameters.plausibility import unusual_numbers
 
 LARGEST_RING_RADIUS = 0.2
 """Radius of the largest usual gasket: 150 to 200 mm. [m]"""
@@ -209,3 +210,34 @@ def _volume(outline: Outline) -> float:
     """Return the volume of an outline. [m^3]"""
     a, b, c = (2.0 * outline.half).tolist()
     return float(a * b * c * (0.25 * np.pi if outline.is_round else 1.0))
+
+
+_MM_PER_M = 1e3
+
+
+def unusual_springs(setup: Setup) -> list[Problem]:
+    """Return one problem for each spring that would have no positive free length.
+
+    A spring of free length L0 > 0 pulls with t = 0 at length L0 and would have to push at length 0.
+    A spring that still pulls when its hooks meet is too soft for the weight that it carries: it has
+    to be stretched by more than its own length.
+
+    Args:
+        setup: The machine at rest, with preloads.
+    """
+    return [
+        Problem(
+            "",
+            f"springs.{name}",
+            f"is too soft: it carries {spring.preload:.0f} N at a length of "
+            f"{_MM_PER_M * spring.rest_length:.0f} mm, so its free length would be negative; is "
+            "the unit of its stiffness right?",
+        )
+        for name, spring in setup.springs.items()
+        if spring.preload > 0.0 and spring.free_length is None
+    ]
+
+
+def unusual_values(setup: Setup) -> list[Problem]:
+    """Return one problem for each unusual number and each impossible spring of a machine."""
+    return [*unusual_numbers(setup.parameters), *unusual_springs(setup)]

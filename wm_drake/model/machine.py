@@ -18,11 +18,10 @@ from wm_drake.errors import input_error, nearest_names
 from wm_drake.model.bodies import add_load, set_bodies
 from wm_drake.model.cabinet import cabinet_at_rest
 from wm_drake.model.equilibrium import force_as_drawn, preloaded, put_to_rest, rest_pose
-from wm_drake.model.frame_poses import FramePoses
+from wm_drake.model.frame_poses import FramePoses, TubPoints, measured_points, tub_points
 from wm_drake.model.placed_elements import PlacedElements, placed_elements
 from wm_drake.model.set_up_cache import SetUpCache
 from wm_drake.model.state_layout import StateLayout
-from wm_drake.model.tub_points import TubPoints, measured_points, tub_points
 from wm_drake.model.tub_statics import TubStatics, Weight, weight_of
 from wm_drake.parameters import Drive, Load, MachineParameters, MotorDrive, Sensor, SpinProfile
 from wm_drake.parameters.drive import motor_of

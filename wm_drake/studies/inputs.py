@@ -226,8 +226,7 @@ def built_with_problems(
     from wm_drake.engines.compiled.stepping import choose_stepping
     from wm_drake.engines.memory import check_size
     from wm_drake.model.build import build_machine
-    from wm_drake.model.expectations import unexpected
-    from wm_drake.model.plausibility import unusual_values
+    from wm_drake.model.expectations import unexpected, unusual_values
     from wm_drake.model.scene import Scene
     from wm_drake.parameters import located, machine_path, measured_amplitudes, published_results
     from wm_drake.parameters.files import check_tables

@@ -20,8 +20,8 @@ from wm_drake.batch.runs import Runner, RunResult, TubMotion
 from wm_drake.batch.work_items import BatchKey, Preparation, WorkItem
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.errors import InputError, Problem
+from wm_drake.model.expectations import unusual_springs
 from wm_drake.model.machine import Setup
-from wm_drake.model.plausibility import unusual_springs
 from wm_drake.model.scene import Gap
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.plausibility import unusual_numbers

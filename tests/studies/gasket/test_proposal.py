@@ -7,7 +7,6 @@ import pytest
 from wm_drake.parameters import GASKET_FACTORS, levels_of, load_factors
 from wm_drake.simulation.measures.responses import GAP
 from wm_drake.studies.doe.design import make_design
-from wm_drake.studies.gasket.check import Check
 from wm_drake.studies.gasket.proposal import (
     ZERO,
     Aim,
@@ -18,7 +17,7 @@ from wm_drake.studies.gasket.proposal import (
     settings_of,
 )
 from wm_drake.studies.gasket.screening import Meaning, Responses, run_screening
-from wm_drake.studies.gasket.surface import model_row, model_rows, surfaces
+from wm_drake.studies.gasket.surface import Check, model_row, model_rows, surfaces
 
 NAMES = ("C_L", "C_T", "K_Lx", "K_Ly")
 UNITS = {GAP: "mm", "Dx": "mm"}

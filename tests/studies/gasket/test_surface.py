@@ -19,9 +19,8 @@ from wm_drake.parameters import (
     quantities,
 )
 from wm_drake.studies.doe.design import make_design
-from wm_drake.studies.gasket.check import Check, Setting
 from wm_drake.studies.gasket.screening import Responses, run_screening
-from wm_drake.studies.gasket.surface import codes, model_row, surfaces
+from wm_drake.studies.gasket.surface import Check, Setting, codes, model_row, surfaces
 
 NAMES = ("a", "b", "c")
 

@@ -7,9 +7,8 @@ import pytest
 
 from wm_drake.model.scene import Gap, Scene
 from wm_drake.parameters import load_machine
-from wm_drake.studies.modes.nearness import Nearness, about_nearness, nearness
 from wm_drake.studies.modes.page import about_damping, damping_text
-from wm_drake.studies.modes.shapes import ANGLE_ARM, NAMES, Mode
+from wm_drake.studies.modes.shapes import ANGLE_ARM, NAMES, Mode, Nearness, about_nearness, nearness
 from wm_drake.studies.modes.study import SLIDING, STUCK
 
 

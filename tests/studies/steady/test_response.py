@@ -17,14 +17,13 @@ from wm_drake.simulation.outputs import tub_outputs
 from wm_drake.studies.steady.balance import HARMONICS, HarmonicBalance
 from wm_drake.studies.steady.condensed import Corrections
 from wm_drake.studies.steady.continuation import first_motion, floquet_multipliers, is_stable
-from wm_drake.studies.steady.products import write_derivative
 from wm_drake.studies.steady.response import (
     branch_of,
     coefficients_of,
     settled_trajectory,
     trajectory_of_period,
 )
-from wm_drake.studies.steady.series import Series
+from wm_drake.studies.steady.series import Series, write_derivative
 
 RPM = np.pi / 30.0
 EXCESS, RADIUS = 0.1, 0.25

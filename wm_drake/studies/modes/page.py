@@ -24,8 +24,15 @@ from wm_drake.studies.modes.figures import (
     sensitivity_figure,
     shapes_figure,
 )
-from wm_drake.studies.modes.nearness import Nearness, about_nearness, nearness, parts
-from wm_drake.studies.modes.shapes import ANGLE_ARM, UNDAMPED, Mode
+from wm_drake.studies.modes.shapes import (
+    ANGLE_ARM,
+    UNDAMPED,
+    Mode,
+    Nearness,
+    about_nearness,
+    nearness,
+    parts,
+)
 from wm_drake.studies.modes.study import (
     AMPLITUDE,
     SLIDING,

@@ -1,5 +1,6 @@
 """Spin runs: cases with their records and measures, in one or several processes."""
 
+import logging
 import os
 import time
 import warnings
@@ -26,7 +27,7 @@ from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number
 from wm_drake.report.terminal import Printed
 from wm_drake.simulation.balance import balance_of, rings_of
 from wm_drake.simulation.cases import Case, is_as_measured, notice_jumping_friction
-from wm_drake.simulation.displacements import band_of
+from wm_drake.simulation.displacements import band_of, largest_motion
 from wm_drake.simulation.measures import Measures, measure
 from wm_drake.simulation.measures.as_json import as_json
 from wm_drake.simulation.mounts import POINT
@@ -210,8 +211,6 @@ class SpinResult(Result):
             if self.files.records:
                 save_record(case.record, folder / f"record_{self._name_of(case)}.nc")
             if file := self.replay_of(case):
-                from wm_drake.studies.spin.replay import case_replay
-
                 (folder / file).write_text(case_replay(self.parameters, case), encoding="utf-8")
 
     def warnings(self) -> list[str]:
@@ -376,3 +375,25 @@ def _run(
         record = simulate(machine, item.case, item.engine, step=item.step, progress=progress)
     measures = measure(record, scene)
     return CaseResult(item.case, record, measures, time.perf_counter() - begin)
+
+
+def case_replay(parameters: MachineParameters, case: CaseResult) -> str:
+    """Return the page of the 3D replay of a case around its largest amplitude."""
+    from wm_drake.model.replay import Motion, replay_page
+
+    # Meshcat would print the address of its server
+    logging.getLogger("drake").setLevel(logging.WARNING)
+    time, positions = largest_motion(case.record)
+    shown = case.record.sel(time=time)
+    cabinet = None
+    if "cabinet_angle" in shown:
+        cabinet = np.hstack([shown.cabinet_angle.values, shown.cabinet_position.values])
+    gasket = case.has_gasket
+    words = "" if gasket or parameters.gasket is None else ", without gasket"
+    return replay_page(
+        parameters,
+        Motion(time, positions, shown.drum_speed.values, cabinet),
+        title=f"Machine {parameters.name}, load {case.case.name}{words}",
+        load=case.case.load,
+        gasket=gasket,
+    )

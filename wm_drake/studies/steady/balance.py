@@ -28,8 +28,7 @@ from wm_drake.model.machine import Setup
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.modes.linearisation import check_fixed_cabinet
 from wm_drake.studies.steady.kinematics import kinematics_of
-from wm_drake.studies.steady.products import write_derivative
-from wm_drake.studies.steady.series import Series
+from wm_drake.studies.steady.series import Series, write_derivative
 
 HARMONICS = 11
 """Default number of harmonics.

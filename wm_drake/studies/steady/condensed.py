@@ -22,7 +22,7 @@ from wm_drake.compiler.compilation import long_running
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.steady.balance import HOLD, HarmonicBalance, Linearised
 from wm_drake.studies.steady.kinematics import Partition
-from wm_drake.studies.steady.products import write_derivative
+from wm_drake.studies.steady.series import write_derivative
 
 
 class Condensed(NamedTuple):
