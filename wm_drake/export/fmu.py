@@ -82,10 +82,8 @@ def export_fmu(
     """Write a machine with a load as an FMU.
 
     Args:
-        parameters: The machine.
         load: Name of one of its loads, with which a run of the FMU begins.
         out: File to write; it is replaced if it exists.
-        options: How it is written.
 
     Raises:
         InputError: an option is not allowed, FMPy or a compiler is missing, or the compiled engine
@@ -141,11 +139,7 @@ class _Contents:
         return files
 
     def libraries(self, compilers: Mapping[str, list[str]]) -> dict[str, bytes]:
-        """Return the library of each platform.
-
-        Args:
-            compilers: Command that compiles and links, by platform.
-        """
+        """Return the library of each platform."""
         files = {}
         for platform in self.platforms:
             place = f"binaries/{platform.folder(self.fmi)}/{IDENTIFIER}{platform.suffix}"
@@ -228,9 +222,6 @@ def _token(model: ExportedModel, code: Mapping[str, str], fmi: int) -> str:
 
 def _library(contents: Mapping[str, bytes], platform: Platform, compiler: list[str]) -> bytes:
     """Return the shared library of a platform.
-
-    Args:
-        contents: Object files and the header of the machine, by file name.
 
     Raises:
         InputError: the compiler fails.

@@ -105,11 +105,7 @@ def symbols(code: Mapping[str, str], platform: Platform) -> list[tuple[str, str,
 
 
 def object_files(code: Mapping[str, str], platform: Platform) -> dict[str, bytes]:
-    """Return the object files of functions for a platform, by file name.
-
-    Args:
-        code: As for `symbols`.
-    """
+    """Return the object files of functions for a platform, by file name."""
     return {
         f"{symbol}.o": _emitted(name, symbol, code[name], _Target(platform, features, "object"))
         for name, symbol, features in symbols(code, platform)
@@ -117,11 +113,7 @@ def object_files(code: Mapping[str, str], platform: Platform) -> dict[str, bytes
 
 
 def assembly(code: Mapping[str, str], platform: Platform) -> dict[str, str]:
-    """Return the text for an assembler of functions for a platform, by symbol.
-
-    Args:
-        code: As for `symbols`.
-    """
+    """Return the text for an assembler of functions for a platform, by symbol."""
     return {
         symbol: _emitted(name, symbol, code[name], _Target(platform, features, "text")).decode()
         for name, symbol, features in symbols(code, platform)

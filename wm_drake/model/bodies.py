@@ -87,9 +87,6 @@ def add_bodies(plant: MultibodyPlant, parameters: MachineParameters) -> None:
     that moves is a floating body too; the housing of the SDF stays where it is drawn, and gives the
     mounting points in the frame of the cabinet.
 
-    Args:
-        plant: Empty plant.
-
     Raises:
         InputError: there is no such file, it is not valid SDF, it lacks a body or a joint, or a new
             frame cannot be added.
@@ -196,7 +193,6 @@ def _attach_drum_to_carrier(plant: MultibodyPlant, actuator: JointActuator) -> J
     """Replace the tub by a massless floating body, the carrier, as the parent of the drum's joint.
 
     Args:
-        plant: Plant before `Finalize`.
         actuator: Actuator of the drum's joint; it is removed together with the joint.
 
     Returns:
@@ -227,11 +223,7 @@ def _attach_drum_to_carrier(plant: MultibodyPlant, actuator: JointActuator) -> J
 
 
 def _add_cabinet(plant: MultibodyPlant) -> None:
-    """Add the body of a cabinet that moves; `set_bodies` sets its mass properties.
-
-    Args:
-        plant: Plant before `Finalize`.
-    """
+    """Add the body of a cabinet that moves; `set_bodies` sets its mass properties."""
     body = plant.AddRigidBody(CABINET, plant.AddModelInstance(CABINET), SpatialInertia.Zero())
     plant.AddJoint(RpyFloatingJoint(f"{CABINET}_floating", plant.world_frame(), body.body_frame()))
 

@@ -33,9 +33,6 @@ def cabinet_at_rest(
     The feet are levelled: at rest the cabinet stands as drawn. Their loads are those of four feet
     of equal stiffness under the weight of the empty machine.
 
-    Args:
-        plant, context: The plant and its Context, at rest and without load.
-
     Raises:
         InputError: the cabinet tips over at rest.
     """

@@ -90,7 +90,6 @@ def preloaded(elements: PlacedElements, force: FloatArray) -> PlacedElements:
     preloads stay; the others balance what these leave. If all are given, the machine sags.
 
     Args:
-        elements: All elements, springs without the preloads to find.
         force: Moment about To and force of these elements and of gravity on the tub as drawn, in W.
             (6,) [N m, N]
 
@@ -126,7 +125,6 @@ def rest_pose(elements: PlacedElements, weight: Weight) -> tuple[FloatArray, Flo
 
     Args:
         elements: All elements, springs with preload, none with bodies of its own.
-        weight: Weight of tub and drum.
 
     Returns:
         Roll, pitch, yaw, x, y, z (6,) [rad, m]; moment about To and force that remain on the tub,
@@ -205,8 +203,6 @@ def put_to_rest(
     """Move all positions but the drum angle to equilibrium, near the drawn pose (T = W).
 
     Args:
-        plant, context: The plant and its Context, with bodies attached to the tub.
-        state_layout: State layout of the plant.
         elements: All elements, springs with preload.
 
     Returns:
@@ -286,9 +282,6 @@ def weight_on_cabinet(
 ) -> FloatArray:
     """Return the wrench of the mounts on the cabinet at rest: the weight of all that hangs on them.
 
-    Args:
-        plant, context: The plant and its Context, at rest.
-
     Returns:
         Moment about the origin of W and force, in W. (6,) [N m, N]
     """
@@ -363,9 +356,6 @@ def _balance(statics: Statics, chosen: Indices) -> float:
     A step is a least-squares solution, so that a tube that can spin freely stays where it is. The
     drum carrier moves with the tub, so that the stiffness of a bearing does not hide the small
     stiffness of the springs.
-
-    Args:
-        statics: Forces of the machine; its Context is moved.
 
     Returns:
         Largest force or moment that rounding may leave. [N, N m]

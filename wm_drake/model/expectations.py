@@ -43,12 +43,7 @@ _INTO_TUB = 0.01
 
 
 def unexpected(setup: Setup, scene: Scene) -> list[Problem]:
-    """Return one problem for each property of a machine that an expert would doubt.
-
-    Args:
-        setup: The machine at rest.
-        scene: Its shapes.
-    """
+    """Return one problem for each property of a machine that an expert would doubt."""
     return [
         *_bounce(setup),
         *_end_bushings(setup),
@@ -221,9 +216,6 @@ def unusual_springs(setup: Setup) -> list[Problem]:
     A spring of free length L0 > 0 pulls with t = 0 at length L0 and would have to push at length 0.
     A spring that still pulls when its hooks meet is too soft for the weight that it carries: it has
     to be stretched by more than its own length.
-
-    Args:
-        setup: The machine at rest, with preloads.
     """
     return [
         Problem(

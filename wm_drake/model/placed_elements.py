@@ -167,7 +167,6 @@ class PlacedElements:
 
         Args:
             begins: Index of each element in packed numbers, by kind.
-            states: States of the machine.
         """
         kinds = tuple(element.kind for element in self.others.values())
         return mounts_at(begins, self.rubber_begins(begins), kinds, states)
@@ -204,7 +203,6 @@ def _states(elements: WithStates, **has: bool) -> StateMap:
     """Return the states of a machine with some elements.
 
     Args:
-        elements: The elements that have states.
         has: Whether there are states of "bearing", "drive" and "cabinet".
     """
     parts = [tub_part(), *map(sponge_part, elements.dampers)]
@@ -312,8 +310,6 @@ def _placed(poses: FramePoses, key: str, kind: ElementKind | None, parts: Sequen
     """Return an element in its place.
 
     Args:
-        poses: Poses of the frames.
-        key: Key path of the element.
         kind: Its kind; None for one of another package.
         parts: The element, and the types that it names.
 

@@ -84,7 +84,6 @@ def replay_page(
         motion: The motion, with at least one sample.
         title: Title of the page; that of the machine if empty.
         load: Point masses in the drum; they turn with it.
-        gasket: Whether the gasket is shown.
     """
     try:
         return _drawn_page(parameters, motion, title, load, gasket)

@@ -36,10 +36,6 @@ from wm_drake.parameters.types import FloatArray
 def set_rotor(plant: MultibodyPlant, context: Any, drive: MotorDrive) -> None:
     """Add the inertia of a rotor to drum, tub and actuator in a plant Context.
 
-    Args:
-        context: Its Context, whose drum and tub have the inertia of the machine without the rotor's
-            rotation against the tub.
-
     Raises:
         InputError: the joint is not revolute, or the tub's inertia is too small.
     """

@@ -323,7 +323,6 @@ class Scene:
             time: (n,) [s]
             poses: Poses of the tub: roll, pitch, yaw, x, y, z. (n, 6) [rad, m]
             rest_pose: Pose of the tub at rest. (6,) [rad, m]
-            path: From `paths`, if it is known.
 
         Returns:
             The smallest gap; None if there is no sample or the SDF has no shapes to measure.
@@ -476,13 +475,7 @@ class Scene:
     def _smallest_of_pair(
         self, path: Path, number: int, best: Gap, time: FloatArray, near: NDArray[np.int64]
     ) -> Gap:
-        """Return the smaller of a known gap and the smallest gap of one pair of shapes.
-
-        Args:
-            number: Number of the pair in the path.
-            best: The smallest gap known.
-            near: Numbers of the poses to look at.
-        """
+        """Return the smaller of a known gap and the smallest gap of one pair of shapes."""
         pair = path.pairs[number]
         if not len(near):
             return best
@@ -512,7 +505,6 @@ class Scene:
         """Record a motion into a Meshcat animation that begins at time 0.
 
         Args:
-            meshcat: The Meshcat that the scene was built with.
             time: (n,) [s]
             positions: Positions of the plant: roll, pitch, yaw, x, y, z, drum angle. (n, 7)
                 [rad, m]

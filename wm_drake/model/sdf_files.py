@@ -47,7 +47,6 @@ def check_mass_properties(roots: dict[Path, Element], fixed: Iterable[str]) -> N
     """Check that each link that moves states its mass and its moments of inertia.
 
     Args:
-        roots: From `sdf_roots`.
         fixed: Names of the links that are fixed to the world.
 
     Raises:

@@ -64,7 +64,6 @@ def weight_of(plant: MultibodyPlant, context: Context) -> Weight:
 
     Args:
         plant: Plant of a machine without bodies between tub and housing.
-        context: Its Context, at the drawn pose.
     """
     grounds = [plant.world_body()]
     if plant.HasBodyNamed(CABINET):

@@ -30,7 +30,6 @@ def add_floor(meshcat: Meshcat, floor: float) -> None:
     """Draw the floor below a cabinet that moves.
 
     Args:
-        meshcat: Where to draw it.
         floor: Height of the floor. [m]
     """
     meshcat.SetObject("/floor", Box(*FLOOR_SIZE), FLOOR_COLOUR)
@@ -91,7 +90,6 @@ def add_visualizer(
     Args:
         state: Output port of the plant's state; for a cabinet that moves, port of the state of tub
             and drum seen from it.
-        plant_state: Output port of the plant's state.
     """
     scene_graph = builder.AddNamedSystem("shapes", SceneGraph())
     plant = MultibodyPlant(time_step=0.0)

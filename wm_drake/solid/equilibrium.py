@@ -212,7 +212,6 @@ class Solver:
 
         Args:
             rim: Displacement of each node of the rim. (nodes of the rim, 3) [m]
-            start: Equilibrium to begin with.
 
         Raises:
             NoEquilibriumError: there is none within the allowed number of iterations.

@@ -61,12 +61,7 @@ class Ring:
 
 
 def half_ring(drawing: GasketDrawing, meridian: int, around: int) -> Ring:
-    """Return the half of a ring with z >= 0, for motions that are symmetric about the plane z = 0.
-
-    Args:
-        meridian: Number of elements along the meridian.
-        around: Number of elements around the half ring.
-    """
+    """Return the half of a ring with z >= 0, for motions symmetric about the plane z = 0."""
     angles = np.linspace(0.0, math.pi, 2 * around + 1)
     section, columns = _section(drawing, meridian), len(angles)
     positions = np.array([[_turned(section, angle)] for angle in angles])[:, 0]
@@ -83,11 +78,7 @@ def half_ring(drawing: GasketDrawing, meridian: int, around: int) -> Ring:
 
 
 def wedge(drawing: GasketDrawing, meridian: int) -> Ring:
-    """Return a thin wedge of a ring, for motions along the axis and about it.
-
-    Args:
-        meridian: Number of elements along the meridian.
-    """
+    """Return a thin wedge of a ring, for motions along the axis and about it."""
     section, angles = _section(drawing, meridian), (-HALF_WEDGE, 0.0, HALF_WEDGE)
     turned = np.array([_turned(section, angle) for angle in angles]).transpose(1, 0, 2, 3)
     every = np.arange(turned[..., 0].size).reshape(turned.shape[:3])
