@@ -207,9 +207,6 @@ def _volume(outline: Outline) -> float:
     return float(a * b * c * (0.25 * np.pi if outline.is_round else 1.0))
 
 
-_MM_PER_M = 1e3
-
-
 def unusual_springs(setup: Setup) -> list[Problem]:
     """Return one problem for each spring that would have no positive free length.
 
@@ -222,7 +219,7 @@ def unusual_springs(setup: Setup) -> list[Problem]:
             "",
             f"springs.{name}",
             f"is too soft: it carries {spring.preload:.0f} N at a length of "
-            f"{_MM_PER_M * spring.rest_length:.0f} mm, so its free length would be negative; is "
+            f"{_MM * spring.rest_length:.0f} mm, so its free length would be negative; is "
             "the unit of its stiffness right?",
         )
         for name, spring in setup.springs.items()

@@ -4,7 +4,7 @@ sdformat drops an included file that it cannot use, takes 1 kg for a missing mas
 process on a cycle of files. So all this is checked here.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
@@ -35,7 +35,8 @@ def sdf_roots(path: Path) -> dict[Path, Element]:
         root = roots.setdefault(current, _root(current))
         if len(roots) > MOST_FILES:
             raise _refused(path, f"includes more than {MOST_FILES} files")
-        for uri in _uris(root):
+        for include in root.iter("include"):
+            uri = _text_at(include, "uri")
             included = _included(folder, current, uri)
             if included.resolve() in (p.resolve() for p in (*above, current)):
                 raise _refused(current, f"includes '{uri}', and so itself")
@@ -72,9 +73,9 @@ _MASS_PROPERTIES = (
 )
 
 
-def _text_at(link: Element, part: str) -> str:
-    """Return the text of an element below a link; empty if there is none."""
-    return (link.findtext(part) or "").strip()
+def _text_at(element: Element, part: str) -> str:
+    """Return the text of an element below another one; empty if there is none."""
+    return (element.findtext(part) or "").strip()
 
 
 def _root(path: Path) -> Element:
@@ -86,11 +87,6 @@ def _root(path: Path) -> Element:
     if root.tag != "sdf":
         raise _refused(path, f"cannot be read: it is <{root.tag[:40]}>, not <sdf>")
     return root
-
-
-def _uris(root: Element) -> Iterator[str]:
-    for include in root.iter("include"):
-        yield (include.findtext("uri") or "").strip()
 
 
 def _included(folder: Path, current: Path, uri: str) -> Path:

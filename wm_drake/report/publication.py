@@ -57,8 +57,12 @@ def write_figures(figures: list[tuple[Figure, str]], folder: Path) -> None:
     for index, (figure, title) in enumerate(figures, start=1):
         stem = f"{index:02d}_{file_name(title)}"
         drawing = matplotlib_of(figure)
+        buffer = io.StringIO()
         with rc_context({"svg.hashsalt": "wm-drake", "svg.fonttype": "path"}):
-            (folder / f"{stem}.svg").write_text(_svg(drawing), encoding="utf-8")
+            drawing.savefig(buffer, format="svg", dpi=DPI, metadata={"Date": None})
+        # matplotlib repeats each text as a comment, names from files among them
+        svg = re.sub(r"<!--.*?-->\n?", "", buffer.getvalue(), flags=re.DOTALL)
+        (folder / f"{stem}.svg").write_text(svg, encoding="utf-8")
         metadata = {"CreationDate": None, "Producer": None, "Creator": None}
         drawing.savefig(folder / f"{stem}.pdf", dpi=DPI, metadata=metadata)
         drawing.savefig(folder / f"{stem}.png", dpi=DPI, metadata={"Software": None})
@@ -69,14 +73,6 @@ def file_name(title: str) -> str:
     """Return a text as name of a file: lower-case letters, digits and underscores."""
     words = re.sub(r"[^a-z0-9]+", "_", title.lower()).strip("_")
     return words[:LONGEST_NAME].strip("_") or "picture"
-
-
-def _svg(drawing: Any) -> str:
-    """Return a drawing as SVG text."""
-    buffer = io.StringIO()
-    drawing.savefig(buffer, format="svg", dpi=DPI, metadata={"Date": None})
-    # matplotlib repeats each text as a comment, names from files among them
-    return re.sub(r"<!--.*?-->\n?", "", buffer.getvalue(), flags=re.DOTALL)
 
 
 def figure_data(figure: Figure) -> pd.DataFrame:

@@ -306,15 +306,14 @@ def _json(content: Any, status: int = 200) -> Response:
     return Response(text, status, media_type="application/json")
 
 
-def _words(where: str, message: str) -> str:
-    """Return a message with the place of the problem, if that is a file."""
-    return message if not where or where.startswith("case ") else f"{where}: {message}"
-
-
 async def _wrong(_request: Request, error: Exception) -> Response:
     """Return the problems of an input, each with the key of its value."""
     assert isinstance(error, InputError)  # the handler of this type
-    problems = [{"key": p.key, "message": _words(p.where, p.message)} for p in error.problems]
+    problems = []
+    for problem in error.problems:
+        is_of_file = problem.where and not problem.where.startswith("case ")
+        place = f"{problem.where}: " if is_of_file else ""
+        problems.append({"key": problem.key, "message": f"{place}{problem.message}"})
     exists = isinstance(error, ExistsAlreadyError)
     return _json({"problems": problems, "exists": exists}, 409 if exists else 422)
 

@@ -400,7 +400,9 @@ class BalancerTask(Task):
         points = [(mass, y, 1.0, 1.0) for mass in self.masses for y in self.places]
         loads = trials.pairs(points, "loads")
         capacities = capacities_of(parameters)
-        mass, y = self._base(capacities)
+        y = self.places[len(self.places) // 2]
+        possible = [m for m in self.masses if is_within(capacities, m * self.radius, y)]
+        mass = max(possible, default=min(self.masses))  # of the load with which rings are varied
         base = next(pair for pair in loads if (pair.mass, pair.y) == (mass, y))
         grid = [(mass, y, b, d) for b in self.ball_masses for d in self.dampings]
         rings = trials.pairs(grid, "rings")
@@ -419,12 +421,6 @@ class BalancerTask(Task):
             self.radius,
             executor.runs,
         )
-
-    def _base(self, capacities: dict[float, float]) -> tuple[float, float]:
-        """Return mass and place of the load with which rings are varied. [kg, m]"""
-        y = self.places[len(self.places) // 2]
-        possible = [m for m in self.masses if is_within(capacities, m * self.radius, y)]
-        return max(possible, default=min(self.masses)), y
 
 
 def _values(text: str, unit: Unit, option: str, is_place: bool = False) -> tuple[float, ...]:

@@ -95,7 +95,8 @@ def _against_published_effects(
     leaders = published.leaders(screening)
     same = sum(ours == theirs for ours, theirs in leaders.values())
     texts = [f"The most influential factor is the published one in {same} of {len(leaders)} cases."]
-    points = list(map(abs, published.main_points(screening).values()))
+    differences = published.differences(screening)
+    points = [abs(points) for (_, term), points in differences.items() if ":" not in term]
     if points:
         texts.append(
             f"Contributions of main effects differ from the published ones by "

@@ -113,14 +113,13 @@ class Published:
         terms = self.compared_terms(screening)
         return [(label, term.name) for label, term in terms if self.sign_differs(label, term)]
 
-    def main_points(self, screening: Screening) -> dict[tuple[Label, str], float]:
-        """Return contribution less published contribution of main effects, by label and term."""
-        differences = {}
-        for label, term in self.compared_terms(screening):
-            published = self.percent(label, term)
-            if published is not None and len(term.factors) == 1:
-                differences[label, term.name] = term.percent - published
-        return differences
+    def differences(self, screening: Screening) -> dict[tuple[Label, str], float]:
+        """Return contribution less published contribution, by label and term. [points]"""
+        return {
+            (label, term.name): term.percent - published
+            for label, term in self.compared_terms(screening)
+            if (published := self.percent(label, term)) is not None
+        }
 
     def leaders(self, screening: Screening) -> dict[Label, tuple[str, str]]:
         """Return our largest main effect and the published one of each response with any."""
@@ -148,12 +147,7 @@ class Published:
 
     def far_contributions(self, screening: Screening) -> dict[tuple[Label, str], float]:
         """Return the contributions that differ by more than `FAR`, by label and term. [points]"""
-        differences = {}
-        for label, term in self.compared_terms(screening):
-            published = self.percent(label, term)
-            if published is not None and abs(term.percent - published) > FAR:
-                differences[label, term.name] = term.percent - published
-        return differences
+        return {key: d for key, d in self.differences(screening).items() if abs(d) > FAR}
 
 
 NOT_PUBLISHED = Published()

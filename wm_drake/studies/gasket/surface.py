@@ -120,7 +120,13 @@ def surfaces(screening: Screening) -> Surfaces:
     design = screening.design
     interactions = design.model != "main"
     inverses = {}
-    inverse = functools.cache(functools.partial(_inverse, screening, interactions))
+
+    @functools.cache
+    def inverse(good: bytes) -> FloatArray:
+        rows = design.levels[np.frombuffer(good, dtype=bool)]
+        matrix = SumCoding(pd.DataFrame(rows, columns=list(design.factors)), interactions).matrix
+        return np.asarray(np.linalg.inv(matrix.T @ matrix))
+
     for load, values in screening.responses.values.items():
         good = np.isfinite(values.to_numpy()).all(axis=1)
         inverses[load] = inverse(good.tobytes())
@@ -133,13 +139,6 @@ def surfaces(screening: Screening) -> Surfaces:
     return Surfaces(
         tuple(design.factors), interactions, coefficients, deviations, quantiles, inverses
     )
-
-
-def _inverse(screening: Screening, interactions: bool, good: bytes) -> FloatArray:
-    design = screening.design
-    rows = design.levels[np.frombuffer(good, dtype=bool)]
-    matrix = SumCoding(pd.DataFrame(rows, columns=list(design.factors)), interactions).matrix
-    return np.asarray(np.linalg.inv(matrix.T @ matrix))
 
 
 def _coefficients(table: AnovaTable) -> FloatArray:

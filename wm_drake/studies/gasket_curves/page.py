@@ -19,12 +19,7 @@ from wm_drake.report.sections import Section, SectionedPage
 from wm_drake.report.table import Column, Table, line
 from wm_drake.report.terminal import Printed
 from wm_drake.solid.curves import AXIAL, RADIAL, TILT, TWIST, Curve, Mesh, Motion
-from wm_drake.studies.gasket_curves.figures import (
-    curves_figure,
-    rings_figure,
-    rubber_figure,
-    sections_figure,
-)
+from wm_drake.studies.gasket_curves import figures
 from wm_drake.studies.gasket_curves.machine import coupling
 from wm_drake.studies.gasket_curves.study import Checked
 from wm_drake.studies.rig.units import units_of
@@ -263,18 +258,18 @@ def checks_table(result: CurvesResult) -> pd.DataFrame:
 def _pictures(curves: dict[str, Curve]) -> tuple[Picture, Picture, Picture]:
     """Return the curves, the cuts through the wall and the deformed rings."""
     drawn = picture(
-        curves_figure(curves),
+        figures.curves_figure(curves),
         "Four panels: axial and radial force over displacement, twist and tilt moment over angle.",
         "Force on the moved rim over its displacement, and moment over its angle. By symmetry the "
         "radial curve is that of x and z, the tilt curve that about x and z: six curves in all.",
     )
     sections = picture(
-        sections_figure(curves),
+        figures.sections_figure(curves),
         "Cuts through the wall as drawn and at both ends of each curve.",
         "Cuts through the wall in the plane of the motion, to scale. Squares: folds touch.",
     )
     rings = picture(
-        rings_figure(curves),
+        figures.rings_figure(curves),
         "Half of the ring at both ends of each curve.",
         "Half of the ring at both ends of each curve, to scale: lines of the mesh, seen from the "
         "side and above.",
@@ -285,7 +280,7 @@ def _pictures(curves: dict[str, Curve]) -> tuple[Picture, Picture, Picture]:
 def _rubber_section(result: CurvesResult) -> list[Section]:
     """Return the section of the tension test; none without one."""
     rubber = result.drawing.rubber
-    figure = rubber_figure(rubber)
+    figure = figures.rubber_figure(rubber)
     if figure is None or rubber.test is None:
         return []
     deviation = f"{significant(100.0 * rubber.test.deviation, 2)} %"

@@ -27,14 +27,7 @@ from wm_drake.studies.gasket_curves.machine import (
     with_gasket,
 )
 from wm_drake.studies.gasket_curves.study import check_gasket, curve_values, positive
-from wm_drake.studies.gasket_geometry.drawings import (
-    FOLDS,
-    changed,
-    factors_of,
-    text_at,
-    values_at,
-    with_folds,
-)
+from wm_drake.studies.gasket_geometry import drawings
 from wm_drake.studies.gasket_geometry.options import GeometryOptions
 from wm_drake.studies.inputs import pairs_of, selected_cases
 from wm_drake.studies.run import Executor
@@ -206,9 +199,9 @@ class GeometryTask(Task):
         self.options, self.machine = options, machine.parameters
         check_gasket(self.machine)
         self.drawing, self.limits = load_gasket_drawing(options.file), limits_of(options.limit)
-        self.factors = factors_of(self.drawing, options.folds)
+        self.factors = drawings.factors_of(self.drawing, options.folds)
         if len(set(options.folds)) == 1:
-            self.drawing = with_folds(self.drawing, options.folds[0])
+            self.drawing = drawings.with_folds(self.drawing, options.folds[0])
         self.cases = selected_cases(self.machine, options.load, True, options.profile)
         self.frequency = positive(options.frequency, Unit("Hz", "Hz"), "--frequency")
         self.values = curve_values(options, POINTS)
@@ -226,13 +219,13 @@ class GeometryTask(Task):
 
     def _mesh(self, levels: FloatArray) -> Mesh:
         """Return the mesh of a drawing: more elements along the meridian for more folds."""
-        values = values_at(self.factors, levels)
-        times = round(values.get(FOLDS, max(self.options.folds)))
+        values = drawings.values_at(self.factors, levels)
+        times = round(values.get(drawings.FOLDS, max(self.options.folds)))
         return replace(self.mesh, meridian=times * self.mesh.meridian)
 
     def _gasket(self, levels: FloatArray) -> Gasket:
         """Return the gasket of a drawing."""
-        return Gasket(changed(self.drawing, self.factors, levels), self._mesh(levels))
+        return Gasket(drawings.changed(self.drawing, self.factors, levels), self._mesh(levels))
 
     @property
     def identity(self) -> dict[str, Any]:
@@ -273,7 +266,7 @@ class GeometryTask(Task):
             every,
             count,
             surfaces,
-            changed(self.drawing, self.factors, levels[ranked(every, self.limits)[0]]),
+            drawings.changed(self.drawing, self.factors, levels[ranked(every, self.limits)[0]]),
             tuple(case.name for case in self.cases),
             self.limits,
             self.candidates,
@@ -302,7 +295,8 @@ class GeometryTask(Task):
         assert ledger is not None
         sources = sources_version()
         works = [
-            (changed(self.drawing, self.factors, at), self._mesh(at), self.values) for at in levels
+            (drawings.changed(self.drawing, self.factors, at), self._mesh(at), self.values)
+            for at in levels
         ]
         keys = [
             key_of(drawing=drawing, mesh=mesh, values=values, sources=sources)
@@ -313,7 +307,7 @@ class GeometryTask(Task):
         progress(done)
         for place, made in executor.each(computed_curves, [works[number] for number in missing]):
             if isinstance(made, str):
-                where = text_at(self.factors, levels[missing[place]])
+                where = drawings.text_at(self.factors, levels[missing[place]])
                 raise WmDrakeError(
                     f"{made}, in the drawing with {where}; choose smaller ranges of motion. "
                     "Finished drawings are kept"
@@ -365,7 +359,7 @@ class GeometryTask(Task):
         }
 
     def _machine(self, levels: FloatArray, stiffness: GasketStiffness) -> MachineParameters:
-        drawing = changed(self.drawing, self.factors, levels)
+        drawing = drawings.changed(self.drawing, self.factors, levels)
         damping = damping_per_stiffness(drawing, self.frequency)
         return with_gasket(self.machine, stiffness, damping, "gasket-geometry")
 

@@ -6,20 +6,7 @@ import numpy as np
 
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
-from wm_drake.report.figure import (
-    COLOURS,
-    MARK,
-    OURS,
-    QUIET,
-    Axis,
-    Figure,
-    Line,
-    Mark,
-    Panel,
-    Points,
-    Rule,
-    in_grid,
-)
+from wm_drake.report import figure as fig
 from wm_drake.report.formatting import number
 from wm_drake.report.page import Picture, picture
 from wm_drake.report.sections import Section
@@ -181,20 +168,20 @@ def _pictures(cases: list[CaseResult]) -> tuple[Picture, ...]:
     return (picture(floor_figure(shown), alternative, caption),)
 
 
-def floor_figure(cases: list[CaseResult]) -> Figure:
+def floor_figure(cases: list[CaseResult]) -> fig.Figure:
     """Return smallest load of a foot, margin of sliding and margin of turning over time."""
-    marks: list[list[Mark]] = [[Rule(0.0, color=MARK)] for _ in HEADS[:3]]
+    marks: list[list[fig.Mark]] = [[fig.Rule(0.0, color=fig.MARK)] for _ in HEADS[:3]]
     for index, case in enumerate(cases):
         time, smallest = windows(case.record.time.values, foot_loads_of(case.record).margins)
-        color = COLOURS[index % len(COLOURS)]
+        color = fig.COLOURS[index % len(fig.COLOURS)]
         for of_panel, column in zip(marks, smallest.T, strict=False):
-            of_panel.append(Line(time, column, color=color, key=case.title))
-    x = Axis(label="time, s", range=(0.0, max(float(case.record.time[-1]) for case in cases)))
+            of_panel.append(fig.Line(time, column, color=color, key=case.title))
+    x = fig.Axis(label="time, s", range=(0.0, max(float(case.record.time[-1]) for case in cases)))
     panels = [
-        Panel(name=head.split(",")[0], marks=tuple(of_panel), x=x, y=Axis(label=head))
+        fig.Panel(name=head.split(",")[0], marks=tuple(of_panel), x=x, y=fig.Axis(label=head))
         for head, of_panel in zip(HEADS, marks, strict=False)
     ]
-    return Figure(panels=in_grid(panels, 1, share="x"), height=180.0)
+    return fig.Figure(panels=fig.in_grid(panels, 1, share="x"), height=180.0)
 
 
 def windows(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -280,7 +267,7 @@ def walk_pictures(cases: list[CaseResult]) -> tuple[Picture, ...]:
     return (picture(walk_figure(shown, farthest), f"Distance walked. {walked}.", caption),)
 
 
-def walk_figure(cases: list[CaseResult], farthest: CaseResult) -> Figure:
+def walk_figure(cases: list[CaseResult], farthest: CaseResult) -> fig.Figure:
     """Return the path of the feet of one case, and distance and turn over time of all."""
     last = max(float(case.record.time[-1]) for case in cases)
     panels = [_floor(farthest)]
@@ -289,31 +276,31 @@ def walk_figure(cases: list[CaseResult], farthest: CaseResult) -> Figure:
         marks = []
         for index, case in enumerate(cases):
             time, path = _sampled(case)
-            color = COLOURS[index % len(COLOURS)]
+            color = fig.COLOURS[index % len(fig.COLOURS)]
             values = unit.from_si(1.0) * path[:, row]
-            marks.append(Line(time, values, color=color, key=case.title))
-        x = Axis(label="time, s" if row else "", range=(0.0, last), scale="time")
+            marks.append(fig.Line(time, values, color=color, key=case.title))
+        x = fig.Axis(label="time, s" if row else "", range=(0.0, last), scale="time")
         x = replace(x, has_numbers=bool(row))
-        y = Axis(label=text)
+        y = fig.Axis(label=text)
         name = text.split(",")[0]
-        panels.append(Panel(name=name, marks=tuple(marks), x=x, y=y, row=row, column=1))
-    return Figure(panels=tuple(panels), height=185.0)
+        panels.append(fig.Panel(name=name, marks=tuple(marks), x=x, y=y, row=row, column=1))
+    return fig.Figure(panels=tuple(panels), height=185.0)
 
 
-def _floor(case: CaseResult) -> Panel:
+def _floor(case: CaseResult) -> fig.Panel:
     """Return the feet before and after a run, with their paths, from above."""
     in_record = cabinet_in(case.record)
     assert in_record is not None
     cabinet = in_record[0]
     feet = np.array([[cabinet.feet[name].x, cabinet.feet[name].y] for name in cabinet.corners])
     paths = MM.from_si(1.0) * (feet + _thinned(case.record.foot_slip.values[:, :, :2]))
-    marks: list[Mark] = [Line(*paths[:, foot].T) for foot in range(len(feet))]
-    for at, color in ((0, QUIET), (-1, OURS)):
+    marks: list[fig.Mark] = [fig.Line(*paths[:, foot].T) for foot in range(len(feet))]
+    for at, color in ((0, fig.QUIET), (-1, fig.OURS)):
         corners = np.vstack([paths[at], paths[at][:1]])
-        marks.append(Line(*corners.T, color=color, dash="" if at else "dashed"))
-        marks.append(Points(*paths[at].T, color=color, is_open=at == 0, size=8.0))
-    x, y = Axis(label="x, mm"), Axis(label="y, mm")
-    return Panel(name="floor", marks=tuple(marks), x=x, y=y, rows=2, is_square=True)
+        marks.append(fig.Line(*corners.T, color=color, dash="" if at else "dashed"))
+        marks.append(fig.Points(*paths[at].T, color=color, is_open=at == 0, size=8.0))
+    x, y = fig.Axis(label="x, mm"), fig.Axis(label="y, mm")
+    return fig.Panel(name="floor", marks=tuple(marks), x=x, y=y, rows=2, is_square=True)
 
 
 def _sampled(case: CaseResult) -> tuple[FloatArray, FloatArray]:

@@ -13,16 +13,9 @@ from wm_drake.report.sections import Section, SectionedPage
 from wm_drake.simulation.measures.registry import tabulated
 from wm_drake.simulation.spring_tension import slack_springs
 from wm_drake.studies.modes.page import natural_modes_table
-from wm_drake.studies.spin import tables
+from wm_drake.studies.spin import figures, tables
 from wm_drake.studies.spin.balance import balance_section
 from wm_drake.studies.spin.drive import capture_warnings, drive_in_short, drive_section
-from wm_drake.studies.spin.figures import (
-    envelopes_figure,
-    gaps_figure,
-    gasket_figure,
-    have_one_orbit,
-    orbits_figure,
-)
 from wm_drake.studies.spin.floor import floor_section, floor_warnings
 from wm_drake.studies.spin.study import CaseResult, Comparison, SpinResult, band_text
 from wm_drake.studies.spin.tables import amplitude_table
@@ -296,7 +289,7 @@ def _envelopes_picture(case: CaseResult, table: pd.DataFrame) -> Picture | None:
     if measured is not None:
         caption += " Dashed lines: measured amplitude, on both sides of zero."
     alternative = f"Envelopes of the displacement over time, load {case.title}. Largest: {largest}."
-    return picture(envelopes_figure(case.record, measured), alternative, caption)
+    return picture(figures.envelopes_figure(case.record, measured), alternative, caption)
 
 
 def _orbits_picture(case: CaseResult) -> Picture | None:
@@ -304,7 +297,7 @@ def _orbits_picture(case: CaseResult) -> Picture | None:
         return None
     depths = case.record.sensor_point.sel(axis="y")
     ends = float(depths.min()), float(depths.max())
-    is_one = have_one_orbit(*ends)
+    is_one = figures.have_one_orbit(*ends)
     planes = "plane of the sensors" if is_one else "planes of the foremost and the rearmost sensor"
     caption = (
         f"Path of the drum axis in the {planes}, seen from the front of the machine. Dot and dark "
@@ -313,7 +306,7 @@ def _orbits_picture(case: CaseResult) -> Picture | None:
     )
     orbits = "Orbit of the drum axis" if is_one else "Orbits of the drum axis, front and rear"
     alternative = f"{orbits}, around the largest amplitude, load {case.title}."
-    return picture(orbits_figure(case.record, *ends), alternative, caption)
+    return picture(figures.orbits_figure(case.record, *ends), alternative, caption)
 
 
 def _gasket_picture(case: CaseResult) -> Picture | None:
@@ -331,7 +324,7 @@ def _gasket_picture(case: CaseResult) -> Picture | None:
         f"Gasket force and moment over time, load {case.title}. Largest force "
         f"{number(float(force.max()))} N, largest moment {number(float(moment.max()), 2)} N m."
     )
-    return picture(gasket_figure(case.record), alternative, caption)
+    return picture(figures.gasket_figure(case.record), alternative, caption)
 
 
 def _gaps_pictures(result: SpinResult) -> tuple[Picture, ...]:
@@ -343,4 +336,4 @@ def _gaps_pictures(result: SpinResult) -> tuple[Picture, ...]:
         "that time."
     )
     words = "Smallest gap between tub and housing per load; the numbers are in the table below."
-    return (picture(gaps_figure(cases), words, caption),)
+    return (picture(figures.gaps_figure(cases), words, caption),)

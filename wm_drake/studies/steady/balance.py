@@ -93,8 +93,11 @@ class HarmonicBalance:
             InputError: the machine has something that the compiled engine does not represent.
         """
         check_fixed_cabinet(setup.parameters)
-        self.derivative, self.series = SlopedDerivative(setup), series
-        self.scale = _scale(self.derivative)
+        derivative = SlopedDerivative(setup)
+        self.derivative, self.series = derivative, series
+        self.scale = np.where(derivative.is_velocity, 0.0, 1.0)
+        angles = np.isin(derivative.free, derivative.layout.states.indices(ANGLE))
+        self.scale[angles] = ANGLE_ARM
         self.held = _held(self.derivative)
         self.is_held = np.isin(np.arange(self.size), self.held)
         self.kinematics = kinematics_of(self.derivative, setup)
@@ -164,12 +167,6 @@ class HarmonicBalance:
     def extent(self, coefficients: FloatArray) -> float:
         """Return the size of a change of the coefficients. [m]"""
         return float(np.linalg.norm(coefficients * self.scale))
-
-
-def _scale(derivative: SlopedDerivative) -> FloatArray:
-    scale = np.where(derivative.is_velocity, 0.0, 1.0)
-    scale[np.isin(derivative.free, derivative.layout.states.indices(ANGLE))] = ANGLE_ARM
-    return scale
 
 
 def _held(derivative: SlopedDerivative) -> np.ndarray:
