@@ -16,8 +16,8 @@ import wm_drake as wm
 from wm_drake.cli import app
 from wm_drake.engines.compiled.run import run_compiled
 from wm_drake.errors import InputError
+from wm_drake.export.fmu import real_time_factor
 from wm_drake.export.options import FmuOptions
-from wm_drake.export.speed import real_time_factor
 from wm_drake.model.scene import Scene
 from wm_drake.parameters import SpinProfile
 from wm_drake.simulation.outputs import variables_of

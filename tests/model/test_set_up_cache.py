@@ -1,6 +1,6 @@
 """What set-ups of a machine share belongs to the numbers that each of them asked for."""
 
-from wm_drake.model.set_up_cache import SetUpCache
+from wm_drake.model.machine import SetUpCache
 from wm_drake.parameters import with_value
 
 MOVED = (-0.22, -0.06, 0.37)

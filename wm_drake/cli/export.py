@@ -29,8 +29,7 @@ def fmu(
     **chosen: Any,
 ) -> None:
     """Write a machine as an FMU for co-simulation and model exchange, without Python inside."""
-    from wm_drake.export.fmu import export_fmu, host_platform
-    from wm_drake.export.speed import real_time_factor
+    from wm_drake.export.fmu import export_fmu, host_platform, real_time_factor
 
     parameters, options = load_parameters(machine, sets), FmuOptions(**chosen)
     for text in machine_warnings(parameters):

@@ -4,15 +4,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 
 class FmuOptions(BaseModel):
-    """How an FMU is written.
-
-    Attributes:
-        fmi: Version of the standard.
-        input: What drives the drum: speed or torque.
-        platform: Names of platforms, separated by commas; that of this computer if empty.
-        step: Largest step of the integrator; that of the machine if None. [s]
-        no_gasket: Whether the gasket is taken out.
-        sources: Whether the FMU also has its sources, which GCC and Clang compile.
+    """How an FMU is written; the step is in s.
 
     Example:
         >>> import wm_drake as wm

@@ -1,6 +1,6 @@
 """The machine in a Drake diagram: its systems and ports, and the numbers set in a Context."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -20,7 +20,8 @@ from wm_drake.model.cabinet import cabinet_at_rest
 from wm_drake.model.equilibrium import force_as_drawn, preloaded, put_to_rest, rest_pose
 from wm_drake.model.frame_poses import FramePoses, TubPoints, measured_points, tub_points
 from wm_drake.model.placed_elements import PlacedElements, placed_elements
-from wm_drake.model.set_up_cache import SetUpCache
+from wm_drake.model.same_elements import check_same_elements
+from wm_drake.model.scene import Scene
 from wm_drake.model.state_layout import StateLayout
 from wm_drake.model.tub_statics import TubStatics, Weight, weight_of
 from wm_drake.parameters import Drive, Load, MachineParameters, MotorDrive, Sensor, SpinProfile
@@ -32,6 +33,42 @@ from wm_drake.systems.motor import Belt, Motor, SpeedController
 from wm_drake.systems.sensors import Sensors
 from wm_drake.systems.speed_source import SpeedSource
 from wm_drake.systems.spin_profile_source import SpinProfileSource
+
+
+class SetUpCache:
+    """Parameters, frame poses and weight of the last set-up, and scenes that no thread uses.
+
+    Threads may share it: each value is replaced as a whole, and a thread that misses computes it.
+
+    Attributes:
+        scenes: Scenes to take from and to give back; many short batches share them.
+    """
+
+    def __init__(self) -> None:
+        """Begin empty."""
+        self.scenes: list[Scene] = []
+        self._poses: FramePoses | None = None
+        self._weight: tuple[Any, Weight] | None = None
+        self._checked: MachineParameters | None = None
+
+    def check(self, built: MachineParameters, requested: MachineParameters) -> None:
+        """Check that a machine has the elements of the built one; see `check_same_elements`."""
+        check_same_elements(built, requested, self._checked)
+        self._checked = requested
+
+    def frame_poses(self, plant: MultibodyPlant, parameters: MachineParameters) -> FramePoses:
+        """Return the frame poses; those of the last set-up if its overrides were the same."""
+        poses = self._poses
+        if poses is None or poses.frames != parameters.frames:
+            poses = self._poses = FramePoses(plant, parameters)
+        return poses
+
+    def weight(self, parameters: MachineParameters, compute: Callable[[], Weight]) -> Weight:
+        """Return the weight on the springs; that of the last set-up if its bodies were the same."""
+        bodies, last = (parameters.bodies, parameters.frames), self._weight
+        if last is None or last[0] != bodies:
+            last = self._weight = bodies, compute()
+        return last[1]
 
 
 @dataclass(frozen=True, repr=False)

@@ -6,6 +6,7 @@ The page is Drake's Meshcat with a recorded animation. A caption shows title, ti
 import gc
 import html
 import json
+import logging
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -96,6 +97,7 @@ def replay_page(
 def _drawn_page(
     parameters: MachineParameters, motion: Motion, title: str, load: Load | None, gasket: bool
 ) -> str:
+    logging.getLogger("drake").setLevel(logging.WARNING)  # it would print the address of Meshcat
     meshcat = Meshcat(MeshcatParams(host="localhost"))  # reachable from this computer only
     for hidden in ("/Grid", "/Axes"):
         meshcat.SetProperty(hidden, "visible", False)

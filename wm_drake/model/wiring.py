@@ -30,13 +30,7 @@ class Link:
 
 
 class Wiring:
-    """Adds systems to a diagram, with a prefix before their names, and connects them.
-
-    Attributes:
-        builder: The diagram.
-        plant: The plant.
-        layout: State layout of the plant.
-    """
+    """Adds systems to a diagram, with a prefix before their names, and connects them."""
 
     def __init__(
         self, builder: DiagramBuilder, plant: MultibodyPlant, layout: StateLayout, prefix: str

@@ -174,12 +174,7 @@ class Numbering:
 
 
 class Solver:
-    """Equilibria of a ring.
-
-    Attributes:
-        ring: The ring.
-        iterations: Newton iterations so far.
-    """
+    """Equilibria of a ring, with the number of Newton iterations so far."""
 
     def __init__(self, ring: Ring, rubber: Rubber, has_contact: bool = False) -> None:
         """Number the unknowns; both rims are given.

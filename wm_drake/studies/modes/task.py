@@ -1,7 +1,5 @@
 """The task of the study of modes, and the motion of a mode for a replay in 3D."""
 
-import logging
-
 import numpy as np
 
 from wm_drake.model.machine import Machine
@@ -43,8 +41,6 @@ def _replays(result: MachineModes) -> dict[str, str]:
     """Return the page of the animation of each sliding mode."""
     from wm_drake.model.replay import replay_page
 
-    # Meshcat would print the address of its server
-    logging.getLogger("drake").setLevel(logging.WARNING)
     return {
         mode.name: replay_page(result.parameters, mode_motion(mode), title=mode.name)
         for mode in result.modes[SLIDING]

@@ -1,6 +1,5 @@
 """Spin runs: cases with their records and measures, in one or several processes."""
 
-import logging
 import os
 import time
 import warnings
@@ -381,8 +380,6 @@ def case_replay(parameters: MachineParameters, case: CaseResult) -> str:
     """Return the page of the 3D replay of a case around its largest amplitude."""
     from wm_drake.model.replay import Motion, replay_page
 
-    # Meshcat would print the address of its server
-    logging.getLogger("drake").setLevel(logging.WARNING)
     time, positions = largest_motion(case.record)
     shown = case.record.sel(time=time)
     cabinet = None

@@ -24,13 +24,6 @@ from wm_drake.studies.spin_cycle.study import (
     mean_and_deviation,
     region_errors,
 )
-from wm_drake.studies.spin_cycle.tables import (
-    drive_frame,
-    drive_table,
-    feet_frame,
-    floor_table,
-    floor_warnings,
-)
 from wm_drake.studies.study import Facts, Result
 
 if TYPE_CHECKING:
@@ -49,10 +42,10 @@ class SpinCycleReport(Result):
 
     def tables(self) -> "dict[str, pd.DataFrame]":
         """Return RMS displacements, cases and, if measured, feet and drive."""
-        result, drive = self.result, drive_frame(self.result)
+        result, drive = self.result, tables.drive_frame(self.result)
         shown = {"rms": rms_table(result.displacement), "cases": tables.case_frame(result)}
         if "turn_margin" in result.forces:
-            shown["feet"] = feet_frame(result)
+            shown["feet"] = tables.feet_frame(result)
         return shown if drive is None else shown | {"drive": drive}
 
     def write(self, folder: Path) -> None:
@@ -113,8 +106,8 @@ class SpinCycleReport(Result):
             Section("regions", "Regions", tables=(tables.regions(result),)),
         ]
         for anchor, heading, table in (
-            ("floor", "Forces on the floor", floor_table(result)),
-            ("drive", "Drive", drive_table(result)),
+            ("floor", "Forces on the floor", tables.floor_table(result)),
+            ("drive", "Drive", tables.drive_table(result)),
         ):
             if table:
                 sections.append(Section(anchor, heading, tables=(table,)))
@@ -237,7 +230,7 @@ def warnings_of(result: SpinCycleResult) -> list[str]:
     smallest = result.smallest_tension
     names = map(str, smallest.case.values)
     texts += slack_warning({c: slack_springs(smallest.sel(case=c)) for c in names}, "case")
-    texts += floor_warnings(result)
+    texts += tables.floor_warnings(result)
     apart = float(disagreement(result).max(skipna=True))
     if apart > 0.01:
         texts.append(

@@ -1,7 +1,7 @@
 """The task of the study of a spin cycle: options and files checked, and runs."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,7 @@ from wm_drake.studies.inputs import channels_of, existing_file, runnable_profile
 from wm_drake.studies.run import Executor
 from wm_drake.studies.spin.study import run_spin
 from wm_drake.studies.spin_cycle.measured import read_accelerations, read_rms
-from wm_drake.studies.spin_cycle.options import SpinCycleOptions
+from wm_drake.studies.spin_cycle.options import CycleOptions, SpinCycleOptions
 from wm_drake.studies.spin_cycle.page import SpinCycleReport
 from wm_drake.studies.spin_cycle.study import (
     Evaluate,
@@ -47,10 +47,9 @@ class SpinCycleTask(Task):
         self.machine, self.engine = machine, options.engine
         self.profile = runnable_profile(options.profile, machine.parameters)
         self.cases = cases_of_table(options.cases, options.case)
-        files = MeasuredFiles(
-            options.measured, options.accelerations, channels_of(options.channels)
+        self.measured = measured_displacements(
+            options, machine.parameters, self.cases, self.profile
         )
-        self.measured = files.read(machine.parameters, self.cases, self.profile)
 
     @property
     def identity(self) -> dict[str, Any]:
@@ -81,45 +80,35 @@ def cases_of_table(path: Path | None, names: Sequence[str] | None) -> list[Unbal
     return [known[name] for name in dict.fromkeys(names)] if names else table
 
 
-@dataclass(frozen=True)
-class MeasuredFiles:
-    """Files of measurements of a spin cycle; at most one of the two.
+def measured_displacements(
+    options: CycleOptions,
+    parameters: MachineParameters,
+    cases: list[UnbalanceCase],
+    profile: SpinProfile,
+) -> xr.DataArray | None:
+    """Return the measured RMS displacements in a file of the options; None without a file.
 
-    Attributes:
-        rms: Table of RMS displacements.
-        accelerations: Folder of records of acceleration.
-        channels: Names of the channels in the records, by word.
+    Raises:
+        InputError: there are files of both kinds, one is wrong, or a case cannot be run.
     """
-
-    rms: Path | None = None
-    accelerations: Path | None = None
-    channels: Mapping[str, str] = field(default_factory=dict)
-
-    def read(
-        self, parameters: MachineParameters, cases: list[UnbalanceCase], profile: SpinProfile
-    ) -> xr.DataArray | None:
-        """Return the measured RMS displacements, or None without files.
-
-        Raises:
-            InputError: both kinds of files are given, a file is wrong, or a case cannot be run.
-        """
-        if self.rms and self.accelerations:
-            raise input_error("not allowed together with --measured", where="--accelerations")
-        if self.channels and not self.accelerations:
-            raise input_error("is about the files of --accelerations", where="--channels")
-        try:
-            runs_of(parameters, cases, profile)  # raises an error for cases that cannot be run
-        except InputError as error:
-            raise InputError(
-                replace(p, where="--profile", key="") if p.key == "profile" else p
-                for p in error.problems
-            ) from None
-        labels = labels_of(parameters, cases, profile)
-        if self.rms:
-            return read_rms(existing_file(self.rms, "--measured"), labels)
-        if self.accelerations:
-            return read_accelerations(self.accelerations, labels, profile, self.channels)
-        return None
+    channels = channels_of(options.channels)
+    if options.measured and options.accelerations:
+        raise input_error("not allowed together with --measured", where="--accelerations")
+    if channels and not options.accelerations:
+        raise input_error("is about the files of --accelerations", where="--channels")
+    try:
+        runs_of(parameters, cases, profile)  # raises an error for cases that cannot be run
+    except InputError as error:
+        raise InputError(
+            replace(p, where="--profile", key="") if p.key == "profile" else p
+            for p in error.problems
+        ) from None
+    labels = labels_of(parameters, cases, profile)
+    if options.measured:
+        return read_rms(existing_file(options.measured, "--measured"), labels)
+    if options.accelerations:
+        return read_accelerations(options.accelerations, labels, profile, channels)
+    return None
 
 
 def compiled_runs(machine: Machine) -> Evaluate:

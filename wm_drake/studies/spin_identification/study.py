@@ -31,11 +31,11 @@ from wm_drake.simulation.cases import Case
 from wm_drake.studies.fitting.fit import Fit, Verdict, verdict_of
 from wm_drake.studies.fitting.methods import least_squares
 from wm_drake.studies.fitting.problem import FitProblem, Measurement, Progress, Unknown
-from wm_drake.studies.inputs import channels_of, runnable_profile
+from wm_drake.studies.inputs import runnable_profile
 from wm_drake.studies.run import Executor
 from wm_drake.studies.spin_cycle.measured import rms_table
 from wm_drake.studies.spin_cycle.study import DIMS, average_errors, labels_of, runs_of
-from wm_drake.studies.spin_cycle.task import MeasuredFiles, cases_of_table
+from wm_drake.studies.spin_cycle.task import cases_of_table, measured_displacements
 from wm_drake.studies.spin_identification.options import SpinIdentifyOptions
 from wm_drake.studies.study import Facts, Result, Task
 
@@ -207,10 +207,9 @@ class SpinIdentifyTask(Task):
         self.profile = runnable_profile(options.profile, machine.parameters)
         names = options.case or (() if options.cases else DEFAULT_CASES)
         self.cases = cases_of_table(options.cases, names)
-        files = MeasuredFiles(
-            options.measured, options.accelerations, channels_of(options.channels)
+        self.measured = measured_displacements(
+            options, machine.parameters, self.cases, self.profile
         )
-        self.measured = files.read(machine.parameters, self.cases, self.profile)
         self.sought = unknowns_of(machine.parameters, options.unknown)
 
     @property
