@@ -27,8 +27,7 @@ SetOption = Annotated[
     ),
 ]
 JsonOption = Annotated[
-    bool,
-    typer.Option("--json", help="Print one JSON object on standard output instead of tables."),
+    bool, typer.Option("--json", help="Print one JSON object on standard output instead of tables.")
 ]
 
 

@@ -4,7 +4,7 @@ import json
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -13,14 +13,7 @@ from wm_drake.cli.new_machine import NewOptions, machine_new
 from wm_drake.cli.options import with_options
 from wm_drake.errors import InputError, WmDrakeError, input_error, shortened
 from wm_drake.report.terminal import say
-from wm_drake.studies.inputs import (
-    built_with_problems,
-    load_parameters,
-    located_in,
-)
-
-if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
-    pass
+from wm_drake.studies.inputs import built_with_problems, load_parameters, located_in
 
 app = typer.Typer(no_args_is_help=True)
 

@@ -13,8 +13,7 @@ from wm_drake.errors import InputNotice
 from wm_drake.report.terminal import QUIET, say
 
 QuietOption = Annotated[
-    bool,
-    typer.Option("--quiet", "-q", help="Print errors and what --json asks for, nothing else."),
+    bool, typer.Option("--quiet", "-q", help="Print errors and what --json asks for, nothing else.")
 ]
 
 

@@ -19,8 +19,7 @@ DEFAULT_FOLDER = Path("wm-drake-studio")
 def studio(
     machine: MachineOption = "reference",
     folder: Annotated[
-        Path,
-        typer.Option(help="Folder for saved machine files and studies.", metavar="DIR"),
+        Path, typer.Option(help="Folder for saved machine files and studies.", metavar="DIR")
     ] = DEFAULT_FOLDER,
     no_browser: Annotated[
         bool, typer.Option("--no-browser", help="Print the address and open no browser.")

@@ -84,8 +84,7 @@ harmonics: matrix of the drum's harmonics; drum: rotation of D in T by rows, the
 [m]; points: measured points; pairs: shapes for the gap; current: per torque on the drum [A/(N m)].
 """
 Counts = namedtuple(
-    "Counts",
-    "packed parameters entries unbalances points mounts feet pairs currents",
+    "Counts", "packed parameters entries unbalances points mounts feet pairs currents"
 )
 """How many of each there are."""
 Plan = namedtuple("Plan", ("at", "of", "count", "elements", "gasket", "follows_speed"))

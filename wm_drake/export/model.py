@@ -14,14 +14,7 @@ from wm_drake.engines.compiled.mechanics import BODIES_SIZE
 from wm_drake.engines.compiled.packing import DrawnBodies, initial_state, pack
 from wm_drake.engines.compiled.step_check import check_step
 from wm_drake.errors import input_error
-from wm_drake.export.kernel import (
-    NODE_SIZE,
-    UNBALANCE_SIZE,
-    Constants,
-    Counts,
-    Places,
-    Plan,
-)
+from wm_drake.export.kernel import NODE_SIZE, UNBALANCE_SIZE, Constants, Counts, Places, Plan
 from wm_drake.export.tunable import Tunable, tunables
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Setup
@@ -127,8 +120,7 @@ def exported_model(
     step = parameters.step if step is None else step
     if not 0.0 < step <= parameters.step * 4.0:
         raise input_error(
-            f"{step:g} s; it must be above 0 and at most {4.0 * parameters.step:g} s",
-            where="step",
+            f"{step:g} s; it must be above 0 and at most {4.0 * parameters.step:g} s", where="step"
         )
     check_step(setup, step)
     tuned = tunables(machine, gasket)
@@ -192,12 +184,7 @@ class _Contents:
         at = self._places()
         numbers = self._numbers(at)
         plan = Plan(
-            at,
-            of,
-            self.count,
-            self.layout.elements,
-            self.layout.gasket,
-            self.input_kind == "speed",
+            at, of, self.count, self.layout.elements, self.layout.gasket, self.input_kind == "speed"
         )
         driven = set(self.states.indices(kinds=[DRIVE]).tolist())
         free = tuple(at.state + k for k in range(self.states.size) if k not in driven)
@@ -215,9 +202,7 @@ class _Contents:
     def _constants(self) -> list[FloatArray]:
         """Return the parts of the constants, in the order of `Constants`."""
         bodies = DrawnBodies(
-            self.setup.machine.plant,
-            self.setup.plant_context,
-            self.setup.parameters.drive.joint,
+            self.setup.machine.plant, self.setup.plant_context, self.setup.parameters.drive.joint
         )
         entries = [
             (BODIES_SIZE + row, number, slope)

@@ -27,13 +27,7 @@ from wm_drake.model.sdf_files import LARGEST_SDF, check_mass_properties, sdf_roo
 from wm_drake.model.sdf_names import frame_problems, sdf_names
 from wm_drake.model.sdf_shapes import check_shapes
 from wm_drake.model.state_layout import CABINET, CARRIER
-from wm_drake.parameters import (
-    BodyOverride,
-    InertiaMatrix,
-    Load,
-    MachineParameters,
-    with_value,
-)
+from wm_drake.parameters import BodyOverride, InertiaMatrix, Load, MachineParameters, with_value
 from wm_drake.parameters.cabinet import Cabinet
 from wm_drake.parameters.drive import motor_of
 from wm_drake.parameters.text_files import check_regular, is_file
@@ -123,8 +117,7 @@ def _add_bodies(plant: MultibodyPlant, parameters: MachineParameters, path: Path
         ]
         hint = nearest_names(parameters.drive.joint, joints)
         raise input_error(
-            f"no moving joint '{parameters.drive.joint}' in the SDF{hint}",
-            key="drive.joint",
+            f"no moving joint '{parameters.drive.joint}' in the SDF{hint}", key="drive.joint"
         )
     if missing:
         raise input_error(

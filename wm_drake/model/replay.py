@@ -281,10 +281,7 @@ def _parts(
         assert law is not None  # the placed elements have it
         tub, housing = (
             RigidTransform(RotationMatrix(rotation), point)
-            for point, rotation in (
-                poses("tub", law.tub_frame),
-                poses("world", law.housing_frame),
-            )
+            for point, rotation in (poses("tub", law.tub_frame), poses("world", law.housing_frame))
         )
         yield _Gasket("/elements/gasket", tub, housing)
     for index, unbalance in enumerate(load.unbalances if load else ()):

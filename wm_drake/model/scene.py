@@ -304,11 +304,7 @@ class Scene:
         self.plant.SetPositions(self._plant_context, self._positions)
 
     def smallest_gap(
-        self,
-        time: FloatArray,
-        poses: FloatArray,
-        rest_pose: FloatArray,
-        path: Path | None = None,
+        self, time: FloatArray, poses: FloatArray, rest_pose: FloatArray, path: Path | None = None
     ) -> Gap | None:
         """Return the smallest distance between tub group and housing over sampled poses.
 
@@ -424,11 +420,7 @@ class Scene:
         return list(self._names)
 
     def contacts(
-        self,
-        time: FloatArray,
-        poses: FloatArray,
-        rest_pose: FloatArray,
-        path: Path | None = None,
+        self, time: FloatArray, poses: FloatArray, rest_pose: FloatArray, path: Path | None = None
     ) -> FloatArray:
         """Return the smallest distance of each pair that touches over sampled poses.
 

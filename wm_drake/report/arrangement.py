@@ -125,10 +125,7 @@ def key_texts(figure: fig.Figure) -> tuple[str, ...]:
 def arrange(figure: fig.Figure) -> Arrangement:
     """Return the places of the panels of a figure."""
     panels = _with_ranges(figure.panels)
-    columns, rows = (
-        1 + max(p.column for p in panels),
-        max(p.row + p.rows for p in panels),
-    )
+    columns, rows = (1 + max(p.column for p in panels), max(p.row + p.rows for p in panels))
     ratios = np.array(figure.widths or (1.0,) * columns)
     outer = fig.LABEL * LINE + 8.0
     begin, end = 0.0, float(fig.WIDTH)

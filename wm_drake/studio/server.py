@@ -213,7 +213,7 @@ class _Routes:
         def opened() -> dict[str, object]:
             return self.studio.opened(identifier)[0].for_page()
 
-        return _json(await _in_thread(opened))
+        return _json(await asyncio.to_thread(opened))
 
     async def run(self, request: Request) -> Response:
         """Return the picture of what a page has chosen; a request that is overtaken is dropped."""
@@ -256,7 +256,7 @@ class _Routes:
                     self.studio.machines, machine, body.state, body.name, body.overwrite
                 ).name
 
-        return _json({"saved": await _in_thread(save)})
+        return _json({"saved": await asyncio.to_thread(save)})
 
     async def studies(self, _request: Request) -> Response:
         """Return all studies."""
@@ -273,7 +273,7 @@ class _Routes:
                     self.studio.machines, machine, body.state, body.study, body.options
                 )
 
-        return _json({"id": await _in_thread(start)})
+        return _json({"id": await asyncio.to_thread(start)})
 
     async def act(self, request: Request) -> Response:
         """Cancel or continue a study."""
@@ -295,10 +295,6 @@ class _Routes:
     async def _at_once(self, answer: Callable[[], Any]) -> Any:
         """Return an answer that needs no run: it does not wait for those that do."""
         return await asyncio.get_running_loop().run_in_executor(self.studio.cheap, answer)
-
-
-async def _in_thread(calculate: Callable[[], Any]) -> Any:
-    return await asyncio.get_running_loop().run_in_executor(None, calculate)
 
 
 def _json(content: Any, status: int = 200) -> Response:

@@ -165,7 +165,7 @@ def answer(f: BalancerResult) -> str:
     base = f.base
     sentences = [
         f"At {high}, free balls lower the amplitude with {len(pays)} of {count} loads: with "
-        f"{_load(base)} from {_mm(base.locked.level)} to {_mm(base.free.level)}.",
+        f"{_load(base)} from {_mm(base.locked.level)} to {_mm(base.free.level)}."
     ]
     if hurt:
         worst = max(hurt, key=lambda pair: pair.free.peak - pair.locked.peak)

@@ -150,8 +150,7 @@ def from_release(speed: float, high: float, rate: float) -> SpinProfile:
     """Return a profile that begins at the speed of a release; its regions: run-up, its end."""
     top = SETTLE + (high - speed) / rate
     return _held(
-        [(0.0, speed), (SETTLE, speed), (top, high)],
-        [Region(name="release", begin=SWING, end=top)],
+        [(0.0, speed), (SETTLE, speed), (top, high)], [Region(name="release", begin=SWING, end=top)]
     )
 
 
@@ -376,8 +375,7 @@ class BalancerTask(Task):
         self.release = _values(options.release, RPM, "--release")
         if max(self.release) >= self.high:
             raise input_error(
-                f"is not below the highest speed, {RPM.from_si(self.high):g} rpm",
-                where="--release",
+                f"is not below the highest speed, {RPM.from_si(self.high):g} rpm", where="--release"
             )
         step = checked_step(parameters, None)
         for ball_mass in self.ball_masses:

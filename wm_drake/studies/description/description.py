@@ -16,13 +16,7 @@ from wm_drake.model.equilibrium import tensions_at
 from wm_drake.model.machine import Setup
 from wm_drake.model.sdf_names import tubes_of
 from wm_drake.model.state_layout import CARRIER
-from wm_drake.parameters import (
-    DAMPER_LAWS,
-    BushingType,
-    ForceTable,
-    MachineParameters,
-    TorqueTable,
-)
+from wm_drake.parameters import DAMPER_LAWS, BushingType, ForceTable, MachineParameters, TorqueTable
 from wm_drake.parameters.rubber import RubberBranches
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.band import (

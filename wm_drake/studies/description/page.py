@@ -113,12 +113,7 @@ def _mounts(shown: Mapping[str, Any]) -> Table:
         line(f"damper {name}", (of["law"], np.nan, MM.from_si(of["length_at_rest"])))
         for name, of in shown["dampers"].items()
     )
-    columns = (
-        "part",
-        "stiffness or law",
-        Column("tension", "N", 1),
-        Column("length", "mm", 1),
-    )
+    columns = ("part", "stiffness or law", Column("tension", "N", 1), Column("length", "mm", 1))
     return Table("Springs and dampers at rest.", columns, (*springs, *dampers), text_columns=2)
 
 

@@ -14,13 +14,7 @@ from wm_drake.report.page import Picture, picture
 from wm_drake.report.sections import Section, SectionedPage
 from wm_drake.report.table import Column, Table, line, table_of
 from wm_drake.report.terminal import Printed
-from wm_drake.studies.drive.study import (
-    PASSES,
-    Estimation,
-    Threshold,
-    TorqueMap,
-    motor_with_limit,
-)
+from wm_drake.studies.drive.study import PASSES, Estimation, Threshold, TorqueMap, motor_with_limit
 from wm_drake.studies.study import Facts, Result
 
 rpm = Unit("rad/s", "rpm").from_si

@@ -107,9 +107,7 @@ def _shown(
 
 
 def all_tables(
-    screening: Screening,
-    factors: Sequence[FactorLevels] = (),
-    compared: Compared = NOT_COMPARED,
+    screening: Screening, factors: Sequence[FactorLevels] = (), compared: Compared = NOT_COMPARED
 ) -> dict[str, pd.DataFrame]:
     """Return all tables but the design by name of the file, without suffix."""
     tables = {

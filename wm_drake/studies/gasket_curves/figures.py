@@ -46,11 +46,7 @@ def curves_figure(curves: dict[str, Curve]) -> fig.Figure:
             unit.factor * finer, table.values(finer), key="table of the machine file"
         )
         points = fig.Line(
-            unit.factor * curve.values,
-            curve.wrench(),
-            width=0.0,
-            symbol="circle",
-            key="equilibria",
+            unit.factor * curve.values, curve.wrench(), width=0.0, symbol="circle", key="equilibria"
         )
         marks: tuple[fig.Mark, ...] = (fig.Rule(0.0, color=fig.QUIET), slope, between, points)
         x, y = fig.Axis(label=unit.label("displacement")), fig.Axis(label=unit.force_label)

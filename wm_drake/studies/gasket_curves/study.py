@@ -17,11 +17,7 @@ from wm_drake.parameters.units import Unit
 from wm_drake.solid.curves import MOTIONS, Curve, Gasket, Mesh
 from wm_drake.solid.deformed import Deformed, deformed, wrinkles
 from wm_drake.solid.touching import Faces
-from wm_drake.studies.gasket_curves.machine import (
-    damping_per_stiffness,
-    stiffness_of,
-    with_gasket,
-)
+from wm_drake.studies.gasket_curves.machine import damping_per_stiffness, stiffness_of, with_gasket
 from wm_drake.studies.gasket_curves.options import CurvesOptions
 from wm_drake.studies.inputs import quantities_of
 from wm_drake.studies.run import Executor

@@ -65,10 +65,7 @@ class AmplitudeMode:
         ):
             return None
         at = np.log(amplitude), np.log(self.amplitude)
-        return (
-            float(np.interp(*at, self.frequency_hz)),
-            float(np.interp(*at, self.damping_ratio)),
-        )
+        return (float(np.interp(*at, self.frequency_hz)), float(np.interp(*at, self.damping_ratio)))
 
 
 @on_one_thread
@@ -172,11 +169,7 @@ class _Free:
 
 
 def _follow(
-    balance: HarmonicBalance,
-    value: complex,
-    vector: FloatArray,
-    name: str,
-    amplitudes: FloatArray,
+    balance: HarmonicBalance, value: complex, vector: FloatArray, name: str, amplitudes: FloatArray
 ) -> AmplitudeMode:
     free = _Free(balance)
     amplitude = min(SMALLEST_AMPLITUDE, float(amplitudes[0]))

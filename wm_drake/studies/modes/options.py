@@ -11,9 +11,7 @@ class ModesOptions(Options):
     )
     no_gasket: bool = option(False, "Without the gasket.")
     amplitude: str = option(
-        "5 mm",
-        "Amplitude of the modes that depend on it, at the middle of the tub.",
-        "LENGTH",
+        "5 mm", "Amplitude of the modes that depend on it, at the middle of the tub.", "LENGTH"
     )
     replay: bool = option(False, "Also write a 3D animation of each sliding mode.")
 

@@ -18,9 +18,7 @@ class OrdersOptions(OptionModel):
     highest: float = option(6.0, "Highest order of the map.", ge=1.0, le=40.0)
     unit: str = option("m/s^2", "Unit of the signals of a CSV, for tables and axes.")
     channels: str | None = option(
-        None,
-        "Names in the files: 'S1_x=Acc 1,S1_y=Acc 2' (also time and speed).",
-        "WORD=NAME,...",
+        None, "Names in the files: 'S1_x=Acc 1,S1_y=Acc 2' (also time and speed).", "WORD=NAME,..."
     )
 
 

@@ -122,10 +122,7 @@ class ComparisonResult(Result):
             for case in variant.result.results
             if (text := gap_text(case))
         ]
-        shown: list[Any] = [
-            amplitude_lines("Displacement amplitudes, in mm", amplitudes),
-            *gaps,
-        ]
+        shown: list[Any] = [amplitude_lines("Displacement amplitudes, in mm", amplitudes), *gaps]
         if self.effect is None:
             return shown
         return [*shown, terminal_table(self.effect), effect_summary(self.effect)]

@@ -38,8 +38,7 @@ DECIMALS = {"mm": 1, "rpm": 0, "N": 1, "N*m": 2}
 
 
 def overlaid_envelopes_figure(
-    cases: Mapping[str, CaseResult],
-    measured_mm: Mapping[str, Mapping[str, float]] | None = None,
+    cases: Mapping[str, CaseResult], measured_mm: Mapping[str, Mapping[str, float]] | None = None
 ) -> Figure:
     """Return the envelopes of several runs over each other, one panel per sensor.
 

@@ -330,10 +330,7 @@ def _modes_of(machine: Machine, case: Case) -> "NaturalModes | None":
 
 
 def _run_side_by_side(
-    machine: Machine,
-    cases: Sequence[Case],
-    step: float,
-    progress: Callable[[int, float], None],
+    machine: Machine, cases: Sequence[Case], step: float, progress: Callable[[int, float], None]
 ) -> list[CaseResult]:
     """Return the results of cases, which the compiled engine runs in the lanes of a batch."""
     notice_jumping_friction(machine.parameters)

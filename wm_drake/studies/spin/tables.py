@@ -12,13 +12,7 @@ import xarray as xr
 from wm_drake.parameters import MachineParameters, measured_amplitudes, quantities
 from wm_drake.parameters.measured import BAND
 from wm_drake.parameters.units import Unit
-from wm_drake.report.formatting import (
-    MM_PER_M,
-    RPM_PER_RAD_S,
-    number,
-    percent,
-    shape_name,
-)
+from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number, percent, shape_name
 from wm_drake.report.table import (
     MOST_SHOWN,
     Column,

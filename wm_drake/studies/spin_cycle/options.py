@@ -25,9 +25,7 @@ class CycleOptions(Options):
     )
     case: tuple[str, ...] = CASE
     measured: Path | None = option(
-        None,
-        "CSV file of measured RMS displacements: case, region, sensor, axis, rms_mm.",
-        "FILE",
+        None, "CSV file of measured RMS displacements: case, region, sensor, axis, rms_mm.", "FILE"
     )
     accelerations: Path | None = option(
         None,

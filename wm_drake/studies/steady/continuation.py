@@ -244,10 +244,7 @@ def _step(
 
 
 def _solved(
-    balance: HarmonicBalance,
-    begin: FloatArray,
-    speed: float,
-    row: tuple[FloatArray, float],
+    balance: HarmonicBalance, begin: FloatArray, speed: float, row: tuple[FloatArray, float]
 ) -> tuple[FloatArray, float, Corrections, int] | None:
     """Return a motion, its speed, factors near it, and the number of corrections; None if none.
 
@@ -287,10 +284,7 @@ def _solved(
 
 
 def _corrections(
-    balance: HarmonicBalance,
-    coefficients: FloatArray,
-    speed: float,
-    row: tuple[FloatArray, float],
+    balance: HarmonicBalance, coefficients: FloatArray, speed: float, row: tuple[FloatArray, float]
 ) -> Corrections | None:
     """Return the corrections at a motion, for a last equation; None if there are none."""
     at = balance.linearised(coefficients, speed)
@@ -301,11 +295,7 @@ def _corrections(
 
 
 def _turned(
-    metric: _Metric,
-    place: _Place,
-    coefficients: FloatArray,
-    speed: float,
-    solve: Corrections,
+    metric: _Metric, place: _Place, coefficients: FloatArray, speed: float, solve: Corrections
 ) -> tuple[_Place, float] | None:
     """Return the next place, and the cosine of the bend; None if the branch bends too much.
 

@@ -24,12 +24,7 @@ from wm_drake.parameters.units import Unit
 from wm_drake.parameters.variation import value_at
 from wm_drake.simulation.cases import Case, load_of
 from wm_drake.simulation.measures import MEASURES
-from wm_drake.simulation.measures.responses import (
-    GAP,
-    has_gap,
-    known_responses,
-    measures_of,
-)
+from wm_drake.simulation.measures.responses import GAP, has_gap, known_responses, measures_of
 from wm_drake.simulation.steps import checked_step
 from wm_drake.studies.inputs import profile_of, selected_cases
 from wm_drake.studies.study import Task
