@@ -28,7 +28,7 @@ import numpy as np
 from wm_drake.engines.compiled.mechanics import DRUM_RATE
 from wm_drake.engines.compiled.run import run_compiled
 from wm_drake.engines.trajectory import LARGEST_ANGLE, LARGEST_DISPLACEMENT, LARGEST_TILT
-from wm_drake.errors import input_error, nearest_names, shortened
+from wm_drake.errors import check_known, input_error, shortened
 from wm_drake.export.description import IDENTIFIER, Identity, model_description
 from wm_drake.export.kernel import kernel_code
 from wm_drake.export.model import ExportedModel, Variable, exported_model
@@ -165,9 +165,7 @@ def _platforms(options: FmuOptions) -> list[Platform]:
         raise input_error(f"no input '{options.input}'; allowed: speed, torque", where="input")
     names = [name.strip() for name in options.platform.split(",") if name.strip()]
     for name in names:
-        if name not in PLATFORMS:
-            near = nearest_names(name, PLATFORMS)
-            raise input_error(f"no platform '{name}'{near}", where="platform")
+        check_known(name, PLATFORMS, f"no platform '{name}'", where="platform")
     return [PLATFORMS[name] for name in dict.fromkeys(names or [host_platform()])]
 
 

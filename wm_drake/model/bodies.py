@@ -21,7 +21,7 @@ from pydrake.multibody.tree import (
     UnitInertia,
 )
 
-from wm_drake.errors import InputError, Problem, input_error, nearest_names, shortened
+from wm_drake.errors import InputError, Problem, check_known, input_error, nearest_names, shortened
 from wm_drake.model.rotor import set_rotor
 from wm_drake.model.sdf_files import LARGEST_SDF, check_mass_properties, sdf_roots
 from wm_drake.model.sdf_names import frame_problems, sdf_names
@@ -152,10 +152,7 @@ def outer_tube(plant: MultibodyPlant, parameters: MachineParameters, name: str) 
     """
     key, joint_name = f"telescopic_dampers.{name}.joint", parameters.telescopic_dampers[name].joint
     joints = [joint.name() for joint in map(plant.get_joint, plant.GetJointIndices())]
-    if joint_name not in joints:
-        raise input_error(
-            f"no joint '{joint_name}' in the SDF{nearest_names(joint_name, joints)}", key=key
-        )
+    check_known(joint_name, joints, f"no joint '{joint_name}' in the SDF", key=key)
     joint = plant.GetJointByName(joint_name)
     if not isinstance(joint, PrismaticJoint):
         raise input_error(f"joint '{joint_name}' is {joint.type_name()}, not prismatic", key=key)
@@ -424,9 +421,7 @@ def _mass_properties(plant: MultibodyPlant, name: str, override: BodyOverride) -
             plant.get_body(index).name()
             for index in plant.GetBodyIndices(plant.GetBodyByName("tub").model_instance())
         ]
-        raise input_error(
-            f"no link '{name}' in the SDF{nearest_names(name, links)}", key=f"bodies.{name}"
-        )
+        check_known(name, links, f"no link '{name}' in the SDF", key=f"bodies.{name}")
     inertia = _overridden(plant.GetBodyByName(name).default_spatial_inertia(), override)
     matrix = inertia.Shift(inertia.get_com()).CalcRotationalInertia().CopyToFullMatrix3()
     indices = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}

@@ -14,7 +14,7 @@ from wm_drake.elements.friction_damper import FrictionDamperParameters
 from wm_drake.elements.motor import packed_controller, packed_friction, packed_limit
 from wm_drake.elements.spring import SpringStrutParameters
 from wm_drake.elements.telescopic_damper import TelescopicDamperParameters
-from wm_drake.errors import input_error, nearest_names
+from wm_drake.errors import check_known, input_error
 from wm_drake.model.bodies import add_load, set_bodies
 from wm_drake.model.cabinet import cabinet_at_rest
 from wm_drake.model.equilibrium import force_as_drawn, preloaded, put_to_rest, rest_pose
@@ -393,12 +393,8 @@ class MachineSystems:
         """Return a load that may be given by its name."""
         if not isinstance(load, str):
             return load
-        if load not in parameters.loads:
-            raise input_error(
-                f"no load '{load}' in machine '{parameters.name}'"
-                f"{nearest_names(load, parameters.loads)}",
-                key="loads",
-            )
+        message = f"no load '{load}' in machine '{parameters.name}'"
+        check_known(load, parameters.loads, message, key="loads")
         return parameters.loads[load]
 
     def _add_load(

@@ -3,7 +3,7 @@
 import warnings
 from dataclasses import dataclass
 
-from wm_drake.errors import InputNotice, input_error, nearest_names
+from wm_drake.errors import InputNotice, check_known
 from wm_drake.parameters import Load, MachineParameters, SpinProfile
 from wm_drake.parameters.damper_laws import DamperNumbers
 
@@ -85,12 +85,8 @@ def case_of(parameters: MachineParameters, load: str, *, gasket: bool = True) ->
         >>> wm.case_of(wm.load_machine("reference"), "counter", gasket=False).name
         'counter'
     """
-    if load not in parameters.loads:
-        raise input_error(
-            f"no load '{load}' in machine '{parameters.name}'"
-            f"{nearest_names(load, parameters.loads)}",
-            key="loads",
-        )
+    message = f"no load '{load}' in machine '{parameters.name}'"
+    check_known(load, parameters.loads, message, key="loads")
     return Case(load, parameters.loads[load], parameters.profile, gasket, parameters)
 
 

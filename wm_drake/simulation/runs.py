@@ -10,7 +10,7 @@ from wm_drake.engines.compiled.run import run_compiled
 from wm_drake.engines.compiled.stepping import choose_stepping
 from wm_drake.engines.drake import run_drake
 from wm_drake.engines.trajectory import Trajectory
-from wm_drake.errors import input_error, nearest_names
+from wm_drake.errors import check_known
 from wm_drake.model.build import AnyMachine, machine_of
 from wm_drake.simulation.cases import Case, case_of, notice_jumping_friction
 from wm_drake.simulation.records import Record, as_record
@@ -75,8 +75,7 @@ def simulate(
         (14001, 2)
     """
     machine = machine_of(machine)
-    if engine not in ENGINES:
-        raise input_error(f"no engine '{engine}'{nearest_names(engine, ENGINES)}", key="engine")
+    check_known(engine, ENGINES, f"no engine '{engine}'", key="engine")
     step = checked_step(machine.parameters, step)
     if isinstance(case, str):
         case = case_of(machine.parameters, case)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from wm_drake.batch.work_items import Preparation
-from wm_drake.errors import InputError, Problem, input_error, nearest_names
+from wm_drake.errors import InputError, Problem, check_known, input_error, nearest_names
 from wm_drake.model.bodies import with_sdf_values
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
@@ -84,10 +84,7 @@ class Machines:
     def name_or_path(self, identifier: str) -> str | Path:
         """Return what `load_machine` reads for an identifier."""
         listed = self.listed()
-        if identifier not in listed:
-            raise input_error(
-                f"no machine '{identifier}'{nearest_names(identifier, listed)}", key="machine"
-            )
+        check_known(identifier, listed, f"no machine '{identifier}'", key="machine")
         if identifier == GIVEN:
             return Path(self.given)
         return identifier if listed[identifier] == "shipped" else self.folder / identifier

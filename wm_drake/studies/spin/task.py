@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from wm_drake.errors import input_error, nearest_names, shortened
+from wm_drake.errors import check_known, input_error, shortened
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters
 from wm_drake.simulation.cases import Case
@@ -46,11 +46,7 @@ class SpinTask(Task):
         """Check the options."""
         self.options = options
         self.engine = options.engine or DEFAULT_ENGINE
-        if self.engine not in ENGINES:
-            raise input_error(
-                f"unknown engine '{self.engine}'{nearest_names(self.engine, ENGINES)}",
-                where="--engine",
-            )
+        check_known(self.engine, ENGINES, f"unknown engine '{self.engine}'", where="--engine")
         self._check_variants(machines)
         parameters = [machine.parameters for machine in machines]
         loads = list(options.load) or (_common_loads(parameters) if len(machines) > 1 else [])

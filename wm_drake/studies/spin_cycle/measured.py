@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from wm_drake.errors import input_error, nearest_names
+from wm_drake.errors import check_known, input_error
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.csv_files import read_csv
 from wm_drake.parameters.lab_files import SUFFIXES, is_lab_file
@@ -50,11 +50,7 @@ def read_rms(path: Path, labels: Mapping[str, Sequence[str]]) -> xr.DataArray:
     names = table[RMS_COLUMNS[:4]].astype(object).fillna("").astype(str)
     for column, dim in zip(RMS_COLUMNS, DIMS, strict=False):
         for name in names[column]:
-            if name not in labels[dim]:
-                raise input_error(
-                    f"no {column} '{name}' in this study{nearest_names(name, labels[dim])}",
-                    where=str(path),
-                )
+            check_known(name, labels[dim], f"no {column} '{name}' in this study", where=str(path))
     if names.duplicated().any():
         name = " ".join(names[names.duplicated()].iloc[0])
         raise input_error(f"{name} occurs twice; each value may occur once", where=str(path))
@@ -96,8 +92,7 @@ def read_accelerations(
     """
     known = {"time", *_words(labels)}
     for word in channels or {}:
-        if word not in known:
-            raise input_error(f"no word '{word}'{nearest_names(word, known)}", where="--channels")
+        check_known(word, known, f"no word '{word}'", where="--channels")
     paths = {name: _file_of(folder, name) for name in labels["case"]}
     if not any(paths.values()):
         raise input_error(

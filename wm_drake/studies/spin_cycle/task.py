@@ -11,7 +11,7 @@ import xarray as xr
 
 from wm_drake.batch import simulate_many
 from wm_drake.batch.many import as_table
-from wm_drake.errors import InputError, input_error, nearest_names
+from wm_drake.errors import InputError, check_known, input_error
 from wm_drake.model.machine import Machine
 from wm_drake.model.scene import Scene
 from wm_drake.parameters import MachineParameters, SpinProfile
@@ -41,10 +41,9 @@ class SpinCycleTask(Task):
 
     def __init__(self, options: SpinCycleOptions, machine: Machine) -> None:
         """Read profile, cases and measurements."""
-        if options.engine not in ENGINES:
-            hint = nearest_names(options.engine, ENGINES)
-            raise input_error(f"unknown engine '{options.engine}'{hint}", where="--engine")
-        self.machine, self.engine = machine, options.engine
+        engine = options.engine
+        check_known(engine, ENGINES, f"unknown engine '{engine}'", where="--engine")
+        self.machine, self.engine = machine, engine
         self.profile = runnable_profile(options.profile, machine.parameters)
         self.cases = cases_of_table(options.cases, options.case)
         self.measured = measured_displacements(
@@ -75,8 +74,7 @@ def cases_of_table(path: Path | None, names: Sequence[str] | None) -> list[Unbal
     table = load_unbalance_cases(existing_file(path, "--cases") if path else TABLE_9)
     known = {case.name: case for case in table}
     for name in names or []:
-        if name not in known:
-            raise input_error(f"unknown case '{name}'{nearest_names(name, known)}", where="--case")
+        check_known(name, known, f"unknown case '{name}'", where="--case")
     return [known[name] for name in dict.fromkeys(names)] if names else table
 
 

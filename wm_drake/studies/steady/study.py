@@ -12,8 +12,8 @@ from threadpoolctl import threadpool_limits
 
 from wm_drake.batch import simulate_many
 from wm_drake.batch.runs import RunResult
-from wm_drake.errors import InputError, Problem
-from wm_drake.model.machine import Machine, Setup
+from wm_drake.errors import problems_at
+from wm_drake.model.machine import Machine
 from wm_drake.parameters import Load, MachineParameters, SpinProfile
 from wm_drake.parameters.spin import Region
 from wm_drake.parameters.types import FloatArray
@@ -126,7 +126,9 @@ def run_steady_study(
 
     def solve(index: int) -> tuple[xr.Dataset, float]:
         start, name = time.perf_counter(), pairs[index][0]
-        response = _response(setups[index], name, settings, done.of(index))
+        numbers = settings.speeds, settings.harmonics, settings.samples
+        with problems_at(f"load '{name}'"):
+            response = response_of(setups[index], *numbers, done.of(index))
         return response, time.perf_counter() - start
 
     # the matrices are small: several threads each would be slower
@@ -143,18 +145,6 @@ def run_steady_study(
         for (name, _, gasket), (response, wall), run in zip(pairs, responses, runs, strict=True)
     ]
     return SteadyStudy(machine.parameters, cases, sweeps, time.perf_counter() - begin)
-
-
-def _response(
-    setup: Setup, load: str, settings: Settings, progress: Callable[[float], None]
-) -> xr.Dataset:
-    """Return the steady response of a setup; an error names its load."""
-    try:
-        return response_of(setup, settings.speeds, settings.harmonics, settings.samples, progress)
-    except InputError as error:
-        raise InputError(
-            Problem(f"load '{load}'", p.key, p.message) for p in error.problems
-        ) from None
 
 
 class _Progress:
