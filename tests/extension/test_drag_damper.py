@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from drag_damper import DRAG_DAMPER
+from drake_spectrum import drake_spectrum
 from energy_book import EnergyBook, dense_record
 from maxwell_strut import MAXWELL_STRUT
 from moving_cabinet import with_moving_cabinet
@@ -28,7 +29,7 @@ from wm_drake.parameters.keys import quantities
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.runs import simulate
 from wm_drake.studies.description.schema import Description
-from wm_drake.studies.modes.linearisation import Linearisation, drake_spectrum
+from wm_drake.studies.modes.linearisation import Linearisation
 from wm_drake.systems.element_system import ElementSystem
 
 FRAMES = {"tub_frame": "damper_left_tub", "housing_frame": "damper_left_housing"}

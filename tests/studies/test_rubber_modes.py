@@ -2,13 +2,14 @@
 
 import numpy as np
 import pytest
+from drake_spectrum import drake_spectrum
 from machine_with_bearing import with_bearing
 from machines_of_each_kind import RUBBER, changed
 
 from wm_drake.elements.state_map import CARRIER, STRETCHES
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import load_machine
-from wm_drake.studies.modes.linearisation import Linearisation, drake_spectrum
+from wm_drake.studies.modes.linearisation import Linearisation
 from wm_drake.studies.steady.balance import ANGLE_ARM, HarmonicBalance
 from wm_drake.studies.steady.response import branch_of, settled_trajectory, trajectory_of_period
 from wm_drake.studies.steady.series import Series

@@ -13,7 +13,6 @@ DIMENSIONS = {"[mass]": "kg", "[length]": "m", "[time]": "s", "[angle]": "rad", 
 """Base units of the standard, by pint's dimension."""
 IDENTIFIER = "wm_drake_machine"
 """Name of the library files of an FMU."""
-TOOL = "wm-drake"
 
 
 @dataclass(frozen=True)

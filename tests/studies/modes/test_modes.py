@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from drake_spectrum import drake_spectrum
 from simple_machines import DAMPING, MASS, STIFFNESS, isotropic_machine
 
 import wm_drake as wm
@@ -10,12 +11,7 @@ from wm_drake.parameters import with_values
 from wm_drake.parameters.machine import BodyOverride, InertiaMatrix
 from wm_drake.studies.modes.amplitude import amplitude_modes
 from wm_drake.studies.modes.campbell import campbell, critical_speeds, mac
-from wm_drake.studies.modes.linearisation import (
-    Linearisation,
-    Spectrum,
-    drake_spectrum,
-    spectrum_of,
-)
+from wm_drake.studies.modes.linearisation import Linearisation, Spectrum, spectrum_of
 from wm_drake.studies.modes.sensitivity import sensitivities
 from wm_drake.studies.modes.shapes import ANGLE_ARM, modes_of
 from wm_drake.studies.modes.study import SLIDING, STUCK, three_linearisations

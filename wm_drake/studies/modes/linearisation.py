@@ -1,8 +1,7 @@
 """Linearisation of a machine about its equilibrium, and its modes.
 
 A small motion d of the free numbers of the state obeys d' = A d. A is the slope of the compiled
-right-hand side by central differences (`SlopedDerivative.jacobian`). `drake_matrix` returns the
-same matrix from Drake's `Linearize`, for tests.
+right-hand side by central differences (`SlopedDerivative.jacobian`).
 
 With a load the right-hand side changes with the drum angle. A and the equilibrium are then means
 over a revolution: what remains is the part of the motion that does not follow the rotation.
@@ -12,14 +11,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.systems.framework import InputPortSelection, OutputPortSelection
-from pydrake.systems.primitives import Linearize
 
 from wm_drake.elements.rubber import FRICTION, MAXWELL
 from wm_drake.engines.compiled.mechanics import DRUM_ANGLE, DRUM_RATE
 from wm_drake.engines.compiled.slopes import SlopedDerivative
 from wm_drake.errors import input_error
-from wm_drake.model.machine import Machine, Setup
+from wm_drake.model.machine import Setup
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
 
@@ -111,7 +108,6 @@ class Linearisation:
             for word, kind in zip(words, kinds, strict=True)
             for name in kind
         ]
-        self._loaded = loaded
         self.equilibrium = self._equilibrium_at() if loaded else self.derivative.rest
 
     def matrix(self, speed: float = 0.0) -> FloatArray:
@@ -151,22 +147,6 @@ class Linearisation:
             if np.max(np.abs(change)) < 1e-12:
                 break
         return self.equilibrium
-
-
-def drake_spectrum(setup: Setup) -> Spectrum:
-    """Return the oscillating eigenvalues of Drake's `Linearize`, with a drum that stands still.
-
-    The eigenvectors are in Drake's order of the state. The Context of the setup is changed.
-    """
-    machine = setup.machine
-    assert isinstance(machine, Machine)
-    # the drum stands still, whatever speed the spin profile begins with
-    machine.set_drum_acceleration(setup.context, 0.0)
-    machine.plant.SetVelocities(setup.plant_context, np.zeros(machine.plant.num_velocities()))
-    system = Linearize(
-        machine.diagram, setup.context, InputPortSelection.kNoInput, OutputPortSelection.kNoOutput
-    )
-    return spectrum_of(system.A())
 
 
 def check_fixed_cabinet(parameters: MachineParameters) -> None:
