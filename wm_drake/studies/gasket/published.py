@@ -33,24 +33,9 @@ class Published:
         return bool(self.terms)
 
     @property
-    def has_means(self) -> bool:
-        """Whether any grand mean was published."""
-        return any(CONSTANT in terms for terms in self.terms.values())
-
-    @property
     def has_terms(self) -> bool:
         """Whether anything else than grand means was published."""
         return any(set(terms) - set(OF_RESPONSE) for terms in self.terms.values())
-
-    @property
-    def has_sums(self) -> bool:
-        """Whether percentages of all main effects or all interactions were published."""
-        return any({MAIN, INTERACTIONS} & set(terms) for terms in self.terms.values())
-
-    @property
-    def has_ranges(self) -> bool:
-        """Whether any range was published."""
-        return any(RANGE in terms for terms in self.terms.values())
 
     def mean(self, label: Label) -> float | None:
         """Return the published grand mean of a response. [unit of the response]"""

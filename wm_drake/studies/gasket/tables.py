@@ -398,16 +398,18 @@ def variance(
     The published mean is beside ours if there is one.
     """
     frame, labels = variance_frame(screening), list(screening.tables)
-    if published.has_means:
-        frame["published_mean"] = [published.mean(label) for label in labels]
+    means = [published.mean(label) for label in labels]
+    has_means = any(mean is not None for mean in means)
+    if has_means:
+        frame["published_mean"] = means
         frame["mean_difference"] = [published.mean_difference(screening, x) for x in labels]
-    if published.has_ranges:
-        ranges = (" to ".join(map(digits, published.range(label))) for label in labels)
+    ranges = [" to ".join(map(digits, published.range(label))) for label in labels]
+    if any(ranges):
         frame["published_range"] = [text or None for text in ranges]
-    if published.has_sums:
-        names = ["published_main_percent", "published_interaction_percent"]
-        sums = [published.sums(label) for label in labels]
-        frame[names] = pd.DataFrame(sums, dtype=float, columns=names)
+    names = ["published_main_percent", "published_interaction_percent"]
+    sums = pd.DataFrame(map(published.sums, labels), dtype=float, columns=names)
+    if sums.notna().any(axis=None):
+        frame[names] = sums
     if has_terms:
         frame["leading"] = [
             _leading_text(table, published, label) for label, table in screening.tables.items()
@@ -418,7 +420,7 @@ def variance(
         "two-factor interactions, and by neither of them (residual). Predicted R²: explained part "
         "of the variance of trials that are left out of the fit."
     )
-    if published.has_means:
+    if has_means:
         caption += (
             f" Published mean: from {published.source}. Difference: 100 % × (ours − published) / "
             f"published; rows in which it is above {FAR:g} % are marked."
