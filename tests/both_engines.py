@@ -59,13 +59,15 @@ class BothEngines:
         sponges = places(self.context, machine.dampers.values())
         tube_sponges = places(self.context, machine.telescopes.values())
         stretches = places(self.context, machine.bushings.values())
+        own = places(self.context, machine.others.values())
         count = self.context.num_continuous_states()
-        known = np.concatenate([*self._trees, feet, sponges, tube_sponges, stretches])
+        known = np.concatenate([*self._trees, feet, sponges, tube_sponges, stretches, own])
         self._motor = np.setdiff1d(np.arange(count), known)
         rest = {
             state_map.STRUT_SPONGE: iter(sponges),
             state_map.TUBES: iter(tube_sponges),
             state_map.STRETCHES: iter(stretches),
+            state_map.ELEMENT: iter(own),
         }
         has_sponge = iter([damper.has_sponge for damper in setup.dampers.values()])
         trees, index, sizes = iter(self._trees), [], np.full(count, SPONGE)
@@ -83,7 +85,7 @@ class BothEngines:
             elif part.kind == state_map.DRIVE:
                 indices = [*self._motor, -1]
                 sizes[self._motor] = INTEGRAL
-            elif part.kind == state_map.STRETCHES:
+            elif part.kind in (state_map.STRETCHES, state_map.ELEMENT):
                 indices = [next(others) for _ in part.roles]
             else:
                 tree = next(trees)

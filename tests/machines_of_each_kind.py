@@ -3,6 +3,8 @@
 import functools
 
 import pytest
+from machine_with_bearing import with_bearing
+from moving_cabinet import with_moving_cabinet
 from pydantic import TypeAdapter
 
 from wm_drake.parameters import DamperType, MachineParameters, load_machine
@@ -78,12 +80,36 @@ def damper_of(law, **changes):
     return TypeAdapter(DamperType).validate_python({"law": law} | DAMPERS[law] | changes)
 
 
-def names_of_each_kind():
-    """Return the names of all variants; those with code of their own to compile are slow."""
-    return [
-        pytest.param(name, marks=pytest.mark.slow) if "rubber" in name else name
-        for name in machines_of_each_kind()
-    ]
+def names_of(machines):
+    """Return the names of machines for tests; those of rubber have much to compile and are slow."""
+    slow = pytest.mark.slow
+    return [pytest.param(name, marks=slow) if "rubber" in name else name for name in machines]
+
+
+@functools.cache
+def machines_beside_rubber():
+    """Return machines with tubes, a motor, a cabinet that moves or a compliant bearing, by name.
+
+    Those with tubes, a motor and a cabinet are there with rubber too.
+    """
+    machines = {"tubes": load_machine("free_stroke"), "motor": load_machine("motor")}
+    machines["cabinet"] = with_moving_cabinet(reference())
+    for name, parameters in list(machines.items()):
+        gasket = parameters.gasket.model_dump() | FRICTION | RUBBER
+        machines[f"rubber and {name}"] = MachineParameters.model_validate(
+            parameters.model_dump(exclude_unset=True) | {"gasket": gasket}
+        )
+    machines["motor on a cabinet"] = with_moving_cabinet(machines["motor"])
+    crooked = {
+        "drum": {"mass": 11.0, "centre_of_mass": (0.03, 0.05, -0.02)},
+        "motor": {"mass": 3.0},
+    }
+    bearings = {
+        "reference": reference(),
+        "tubes": machines["tubes"],
+        "crooked": changed(bodies=crooked),
+    }
+    return machines | {f"bearing, {name}": with_bearing(it) for name, it in bearings.items()}
 
 
 @functools.cache

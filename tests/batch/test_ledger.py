@@ -164,17 +164,6 @@ def read_all(path, count):
         return [ledger.get(key_of(index=index)) for index in range(count)]
 
 
-@pytest.mark.parametrize("place", [0.3, 0.6, 0.9])
-def test_overwritten_pages_are_found(path, place):
-    filled(path, 2000)
-    content = bytearray(path.read_bytes())
-    begin = int(place * len(content))
-    content[begin : begin + 3000] = b"\xa5" * 3000
-    path.write_bytes(content)
-    with pytest.raises(WmDrakeError, match="is damaged"):
-        read_all(path, 2000)
-
-
 def test_truncated_file_is_refused(path):
     filled(path, 2000)
     path.write_bytes(path.read_bytes()[:20_000])

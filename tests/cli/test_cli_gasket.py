@@ -1,7 +1,6 @@
 """Tests of `wm-drake study gasket`: output, bad input, kills, full disks, parallel processes."""
 
 import json
-import random
 import re
 import shutil
 import signal
@@ -67,16 +66,6 @@ def test_study_writes_tables_and_prints_them(study):
     assert "Line to copy: wm-drake spin --set" in ended.out
     levels = sorted(pd.read_csv("out/design.csv")["K_Lx [N/mm]"].unique())
     assert levels == pytest.approx(stiffness * np.array([0.5, 1.0, 1.5]))
-
-
-def test_responses_can_be_chosen(study_without_page):
-    ended = study_without_page(
-        "--response", "gap", "--response", "amplitude_Xr", "--response", "D", "--load", "middle"
-    )
-    assert (ended.code, ended.err.strip()) == (0, "")
-    names = list(pd.read_csv("out/variance.csv")["response"])
-    assert names == ["gap", "amplitude_Xr", "Dx", "Dy", "Dz"]
-    assert {"gap [mm]", "amplitude_Xr [mm]"} < set(pd.read_csv("out/runs.csv"))
 
 
 def test_json_says_how_well_the_model_predicts(study_without_page):
@@ -168,30 +157,6 @@ def start(folder, *arguments, **options):
 
 
 @pytest.mark.slow
-def test_kills_leave_identical_tables(tmp_path):
-    begin = time.perf_counter()
-    assert start(tmp_path, "--out", "whole").wait() == 0
-    wall_s = time.perf_counter() - begin
-    rng, kills = random.Random(6), 0
-    while kills < 2:
-        process = start(tmp_path, "--out", "out", "--resume")
-        try:
-            # from the moment the ledger is there, somewhere in the rest of the study; earlier kills would hit imports only
-            while not list((tmp_path / "out").glob("ledger.sqlite")) and process.poll() is None:
-                time.sleep(0.01)
-            process.wait(rng.uniform(0.0, 0.3 * wall_s))
-        except subprocess.TimeoutExpired:
-            pass
-        process.send_signal(signal.SIGKILL)
-        kills += 1
-        process.communicate()
-    process = start(tmp_path, "--out", "out", "--resume")
-    assert process.communicate()[1].strip() == ""
-    assert process.returncode == 0
-    assert tables(tmp_path / "out") == tables(tmp_path / "whole")
-
-
-@pytest.mark.slow
 def test_second_study_on_the_folder_is_refused_while_the_first_runs(tmp_path):
     first = start(tmp_path, "--out", "out")
     ledger = tmp_path / "out" / "ledger.sqlite"
@@ -206,24 +171,6 @@ def test_second_study_on_the_folder_is_refused_while_the_first_runs(tmp_path):
     first.communicate()
     assert first.returncode == 0
     assert set(TABLES) < {path.name for path in (tmp_path / "out").iterdir()}
-
-
-def limit_files():
-    import resource
-
-    resource.setrlimit(resource.RLIMIT_FSIZE, (30_000, resource.RLIM_INFINITY))
-
-
-@pytest.mark.slow
-def test_full_disk_is_said_and_nothing_finished_is_lost(tmp_path):
-    process = start(tmp_path, "--out", "out", preexec_fn=limit_files)
-    message = process.communicate()[1].strip()
-    assert process.returncode == 2
-    assert len(message.splitlines()) == 1
-    assert "out/ledger.sqlite: cannot be written to" in message
-    process = start(tmp_path, "--out", "out", "--resume")
-    assert process.communicate()[1].strip() == ""
-    assert process.returncode == 0
 
 
 def test_published_results_that_a_user_names_are_beside_ours(study_without_page):

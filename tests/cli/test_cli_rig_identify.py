@@ -128,19 +128,6 @@ def test_a_damper_goes_from_the_bench_into_a_machine(wm_drake, loops_of):
     assert mine.gasket == reference.gasket
 
 
-def test_a_damper_may_change_its_law(wm_drake, loops_of):
-    Path("coulomb.yaml").write_text(COULOMB + "damping: 0.05 N s/mm\n")
-    files = loops_of("damper", "--component", "coulomb.yaml", "-f", "1,7 Hz", "-a", "5 mm")
-    ended = wm_drake("identify", "damper", *files, "--law", "coulomb", "--out", "fit")
-    assert ended.code == 0
-    assert "friction_force" in ended.out
-    damper = load_machine("fit/identified.yaml").damper_types["friction"]
-    # two samples of each file lie on a reversal, where dry friction jumps: to which side is anybody's guess
-    assert damper.law == "coulomb"
-    assert damper.friction_force == pytest.approx(60.0, rel=0.03)
-    assert damper.damping == pytest.approx(50.0, rel=0.2)
-
-
 def test_a_radial_axis_serves_x_and_z_and_a_component_file_serves_the_bench(wm_drake, loops_of):
     files = loops_of(
         "gasket", "--machine", "free_stroke", "--axis", "radial", "-f", "1,5 Hz", "-a", "1,10 mm"

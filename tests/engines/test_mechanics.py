@@ -4,18 +4,18 @@ import re
 
 import pytest
 from both_engines import difference, redrawn
-from machines_of_each_kind import changed, machines_of_each_kind, names_of_each_kind
+from machines_of_each_kind import changed, machines_beside_rubber, machines_of_each_kind, names_of
 
 from wm_drake.engines.compiled.run import run_compiled
 from wm_drake.errors import InputError
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import SpinProfile
 
-MACHINES = machines_of_each_kind()
+MACHINES = machines_of_each_kind() | machines_beside_rubber()
 SDF = "oscillating_group.sdf"
 
 
-@pytest.mark.parametrize("name", names_of_each_kind())
+@pytest.mark.parametrize("name", names_of(MACHINES))
 def test_derivatives_are_those_of_the_diagram_at_random_states(name):
     assert difference(build_machine(MACHINES[name])) < 1e-10
 

@@ -61,10 +61,6 @@ def test_an_input_is_extrapolated_along_its_parabola():
         assert end == pytest.approx(2.0 - 3.0 + 0.5)
 
 
-def stable(matrix):
-    return np.abs(np.linalg.eigvals(matrix)).max() < 1.0 + 1e-9
-
-
 def test_numbers_that_are_not_finite_are_not_followed():
     for entry in (np.nan, -1e12, -1e300):
         jacobians = np.full((WIDTH, 1, 1), entry)

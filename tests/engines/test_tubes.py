@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from both_engines import LOAD, difference, redrawn
-from telescopic_machine import RUN_UP, changed, telescopic, with_bushing
+from telescopic_machine import changed, telescopic, with_bushing
 
 from wm_drake.engines.compiled.run import run_compiled
 from wm_drake.errors import InputError
@@ -16,10 +16,6 @@ from wm_drake.simulation.runs import simulate
 @pytest.fixture(scope="module")
 def built(shipped):
     return shipped("free_stroke")
-
-
-def test_derivatives_are_those_of_the_diagram_at_random_states(built):
-    assert difference(built) < 1e-10
 
 
 def test_they_agree_for_crooked_tubes_and_without_friction(built):
@@ -86,21 +82,6 @@ def test_a_run_moves_as_in_drake(built):
         compiled.bushing_force,
         drake.bushing_force,
         atol=1e-3 * float(np.abs(drake.bushing_force).max()),
-    )
-
-
-def test_tubes_stay_between_their_bushings(built):
-    record = simulate(built, Case("two", LOAD, RUN_UP))
-    load = np.abs(record.bushing_force.sel(bushing=["left_tub", "left_housing"]))
-    assert 20.0 < float(load.sel(axis="y").max()) < 200.0  # along the damper, N: it works
-    stretch = record.tube_extension.sel(tube="left")
-    assert float(stretch.max() - stretch.min()) > 1e-3
-    # what the two bushings and the tub leave between them is the extension
-    tension = record.damper_tension.sel(damper="left")
-    np.testing.assert_allclose(
-        record.bushing_force.sel(bushing="left_housing", axis="y"),
-        tension,
-        atol=0.12 * float(np.abs(tension).max()),
     )
 
 

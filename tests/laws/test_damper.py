@@ -125,14 +125,6 @@ def test_slider_keeps_half_the_velocity_where_the_friction_jumps():
     )
 
 
-def test_the_damper_slips_at_constant_rate_with_full_friction_and_air_resistance():
-    rate, f_max = 0.02, 60.0  # m/s, N
-    deformation = (f_max + C2 * rate) / K1  # m
-    tension, deformation_rate = mstv_damper(rate, deformation, f_max, 0.0, EPSILON, K1, C1, C2)
-    assert tension == pytest.approx(f_max + C2 * rate)
-    assert deformation_rate == pytest.approx(0.0, abs=1e-15)
-
-
 def test_a_damper_at_constant_rate_comes_to_slip_and_no_further():
     deformation, rate, step = 0.0, 0.02, 1e-5  # m, m/s, s
     for _ in range(10_000):
@@ -151,18 +143,6 @@ def test_in_its_free_stroke_a_damper_has_basic_friction_only_and_the_sponge_stay
     basic = P_B * np.sin(0.5 * np.pi * np.clip(rate / V_B, -1.0, 1.0))
     assert tension == pytest.approx(basic, rel=1e-12, abs=1e-14)
     assert deformation_rate == rate
-
-
-def test_beyond_its_free_stroke_the_sponge_slips_as_its_force_exceeds_friction():
-    force = stiffness_force(0.014, SPONGE, 0)  # N
-    slip = (force - F_MAX) / C_M  # m/s; [A] Eq. (4) turned round
-    rate = 1.5 * slip  # less than twice: slips
-    tension, deformation_rate = free_stroke_damper(
-        rate, 0.014, F_MAX, C_M, EPSILON, P_B, V_B, (SPONGE, 0)
-    )
-    assert force > F_MAX
-    assert deformation_rate == pytest.approx(0.5 * slip)
-    assert tension == pytest.approx(force + P_B)  # rate > v_b
 
 
 PACKED = {  # law -> its numbers in the order of its class

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from applied_force import elastic_and_gravity_force
-from machine_with_bearing import with_bearing
 from scipy.linalg import eigh
 from simple_machines import with_gasket_tables
 
@@ -220,22 +219,6 @@ def test_an_sdf_error_is_one_short_line(tmp_path):
     assert "\n" not in quoted
     assert quoted.startswith("own.sdf:1: error")
     assert len(quoted) <= 200
-
-
-def test_a_compliant_bearing_needs_a_joint_between_tub_and_drum(tmp_path):
-    text = sdf_path("oscillating_group.sdf").read_text()
-    begin = text.index('<joint name="drum_axis"')
-    end = text.index("</joint>", begin)
-    joint = text[begin:end].replace("<parent>tub<", "<parent>motor<")
-    assert joint != text[begin:end]
-    (tmp_path / "own.sdf").write_text(text[:begin] + joint + text[end:])
-    (tmp_path / "own.yaml").write_text("extends: reference\nmodel: own.sdf\n")
-    parameters = with_bearing(load_machine(tmp_path / "own.yaml"))
-    with pytest.raises(
-        InputError,
-        match="needs a revolute joint from 'tub' to 'drum'; joint 'drum_axis' is revolute, from 'motor'",
-    ):
-        build_machine(parameters)
 
 
 @pytest.mark.parametrize(

@@ -1,15 +1,10 @@
 """Force elements: which numbers are allowed, and the packed form of tables."""
 
-import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 from ruamel.yaml import YAML
-from scipy.interpolate import PchipInterpolator
 
 from wm_drake.elements.layouts import packed_stiffness, packed_stiffnesses
-from wm_drake.laws.table import PIECE_SIZE, packed_size, stiffness_force
 from wm_drake.parameters import (
     Bushing,
     DamperType,
@@ -65,33 +60,6 @@ def test_table_from_a_file():
         SpringType, "stiffness: {displacement: '(-1, 0, 2) mm', force: '(-8, 0, 16) N'}"
     ).stiffness
     assert table == ForceTable(displacement=(-0.001, 0.0, 0.002), force=(-8.0, 0.0, 16.0))
-
-
-@pytest.mark.parametrize(
-    "table", [ForceTable(displacement=X, force=Y), TorqueTable(angle=X, torque=Y)]
-)
-def test_packed_table_is_scipys_monotone_cubic(table):
-    packed = packed_stiffness(table)
-    curve = PchipInterpolator(X, Y)
-    assert packed[0] == len(X)
-    pieces = packed[1:-2].reshape(len(X) - 1, PIECE_SIZE)
-    np.testing.assert_allclose(pieces, np.column_stack([X[:-1], curve.c[::-1].T]))
-    np.testing.assert_allclose(packed[-2:], [X[-1], curve.derivative()(X[-1])])
-    assert packed_size(packed, 0) == len(packed)
-    inside = np.linspace(X[0], X[-1], 201)
-    assert [stiffness_force(x, packed, 0) for x in inside] == pytest.approx(curve(inside), abs=1e-9)
-
-
-@given(st.lists(st.tuples(st.floats(0.001, 1.0), st.floats(0.0, 100.0)), min_size=2, max_size=6))
-def test_table_never_falls(steps):
-    x, y = np.cumsum(steps, axis=0).T
-    packed = packed_stiffness(ForceTable(displacement=tuple(x), force=tuple(y)))
-    forces = [stiffness_force(at, packed, 0) for at in np.linspace(x[0] - 1.0, x[-1] + 1.0, 101)]
-    assert np.diff(forces).min() >= -1e-9
-
-
-def test_packed_number():
-    assert packed_stiffness(5000.0).tolist() == [0.0, 5000.0]
 
 
 @pytest.mark.parametrize("law", DAMPERS)

@@ -91,16 +91,6 @@ def test_written_machine_without_gasket_is_read_back_the_same(write, reference):
     assert load_machine(write(machine_yaml(changed))).gasket is None
 
 
-@pytest.mark.parametrize("name", ["1.5kg", "a/b"])
-def test_name_that_breaks_key_paths_or_file_names_is_refused(write, name):
-    path = write(
-        f"extends: reference\nloads:\n  {name}: {{unbalances: [{{mass: 1 kg, radius: 1 mm, y: 0 mm}}]}}\n"
-    )
-    (problem,) = refused(path)
-    assert problem.startswith(f"{path}:")
-    assert f"'{name}'" in problem
-
-
 def test_extending_file_changes_only_its_entries(write, reference):
     path = write(
         "extends: reference\nname: heavy\nbodies:\n  upper_counterweight:\n    mass: {value: 12 kg, source: guess}\n"

@@ -178,14 +178,6 @@ def largest_difference(mass):
     return np.max(np.abs(mstv_force(mass) - mstv_force(0.0)))
 
 
-def test_the_mstv_loop_is_a_friction_loop():
-    loop = mstv_force(0.0)
-    assert np.max(loop) == pytest.approx(-np.min(loop), rel=1e-3)
-    assert (
-        60.0 < np.max(loop) < 60.0 + 400.0 * 2.0 * np.pi * 3.0 * 1e-3
-    )  # full friction, less than all the air resistance
-
-
 @pytest.mark.parametrize("mass", [0.04, 0.02])  # kg
 def test_a_sponge_with_mass_differs_in_proportion_to_it(mass):
     assert 1.8 < largest_difference(mass) / largest_difference(0.5 * mass) < 2.2
@@ -217,7 +209,7 @@ def test_all_tests_of_c_run_with_a_sponge_of_ten_grams():
         assert mean < inertia + 2e-4 * largest
 
 
-@pytest.mark.parametrize("mass", [0.01, 0.5])  # kg
+@pytest.mark.parametrize("mass", [0.0, 0.01, 0.5])  # kg
 @pytest.mark.parametrize("frequency", [1.0, 10.0, 50.0])  # Hz
 def test_heavy_sponge_without_friction_has_its_complex_stiffness(mass, frequency):
     """Solve m X'' + c2 X' = k1 (Y - X) + c1 (Y' - X') in closed form: a complex stiffness."""
@@ -229,18 +221,6 @@ def test_heavy_sponge_without_friction_has_its_complex_stiffness(mass, frequency
     measures = measures_of(force_loop(bench, motion))
     assert measures.dynamic_stiffness == pytest.approx(abs(expected), rel=1e-5)
     assert measures.loss_angle == pytest.approx(np.angle(expected), abs=1e-5)
-
-
-def test_sponge_without_friction_is_a_linear_solid():
-    """Solve c2 w = k1 delta + c1 delta' in closed form: a complex stiffness."""
-    bench = damper_bench(MSTV.model_copy(update={"friction_force": 0.0}))
-    motion = Harmonic(10.0, 1e-3)
-    s = 1j * motion.angular_frequency
-    sponge, slider = 176e3 + 90.0 * s, 400.0 * s
-    expected = sponge * slider / (sponge + slider)
-    measures = measures_of(force_loop(bench, motion))
-    assert measures.dynamic_stiffness == pytest.approx(abs(expected), rel=1e-6)
-    assert measures.loss_angle == pytest.approx(np.angle(expected), rel=1e-6)
 
 
 def test_coulomb_friction_behind_a_spring_is_masings_loop():

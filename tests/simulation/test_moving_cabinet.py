@@ -187,18 +187,6 @@ def test_energy_of_bodies_is_the_work_of_all_forces(moving):
     np.testing.assert_allclose(work, change, atol=2e-4 * np.ptp(change))
 
 
-def test_a_batch_measures_what_a_record_does(moving):
-    parameters = with_value(moving.parameters, "cabinet.friction", 0.12)
-    case = Case("two", TWO, SHORT, parameters=parameters)
-    measures = ["feet", "extremes", "amplitudes", "cabinet"]
-    table = simulate_many(moving, [case], measures=measures, histories=False)
-    found = measure(simulate(moving, case))
-    for name in ("smallest_foot_load", "slide_margin", "turn_margin", "foot_normal_largest"):
-        np.testing.assert_allclose(table[name][0], found.feet[name], rtol=1e-12)
-    np.testing.assert_array_equal(table.amplitude[0], found.amplitude)
-    np.testing.assert_allclose(table.cabinet_force_peak[0], found.cabinet_force_peak, rtol=1e-12)
-
-
 def test_walk_is_the_nearest_rigid_motion():
     cabinet = load_machine("reference").cabinet
     feet = np.array([(cabinet.feet[n].x, cabinet.feet[n].y) for n in cabinet.corners])

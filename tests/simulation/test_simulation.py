@@ -44,11 +44,6 @@ def test_run_up_is_sampled_every_5_ms_from_rest(run_up):
     assert all(run_up[name].attrs["units"] for name in run_up.data_vars)
 
 
-def test_drum_follows_the_profile_within_1e_5_rpm(run_up):
-    speed = FAST_RUN_UP.speed_at(run_up.time.values)
-    assert np.max(np.abs(run_up.drum_speed.values - speed)) / RPM < 1e-5
-
-
 def test_drum_follows_a_profile_with_corners_off_the_grid(machine, reference, engine):
     profile = SpinProfile(time=(0.0, 0.3333, 1.00017, 1.5), speed=(0.0, 12.0, -5.0, -5.0))
     record = simulate(machine, Case("middle", reference.loads["middle"], profile), engine)
@@ -109,12 +104,6 @@ def test_energy_balances_over_a_fast_run_up(of_each_damper):
     profile = SpinProfile(time=(0.0, 3.0, 4.0), speed=(12.0, 24.0, 24.0))
     case = Case("middle", of_each_damper.parameters.loads["middle"], profile)
     assert check_energy(of_each_damper, case, 3.125e-4) < 1e-5
-
-
-@pytest.mark.hours
-def test_energy_balances_over_the_run_up_of_70_s(of_each_damper):
-    case = case_of(of_each_damper.parameters, "middle")
-    assert check_energy(of_each_damper, case, 2.5e-4) < 1e-5
 
 
 def peaks(record):
@@ -301,16 +290,6 @@ def test_unknown_engine_or_unfit_step_is_refused(machine, arguments):
 def test_unknown_load_names_the_nearest(machine):
     with pytest.raises(InputError, match="did you mean 'middle'"):
         simulate(machine, "midle")
-
-
-def test_parameters_of_a_case_replace_the_machines(machine, reference, engine):
-    profile = SpinProfile(time=(0.0, 2.0), speed=(8.0, 20.0))
-    softer = with_value(reference, "spring_types.suspension.stiffness", 5000.0)
-    base = simulate(machine, Case("a", reference.loads["middle"], profile), engine)
-    changed = simulate(
-        machine, Case("a", reference.loads["middle"], profile, parameters=softer), engine
-    )
-    assert not np.allclose(base.displacement, changed.displacement, atol=1e-6)
 
 
 def test_a_case_of_changed_parameters_runs_with_them(machine, reference):

@@ -45,15 +45,6 @@ def test_second_run_needs_overwrite_and_leaves_nothing_stale():
 
 
 @pytest.mark.parametrize("overwrite", [False, True])
-def test_results_of_another_command_are_never_touched(overwrite):
-    written(Run("study gasket", identity={"design": "a"}), "report.html")
-    before = content()
-    with pytest.raises(InputError, match=r"holds results of 'wm-drake study gasket'"):
-        written(Run("spin", overwrite), "report.html")
-    assert content() == before
-
-
-@pytest.mark.parametrize("overwrite", [False, True])
 @pytest.mark.parametrize("name", ["report.html", "thesis.tex", "ledger.sqlite"])
 def test_files_that_no_run_wrote_are_never_touched(name, overwrite):
     OUT.mkdir()

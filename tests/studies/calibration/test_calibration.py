@@ -10,14 +10,14 @@ import pytest
 from wm_drake.batch.ledger import open_ledger
 from wm_drake.errors import InputError
 from wm_drake.model.build import build_machine
-from wm_drake.parameters import SpinProfile, load_machine
+from wm_drake.parameters import load_machine
 from wm_drake.parameters.files import yaml_text
 from wm_drake.parameters.free import Measured, load_free
 from wm_drake.studies.calibration.calibration import Plan, calibrate, identity_of
 from wm_drake.studies.calibration.computed import Evaluation, Runner
-from wm_drake.studies.calibration.fewer import check_counts, fit_with_fewer
+from wm_drake.studies.calibration.fewer import fit_with_fewer
 from wm_drake.studies.calibration.parameter_map import parameter_map_of
-from wm_drake.studies.calibration.prediction import check_held_out, predict
+from wm_drake.studies.calibration.prediction import predict
 from wm_drake.studies.calibration.solutions import Solution, distinct, solved_machine
 from wm_drake.studies.calibration.tables import (
     amplitude_rows,
@@ -63,7 +63,6 @@ spring_preload:
   prior: (100, 20) N
   source: test
 """
-RUN_UP = SpinProfile(time=(0.0, 20.0), speed=(4.0, 28.0))
 
 
 @pytest.fixture(scope="module")
@@ -323,15 +322,6 @@ def test_excess_is_the_logarithm_beyond_the_limit_on_both_sides():
     assert tiny.tolist() == [0.0, 0.0, 0.0]  # more than 100 % is no limit below
 
 
-@pytest.mark.parametrize(
-    ("limits", "message"),
-    [({"Q": 0.2}, "'Q' is no load, sensor"), ({"X": 0.0}, "limit of 'X': 0 is not allowed")],
-)
-def test_wrong_limits_are_refused(limits, message):
-    with pytest.raises(InputError, match=message):
-        limited_pair().limited(limits)
-
-
 def test_values_beyond_their_limits_are_named():
     found = solution([0.0], [1.0], np.zeros((1, 1)), targets=limited_pair())
     found = replace(found, amplitude=np.array([[1.05, 0.7], [1.4, 9.0]]))
@@ -437,18 +427,6 @@ def test_fewer_quantities_cost_more_and_the_least_determined_goes_first(recovere
     assert table.set_to_expected[0] == ""
 
 
-def test_finished_calibration_is_read_back_without_a_run(recovered, short, monkeypatch):
-    _, free, targets, plan, calibration, _, folder = recovered
-
-    def no_run(*_, **__):
-        raise AssertionError("ran again")
-
-    monkeypatch.setattr("wm_drake.studies.calibration.computed.simulate_many", no_run)
-    with open_ledger(folder / "ledger.sqlite", identity_of(short, free, targets, plan)) as ledger:
-        again = calibrate(Runner(short, ledger), free, targets, plan)
-    assert quantity_table(again).equals(quantity_table(calibration))
-
-
 def test_interrupted_calibration_continues_where_it_stopped(short, tmp_path, recovered):
     _, free, targets, plan, calibration, _, _ = recovered
     identity = identity_of(short, free, targets, plan)
@@ -491,14 +469,6 @@ def test_table_of_amplitudes_is_a_file_of_measured_amplitudes(recovered, short, 
     assert targets_of(short.parameters, measured_amplitudes(named)).amplitude == pytest.approx(
         recovered[2].amplitude
     )
-
-
-def test_unknown_load_or_all_loads_cannot_be_held_out():
-    targets = Targets((("a", True), ("b", True)), ("X",), np.ones((2, 1)), np.ones((2, 1)))
-    with pytest.raises(InputError, match="no measured load 'c'"):
-        check_held_out(targets, [["c"]])
-    with pytest.raises(InputError, match="leaves no load"):
-        check_held_out(targets, [["a", "b"]])
 
 
 ONE_VALUE = Targets((("a", True),), ("X",), np.array([[1.0]]), np.ones((1, 1)))
@@ -569,9 +539,3 @@ def test_slack_springs_are_residuals(short, tmp_path):
     assert residuals == pytest.approx((0.1 - elongation) / 0.002)
     enough = parameter_map_of(short, free_file(tmp_path, limits.replace("100", "-90") + FREE))
     assert not known_residuals(short, enough, points).any()
-
-
-@pytest.mark.parametrize("counts", [[3], [0], [2, 2], [1, 2], [-1]])
-def test_counts_must_fall_from_the_number_of_free_quantities(counts):
-    with pytest.raises(InputError, match="falling numbers from 2 to 1; 3 quantities are free"):
-        check_counts(counts, 3)

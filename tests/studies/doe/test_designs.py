@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wm_drake.errors import InputError
-from wm_drake.studies.doe.coding import MODELS, efficiency, level_matrix
+from wm_drake.studies.doe.coding import efficiency, level_matrix
 from wm_drake.studies.doe.design import make_design, read_design, write_design
 from wm_drake.studies.doe.exchange import d_optimal_levels
 from wm_drake.studies.doe.orthogonal import orthogonal_levels
@@ -24,40 +24,6 @@ def d_optimal():
     begin = time.perf_counter()
     design = make_design("d-optimal", NAMES)
     return design, time.perf_counter() - begin
-
-
-def treatment_efficiency(levels, model):
-    """Return the efficiency by another coding and another normalisation.
-
-    The coding is by indicators; the normalisation is by the determinant of the full factorial.
-    """
-
-    def columns(array):
-        main = [
-            np.stack([array[:, f] == 0, array[:, f] == 1], axis=1).astype(float)
-            for f in range(array.shape[1])
-        ]
-        blocks = [np.ones((len(array), 1)), *main]
-        if model == "main+2fi":
-            blocks += [
-                (a[:, :, None] * b[:, None, :]).reshape(len(array), -1)
-                for a, b in itertools.combinations(main, 2)
-            ]
-        return np.hstack(blocks)
-
-    def logarithm(x):
-        return np.log(np.linalg.svd(x / np.sqrt(len(x)), compute_uv=False)).sum() * 2.0
-
-    x, full = columns(levels), columns(level_matrix(levels.shape[1]))
-    return 100.0 * np.exp((logarithm(x) - logarithm(full)) / x.shape[1])
-
-
-@pytest.mark.parametrize("model", MODELS)
-def test_efficiency_of_another_coding_is_the_same(d_optimal, model):
-    design, _ = d_optimal
-    assert efficiency(design.levels, model) == pytest.approx(
-        treatment_efficiency(design.levels, model), abs=1e-6
-    )
 
 
 def test_thousand_trials_are_efficient_different_and_quickly_found(d_optimal):
@@ -150,20 +116,6 @@ def test_no_design_exceeds_the_bound(seed):
     rng = np.random.default_rng(seed)
     levels = rng.integers(-1, 2, size=(rng.integers(1, 120), 4)).astype(np.int8)
     assert 0.0 <= efficiency(levels, "main+2fi") <= 100.0 + 1e-9
-
-
-def test_efficiency_does_not_depend_on_names_of_factors_and_levels(d_optimal):
-    levels = d_optimal[0].levels
-    assert efficiency(levels[:, ::-1], "main+2fi") == pytest.approx(
-        efficiency(levels, "main+2fi"), rel=1e-10
-    )
-    assert efficiency(-levels, "main+2fi") == pytest.approx(
-        efficiency(levels, "main+2fi"), rel=1e-10
-    )
-    turned = ((levels.astype(int) + 2) % 3 - 1).astype(np.int8)
-    assert efficiency(turned, "main+2fi") == pytest.approx(
-        efficiency(levels, "main+2fi"), rel=1e-10
-    )
 
 
 def test_few_trials_and_large_grids():

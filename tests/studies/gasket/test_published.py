@@ -23,7 +23,7 @@ from wm_drake.studies.gasket.findings import level_zero_text, summary
 from wm_drake.studies.gasket.level_zero import run_level_zero
 from wm_drake.studies.gasket.page import GasketResult
 from wm_drake.studies.gasket.proposal import Compared
-from wm_drake.studies.gasket.published import NOT_PUBLISHED, published_for
+from wm_drake.studies.gasket.published import published_for
 from wm_drake.studies.gasket.screening import Responses, Words, run_screening
 from wm_drake.studies.gasket.study import GasketTrials
 from wm_drake.studies.gasket.tables import as_plain_data
@@ -192,8 +192,3 @@ def test_level_zero_is_not_run_without_tables(earlier, factor):
     known = {factor: load_factors(GASKET_FACTORS)[factor]}
     every = {name: levels_of(earlier, known, name) for name in TABLES}
     assert run_level_zero(earlier, every, "scaled", None, None) is None
-
-
-def test_nothing_is_nothing():
-    assert not NOT_PUBLISHED
-    assert not published_for({("a", "b"): {}}, [("a", "c")], "table.csv")

@@ -233,9 +233,3 @@ def test_physical_values_are_in_design_and_runs(reference, tmp_path):
         assert table["C_L [N s/mm]"][0] == pytest.approx(damping)
     again = read_design(tmp_path / "design.csv", ("C_L", "K_Lx"), "main")
     np.testing.assert_array_equal(again.levels, design.levels)
-
-
-def test_saturated_design_is_refused_before_any_run():
-    design = make_design("d-optimal", ("a", "b", "c"), trials=19)
-    with pytest.raises(InputError, match="19 trials for 19 coefficients"):
-        run_screening(design, lambda _: pytest.fail("no run is needed"))

@@ -14,12 +14,10 @@ from wm_drake.model.build import build_machine
 from wm_drake.parameters import SpinProfile
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.runs import simulate
-from wm_drake.studies.fitting.grid import grid_search
 from wm_drake.studies.fitting.search import Optimum
 from wm_drake.studies.gasket_damping.page import summary
 from wm_drake.studies.gasket_damping.study import (
     LOWER,
-    MESH,
     NOISE,
     UPPER,
     Damping,
@@ -87,28 +85,9 @@ def test_value_does_not_depend_on_the_other_points(distance):
     assert distance(points)[2] == pytest.approx(distance([points[2]])[0], rel=1e-9)
 
 
-PLANTED = [(0.019, 60.0), (0.0287, 87.0), (0.04, 30.0)]
-"""C_L and C_T [N s/mm, N mm s/deg]; the first pair is that of [B]."""
-
-
 def si(pair):
     """Return C_L and C_T in SI units. [N s/m, N m s/rad]"""
     return np.array([1e3 * pair[0], 1e-3 * np.rad2deg(pair[1])])
-
-
-def records_with(parameters, truth, profile, loads):
-    """Return the displacements of the machine with the true damping, by load. [m]"""
-    planted = with_damping(parameters, truth)
-    machine = build_machine(planted)
-    cases = [Case(load, planted.loads[load], profile, parameters=planted) for load in loads]
-    found = {}
-    simulate_many(
-        machine,
-        cases,
-        histories=True,
-        finished=lambda run: found.update({run.case.name: run.record.displacement}),
-    )
-    return {load: found[load] for load in loads}
 
 
 def with_noise(records, seed):
@@ -117,20 +96,6 @@ def with_noise(records, seed):
         load: record + rng.normal(scale=NOISE, size=record.shape)
         for load, record in records.items()
     }
-
-
-@pytest.mark.hours
-@pytest.mark.parametrize("pair", PLANTED)
-def test_grid_recovers_planted_damping_for_five_seeds_of_noise(reference, pair):
-    truth = si(pair)
-    profile = run_up_of(reference)
-    records = records_with(reference, truth, profile, ("middle", "counter"))
-    for seed in range(5):
-        problem = damping_problem(
-            EnvelopeModel(build_machine(reference), with_noise(records, seed))
-        )
-        end, _ = grid_search(problem, MESH)
-        assert problem.points_at(end.point) == pytest.approx(truth, rel=0.02), seed
 
 
 def test_both_searches_find_the_true_damping(fast, records, monkeypatch):

@@ -61,26 +61,6 @@ def test_gyroscopic_splitting_is_that_of_the_closed_form(isotropic):
             assert np.min(np.abs(found / frequency - 1.0)) < 1e-6
 
 
-def test_modes_that_cross_keep_their_curves():
-    """Let the forward whirl rise through the bounce: neither may continue the other."""
-    parameters = isotropic_machine(rotational_stiffness=200.0 * BALLS * BALL_INERTIA * 0.8)
-    linear = linearised(build_machine(parameters))
-    speeds = np.linspace(0.0, 40.0, 41)
-    diagram = campbell(linear.spectrum, speeds, 6)
-    found = np.sort(np.abs(diagram.value), axis=1)
-    bounce = np.sqrt(STIFFNESS / MASS)
-    inertia = BALLS * BALL_INERTIA
-    g = 0.5 * BALL_INERTIA * speeds / inertia
-    rise = np.sqrt(160.0 + g * g) + g
-    assert rise[0] < bounce < rise[-1]  # they cross
-    columns = np.abs(diagram.value).T
-    assert np.all(np.ptp(found, axis=1) > 0.0)
-    flat = [c for c in columns if np.allclose(c, bounce, rtol=1e-6)]
-    rising = [c for c in columns if np.allclose(c, rise, rtol=1e-6)]
-    assert len(flat) == 3  # x, y, z
-    assert len(rising) == 1
-
-
 def test_modes_are_joined_by_shape_where_frequencies_cross():
     """Plant two uncoupled oscillators whose frequencies cross."""
 

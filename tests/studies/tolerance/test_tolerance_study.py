@@ -17,8 +17,6 @@ from wm_drake.parameters.tolerances import (
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.measures.responses import Response
-from wm_drake.studies.study import Facts
-from wm_drake.studies.tolerance.page import ToleranceReport, samples_frame
 from wm_drake.studies.tolerance.study import Settings, limits_of, run_tolerances
 from wm_drake.studies.tolerance.variables import uncertain_machine
 from wm_drake.studies.tolerance.words import in_percent, rare_sentences, summary
@@ -219,11 +217,6 @@ def test_words_claim_no_more_than_the_samples_support(study):
     assert "without contact the simulation gives no probability" in text
 
 
-def test_doubling_keeps_the_old_samples(study):
-    few, many = study(Settings(64, 0, 0)), study(Settings(128, 0, 0))
-    assert samples_frame(few).equals(samples_frame(many)[:64])
-
-
 def test_correlated_quantities_have_no_sobol_indices(study):
     result = study(Settings(64, 64, 0), {"quantities": ("k", "f"), "matrix": ((1, 0.5), (0.5, 1))})
     assert not result.indices
@@ -255,29 +248,6 @@ def test_limits_that_cannot_be_judged_are_refused(tmp_path):
         load_limits(path)
 
 
-def test_json_and_page_have_what_they_must(study):
-    wanted = Limit(quantity="gap", at_least="0 mm", allowed_share="1 %")
-    result = study(Settings(256, 64, 1000), limits=[wanted])
-    report = ToleranceReport(result, "about")
-    data = report.as_json()
-    assert {"p5", "p50", "p95"} <= set(data["measures"]["smallest_gap_mm"])
-    assert {"estimate", "lower", "upper", "method"} <= set(data["contact_probability"])
-    assert {"first", "total", "total_lower", "total_upper"} <= set(
-        data["sobol"]["smallest_gap_mm"]["k"]
-    )
-    assert data["limits"][0]["verdict"] in ("pass", "fail", "undecided")
-    assert data["measures"]["smallest_gap_mm"]["p50"] == pytest.approx(30.0, abs=1.0)
-    page = report.page(Facts())
-    assert "The tub touches the housing in" in page
-    assert "motor" in page
-
-
 def test_shares_in_percent():
     shown = [in_percent(x) for x in (0.0, 1.25e-6, 7.31e-4, 1.2345e-2, 0.5)]
     assert shown == ["0 %", "0.00013 %", "0.073 %", "1.2 %", "50 %"]
-
-
-@pytest.mark.parametrize("name", ["samples", "sensitivity", "subset"])
-def test_wrong_numbers_of_samples_are_refused(name):
-    with pytest.raises(InputError, match=f"--{name}"):
-        Settings(**{name: 1001})
