@@ -4,7 +4,6 @@ import multiprocessing
 import traceback
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from functools import partial
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
@@ -46,7 +45,10 @@ def map_in_processes(
             worker.send(waiting.pop())
         values: dict[int, Any] = {}
         while len(values) < len(items):
-            for worker in _with_message(workers):
+            ready = wait([worker.connection for worker in workers])
+            for worker in workers:
+                if worker.connection not in ready:
+                    continue
                 index, fraction, value = worker.received()
                 if fraction is not None:
                     progress(index, fraction)
@@ -100,19 +102,17 @@ class _Worker:
         self._process.join()
 
 
-def _with_message(workers: Sequence[_Worker]) -> list[_Worker]:
-    """Wait for a message and return the workers that have one."""
-    ready = wait([worker.connection for worker in workers])
-    return [worker for worker in workers if worker.connection in ready]
-
-
 def _serve(connection: Connection, function: Function) -> None:
     """Evaluate a function for each received item until the connection is closed."""
     try:
         while True:
             index, item = connection.recv()
+
+            def report(fraction: float, index: int = index) -> None:
+                connection.send((index, fraction, None, None))
+
             try:
-                value = function(item, partial(_send_progress, connection, index))
+                value = function(item, report)
             except Exception as error:
                 error.add_note(f"In a worker process:\n{traceback.format_exc()}")
                 connection.send((index, None, None, error))
@@ -120,8 +120,3 @@ def _serve(connection: Connection, function: Function) -> None:
                 connection.send((index, None, value, None))
     except (EOFError, OSError, KeyboardInterrupt):
         return
-
-
-def _send_progress(connection: Connection, index: int, fraction: float) -> None:
-    """Send the finished fraction of an item."""
-    connection.send((index, fraction, None, None))
