@@ -40,7 +40,7 @@ from wm_drake.studies.identification.drift import (
     mstv_of_c,
     printed_table,
 )
-from wm_drake.studies.spin.gasket_effect import effect_table
+from wm_drake.studies.spin.comparison import effect_table
 from wm_drake.studies.spin.study import run_spin
 from wm_drake.studies.spin.tables import amplitude_table
 from wm_drake.studies.spin_cycle.study import run_spin_cycle

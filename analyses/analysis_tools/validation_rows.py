@@ -12,7 +12,7 @@ import xarray as xr
 from wm_drake.parameters import PublishedResults
 from wm_drake.parameters.published import CONSTANT
 from wm_drake.studies.gasket.screening import Screening
-from wm_drake.studies.spin.gasket_effect import LARGE_STEADY, SMALL_STEADY
+from wm_drake.studies.spin.comparison import LARGE_STEADY, SMALL_STEADY
 from wm_drake.studies.spin_cycle.study import SpinCycleResult
 
 FITTED, PREDICTED = "fitted", "predicted"
@@ -267,7 +267,7 @@ def effect_rows(table: pd.DataFrame, kind: str = FITTED) -> list[Row]:
     """Return a row for each effect of the gasket on an amplitude, and one for the steady state.
 
     Args:
-        table: Result of `effect_table` of `studies.spin.gasket_effect`.
+        table: Result of `effect_table` of `studies.spin.comparison`.
         kind: Whether the amplitudes were fitted. The steady state is predicted always.
     """
     section, rows = "[B] Table 1 and section 2.2: effect of the gasket", list[Row]()

@@ -16,7 +16,7 @@ from wm_drake.simulation.cases import case_of
 from wm_drake.simulation.runs import simulate
 from wm_drake.studies.calibration.response_targets import ComputedResponses, response_targets_of
 from wm_drake.studies.calibration.targets import targets_of
-from wm_drake.studies.spin.gasket_effect import steady_amplitudes, steady_window
+from wm_drake.studies.spin.comparison import steady_amplitudes, steady_window
 
 R_GASKET = 0.18
 """Radius of the rubber ring. [m] Assumption: openings of 320 to 400 mm."""

@@ -15,6 +15,7 @@ from wm_drake.studies.spin.comparison import (
     Variant,
     check_comparable,
     difference_table,
+    effects,
     remarks,
 )
 from wm_drake.studies.spin.comparison_page import (
@@ -24,7 +25,6 @@ from wm_drake.studies.spin.comparison_page import (
     different_parameters,
     overlaid_envelopes_figure,
 )
-from wm_drake.studies.spin.gasket_effect import effects
 from wm_drake.studies.spin.study import Files
 from wm_drake.studies.study import Facts
 

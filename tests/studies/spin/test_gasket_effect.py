@@ -7,14 +7,14 @@ import xarray as xr
 from wm_drake.parameters import SpinProfile
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import Measures
-from wm_drake.studies.spin.comparison import Variant
-from wm_drake.studies.spin.effect_page import amplitudes, effect_summary
-from wm_drake.studies.spin.gasket_effect import (
+from wm_drake.studies.spin.comparison import (
+    Variant,
     effect_table,
     effects,
     steady_amplitudes,
     steady_window,
 )
+from wm_drake.studies.spin.comparison_page import effect_amplitudes, effect_summary
 from wm_drake.studies.spin.study import CaseResult, Comparison, SpinResult
 
 SENSORS = ["Xr", "Yr", "Zr", "Xf", "Yf", "Zf"]
@@ -78,7 +78,7 @@ def test_differences_are_those_of_equation_1(reference, comparison):
         "In the steady state the gasket matters little: amplitudes of at least 1 mm without gasket "
         "differ by up to 4.0 %"
     ) in text
-    shown = amplitudes(effect)
+    shown = effect_amplitudes(effect)
     if comparison is Comparison.NONE:
         assert table["experiment_percent"].isna().all()
         assert "experiment" not in text
@@ -103,7 +103,7 @@ def test_of_several_machines_each_row_names_its_machine(reference):
     assert table["percent"].to_numpy() == pytest.approx(50.0)
     assert table.groupby("machine", sort=False).size().to_dict() == {"reference": 6, "other": 6}
     assert effect_summary(table).startswith("Load reference, middle: ")
-    assert [group.heading for group in amplitudes(table).groups] == [
+    assert [group.heading for group in effect_amplitudes(table).groups] == [
         "reference, middle",
         "other, middle",
     ]

@@ -21,9 +21,8 @@ from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import number, percent
 from wm_drake.report.scripts import packed_plotly
 from wm_drake.report.table import readable
-from wm_drake.studies.spin.figures import orbits_figure
+from wm_drake.studies.spin.figures import orbits_figure, revolution_starts, simplified_indices
 from wm_drake.studies.spin.page import amplitude_table, spin_page, warnings_of
-from wm_drake.studies.spin.panels import revolution_starts, simplified_indices
 from wm_drake.studies.spin.study import CaseResult, Files, SpinResult
 from wm_drake.studies.spin.tables import (
     accelerations,

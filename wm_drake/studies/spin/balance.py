@@ -12,7 +12,7 @@ from wm_drake.report.page import Picture, picture
 from wm_drake.report.sections import Section
 from wm_drake.report.table import Column, Table, table_of
 from wm_drake.simulation.balance import Balance, balance_of
-from wm_drake.studies.spin.panels import speed_axis
+from wm_drake.studies.spin.figures import speed_axis
 from wm_drake.studies.spin.study import CaseResult, SpinResult
 
 WINDOW = 0.1

@@ -2,30 +2,34 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
 from wm_drake.parameters import quantities
-from wm_drake.report.figure import MEASURED, OURS, Figure, Mark
+from wm_drake.report.figure import MEASURED, OURS, QUIET, Axis, Figure, Line, Mark, Panel, Rule
 from wm_drake.report.formatting import MISSING, MM_PER_M, listed, number, percent
 from wm_drake.report.page import Picture, picture, versions_of
 from wm_drake.report.sections import Section, SectionedPage
-from wm_drake.report.table import Group, Row, Table, line, readable
-from wm_drake.simulation.displacements import envelopes
-from wm_drake.studies.spin import effect_page, tables
-from wm_drake.studies.spin.comparison import ComparisonResult, Variant, common_sensors, remarks
-from wm_drake.studies.spin.figures import experiment_rules
-from wm_drake.studies.spin.page import warnings_of
-from wm_drake.studies.spin.panels import (
-    largest_marks,
-    symmetric_limits,
-    time_band,
-    time_figure,
-    time_panel,
+from wm_drake.report.table import Column, Columns, Group, Row, Table, line, readable, table_of
+from wm_drake.simulation.displacements import envelopes, filtered_displacement
+from wm_drake.studies.spin import figures, tables
+from wm_drake.studies.spin.comparison import (
+    LARGE_STEADY,
+    SMALL_STEADY,
+    ComparisonResult,
+    Variant,
+    common_sensors,
+    remarks,
+    steady_window,
 )
+from wm_drake.studies.spin.page import warnings_of
 from wm_drake.studies.spin.study import CaseResult, band_text
 from wm_drake.studies.study import Facts
+
+if TYPE_CHECKING:
+    from rich.table import Table as TerminalTable
 
 COLOURS = (OURS, MEASURED, "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Colours of the variants: those of Okabe and Ito, which the colour-blind can tell apart."""
@@ -62,21 +66,23 @@ def overlaid_envelopes_figure(
     lines = len(cases) if len(cases) <= MOST_MARKED else 0
     sizes = [float(abs(band.sel(sensor=sensors)).to_array().max()) for band in bands.values()]
     sizes += [of_variant[sensor] for of_variant in measured.values() for sensor in sensors]
-    limits = symmetric_limits(max(sizes), max(1, lines))
+    limits = figures.symmetric_limits(max(sizes), max(1, lines))
     panels = []
     for sensor in sensors:
         marks: list[Mark] = []
         for index, (name, band) in enumerate(bands.items()):
             color, record = COLOURS[index], cases[name].record
             lower, upper = (b.sel(sensor=sensor).values for b in (band.lower, band.upper))
-            marks.append(time_band((record.time.values, lower, upper), limits[1], name, color))
+            marks.append(
+                figures.time_band((record.time.values, lower, upper), limits[1], name, color)
+            )
             if lines:
                 farther = np.where(np.abs(lower) > np.abs(upper), lower, upper)
-                marks += largest_marks(record, farther, "mm", color, index)
+                marks += figures.largest_marks(record, farther, "mm", color, index)
             if name in measured:
-                marks += experiment_rules(measured[name][sensor], color)
-        panels.append(time_panel(longest, sensor, marks, "displacement, mm", limits))
-    return time_figure(panels)
+                marks += figures.experiment_rules(measured[name][sensor], color)
+        panels.append(figures.time_panel(longest, sensor, marks, "displacement, mm", limits))
+    return figures.time_figure(panels)
 
 
 def differences(table: pd.DataFrame, load: str) -> Table:
@@ -256,7 +262,7 @@ def _pictures(comparison: ComparisonResult, index: int) -> Iterator[Picture | No
         rows = effect
         if "machine" in effect:
             rows = effect[effect["machine"] == variants[first].result.parameters.name]
-        yield effect_page.records_picture(rows, without, with_gasket)
+        yield records_picture(rows, without, with_gasket)
 
 
 def _amplitude_sections(comparison: ComparisonResult) -> list[Section]:
@@ -275,8 +281,8 @@ def _amplitude_sections(comparison: ComparisonResult) -> list[Section]:
     ]
     if effect is None:
         return sections
-    steady = effect_page.steady(effect, variants[0].result.results[0])
-    effects = (effect_page.amplitudes(effect), *([steady] if steady else []))
+    steady = steady_table(effect, variants[0].result.results[0])
+    effects = (effect_amplitudes(effect), *([steady] if steady else []))
     return [Section("gasket", "Effect of the gasket", tables=effects), *sections]
 
 
@@ -297,7 +303,7 @@ def summary(comparison: ComparisonResult) -> str:
     sentences = [opening, *(_of_variant(variant) for variant in variants)]
     changes = table[(table["measure"] == "amplitude") & np.isfinite(table["percent"])]
     if comparison.effect is not None:
-        sentences.append(effect_page.effect_summary(comparison.effect))
+        sentences.append(effect_summary(comparison.effect))
     elif len(changes):
         largest = changes.loc[changes["percent"].abs().idxmax()]
         sentences.append(
@@ -342,3 +348,199 @@ def facts_of_comparison(variants: Sequence[Variant], made: Facts) -> list[tuple[
     versions = versions_of(first.results[0].record.attrs)
     made = replace(made, step=0.0)  # the lines of the variants have it
     return [*facts, ("Engine", first.engine), ("Versions", versions), *made.rows()]
+
+
+WITHOUT, WITH = "without gasket", "with gasket"
+"""Names of the two runs of a pair; differences are in percent of the first."""
+
+SHOWN = 3
+"""Number of sensors per load whose records are shown: those with the largest difference."""
+
+ZOOM = 1.5
+"""Half of the time interval of the detail of a record. [s]"""
+
+COLUMNS = {
+    "without_mm": Column("without", "mm", 1),
+    "with_mm": Column("with", "mm", 1),
+    "percent": Column("difference", "%", 0),
+    "experiment_percent": Column("experiment", "%", 0),
+    "steady_without_mm": Column("steady, without", "mm", 1),
+    "steady_with_mm": Column("steady, with", "mm", 1),
+    "steady_percent": Column("difference", "%", 0),
+}
+"""Columns of the effect of the gasket on the terminal."""
+
+
+def terminal_table(effect: pd.DataFrame) -> "TerminalTable":
+    """Return the effect of the gasket for the terminal, without columns that have no number."""
+    kept = [key for key in COLUMNS if effect[key].notna().any()]
+    words = [name for name in ("machine", "load", "sensor") if name in effect]
+    title = "Amplitudes without and with gasket"
+    return table_of(effect[[*words, *kept]], columns=COLUMNS).terminal(title)
+
+
+def effect_summary(effect: pd.DataFrame) -> str:
+    """Return one paragraph on the transient, the experiment and the steady state."""
+    sentences = []
+    for load, rows in _by_load(effect):
+        known = rows[np.isfinite(rows["percent"])]
+        if known.empty:
+            sentences.append(f"Load {load}: a run diverged or is too short.")
+            continue
+        up, down = (known.loc[known["percent"].agg(f)] for f in ("idxmax", "idxmin"))
+        sentences.append(
+            f"Load {load}: the gasket changes amplitudes by {percent(down['percent'])} "
+            f"({down['sensor']}) to {percent(up['percent'])} ({up['sensor']})."
+        )
+    measured = effect[np.isfinite(effect["experiment_percent"]) & np.isfinite(effect["percent"])]
+    if len(measured):
+        same = int((np.sign(measured["percent"]) == np.sign(measured["experiment_percent"])).sum())
+        sentences.append(
+            f"The sign of the difference is that of the experiment in {same} of {len(measured)} "
+            "cases."
+        )
+    return " ".join(sentences + _steady_sentences(effect))
+
+
+def _by_load(effect: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:
+    """Return the rows of each load, with its name; of several machines with theirs too."""
+    words = [name for name in ("machine", "load") if name in effect]
+    return [(", ".join(map(str, key)), rows) for key, rows in effect.groupby(words, sort=False)]
+
+
+def _steady_sentences(effect: pd.DataFrame) -> list[str]:
+    """Return what the gasket changes in the steady state; empty if the profile has none.
+
+    Large amplitudes decide whether it matters. Percents of small ones are large, so these are in
+    mm.
+    """
+    changed = effect.assign(
+        change_mm=(effect["steady_with_mm"] - effect["steady_without_mm"]).abs()
+    )
+    known = changed[np.isfinite(changed["change_mm"])]
+    is_large = known["steady_without_mm"] >= LARGE_STEADY
+    large, small = known[is_large], known[~is_large]
+    sentences = []
+    if len(large):
+        worst = large.loc[large["steady_percent"].abs().idxmax()]
+        size = abs(worst["steady_percent"])
+        matters = "matters little" if size <= SMALL_STEADY else "still matters"
+        sentences.append(
+            f"In the steady state the gasket {matters}: amplitudes of at least {LARGE_STEADY:g} mm "
+            f"without gasket differ by up to {number(size, 1)} % ({_both_steady(worst)})."
+        )
+    if len(small):
+        worst = small.loc[small["change_mm"].idxmax()]
+        which = "Smaller ones" if len(large) else "Steady amplitudes"
+        below = "" if len(large) else f", all below {LARGE_STEADY:g} mm without gasket,"
+        sentences.append(
+            f"{which}{below} differ by up to {number(worst['change_mm'], 2)} mm "
+            f"({_both_steady(worst)})."
+        )
+    return sentences
+
+
+def _both_steady(row: pd.Series) -> str:
+    """Return sensor, load and both steady amplitudes of a row as text."""
+    return (
+        f"{row['sensor']}, load {row['load']}: {number(row['steady_without_mm'], 2)} mm without, "
+        f"{number(row['steady_with_mm'], 2)} mm with gasket"
+    )
+
+
+def effect_amplitudes(effect: pd.DataFrame) -> Table:
+    """Return the amplitudes without and with gasket and their differences, as [B] Table 1."""
+    is_measured = bool(np.isfinite(effect["experiment_percent"]).any())
+    lines = [("", "computed")] + ([("experiment_", "experiment")] if is_measured else [])
+    caption = (
+        "Amplitudes without and with gasket, and their difference 100 % × (with − without) / "
+        "without, [B] Eq. (1) and Table 1."
+    )
+    if is_measured:
+        caption += " Experiment: measured amplitudes that the machine file names."
+    return _pair_table(effect, lines, caption)
+
+
+def steady_table(effect: pd.DataFrame, case: CaseResult) -> Table | None:
+    """Return the amplitudes in the steady state; None if the profile of the case has none."""
+    window = steady_window(case.case.profile)
+    if window is None:
+        return None
+    caption = (
+        "Amplitudes at constant speed: mean of the envelope (analytic signal) from "
+        f"{window[0]:.1f} to {window[1]:.1f} s, and their difference in percent of that without "
+        "gasket."
+    )
+    return _pair_table(effect, [("steady_", "computed")], caption)
+
+
+def _pair_table(effect: pd.DataFrame, lines: list[tuple[str, str]], caption: str) -> Table:
+    """Return a table of amplitudes: rows without, with and difference, a column per sensor.
+
+    Args:
+        lines: Prefix of the columns and name of the source, for each source.
+    """
+    groups = []
+    for load, rows in _by_load(effect):
+        shown = []
+        for prefix, source in lines:
+            kind = "ours" if source == "computed" else "measured"
+            for name, column in ((WITHOUT, "without_mm"), (WITH, "with_mm")):
+                shown.append(Row((f"{source}, {name}", *rows[prefix + column]), kind))
+            changes = (percent(value) for value in rows[f"{prefix}percent"])
+            other = "difference" if source == "computed" else "difference other"
+            shown.append(Row((f"{source}, difference", *changes), other))
+        groups.append(Group(load, tuple(shown)))
+    sensors = (Column(name, "mm", 1) for name in dict.fromkeys(effect["sensor"]))
+    header: Columns = ("load", "source", *sensors)
+    return Table(caption, header, tuple(groups), text_columns=2)
+
+
+def records_picture(
+    effect: pd.DataFrame, without: CaseResult, with_gasket: CaseResult
+) -> Picture | None:
+    """Return the records of both runs of a case at the sensors with the largest difference.
+
+    Returns:
+        The picture; None if a run diverged or is too short.
+    """
+    load = without.case.name
+    rows = effect[(effect["load"] == load) & np.isfinite(effect["percent"])]
+    ranked = rows.reindex(rows["percent"].abs().sort_values(ascending=False).index)
+    sensors = list(ranked["sensor"][:SHOWN])
+    if not sensors:
+        return None
+    caption = (
+        f"Displacement in the band {band_text(without)}, without and with gasket, at the sensors "
+        "with the largest difference ([B] Fig. 3). Left: envelopes and records. Right: the records "
+        "around the largest amplitude with gasket."
+    )
+    alternative = f"Overlaid records without and with gasket, load {load}: {sensors}."
+    return picture(records_figure(without, with_gasket, sensors), alternative, caption)
+
+
+def records_figure(without: CaseResult, with_gasket: CaseResult, sensors: list[str]) -> Figure:
+    """Return the records of both runs over each other, one row per sensor, with a detail."""
+    runs = ((WITH, with_gasket.record, OURS), (WITHOUT, without.record, MEASURED))
+    signals = {name: MM_PER_M * filtered_displacement(record) for name, record, _ in runs}
+    lines = {name: MM_PER_M * envelopes(record) for name, record, _ in runs}
+    panels = []
+    for row, sensor in enumerate(sensors):
+        middle = float(abs(signals[WITH].sel(sensor=sensor)).idxmax("time"))
+        whole: list[Mark] = [Rule(0.0, color=QUIET)]
+        detail: list[Mark] = [Rule(0.0, color=QUIET)]
+        for name, _, color in runs:
+            signal, envelope = signals[name].sel(sensor=sensor), lines[name].sel(sensor=sensor)
+            record = Line(signal.time.values, signal.values, color=color, opacity=0.35, key=name)
+            whole.append(replace(record, width=0.5))
+            time = envelope.time.values[::10]
+            sides = (envelope.upper.values[::10], envelope.lower.values[::10])
+            whole += [Line(time, side, color=color, key=name) for side in sides]
+            near = signal.sel(time=slice(middle - ZOOM, middle + ZOOM))
+            detail.append(Line(near.time.values, near.values, color=color, key=name))
+        is_last = row == len(sensors) - 1
+        x, y = Axis(label="time, s" if is_last else ""), Axis(label="mm", scale=str(row))
+        panels.append(Panel(title=sensor, marks=tuple(whole), x=x, y=y, row=row))
+        y = replace(y, label="", has_numbers=False)
+        panels.append(Panel(marks=tuple(detail), x=x, y=y, row=row, column=1))
+    return Figure(panels=tuple(panels), height=130.0, widths=(2.2, 1.0))

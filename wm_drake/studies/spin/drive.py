@@ -12,7 +12,7 @@ from wm_drake.report.sections import Section
 from wm_drake.report.table import Group, Row, Table
 from wm_drake.simulation.drive import CAPTURE_LAG, CAPTURE_TIME, over_revolutions
 from wm_drake.simulation.records import profile_of
-from wm_drake.studies.spin.panels import revolution_starts
+from wm_drake.studies.spin.figures import revolution_starts
 from wm_drake.studies.spin.study import CaseResult, SpinResult
 
 

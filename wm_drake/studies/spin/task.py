@@ -17,8 +17,8 @@ from wm_drake.studies.spin.comparison import (
     Variant,
     check_comparable,
     difference_table,
+    effects,
 )
-from wm_drake.studies.spin.gasket_effect import effects
 from wm_drake.studies.spin.options import SpinOptions
 from wm_drake.studies.spin.study import Comparison, Files, SpinResult, run_spin
 from wm_drake.studies.study import Task

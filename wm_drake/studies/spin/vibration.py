@@ -14,17 +14,7 @@ from wm_drake.simulation.mount_forces import MountForce, mount_forces
 from wm_drake.simulation.orders import PERIOD, REVOLUTIONS, WINDOW, frequency_map, order_map
 from wm_drake.simulation.records import Record
 from wm_drake.simulation.vibration import sensor_accelerations
-from wm_drake.studies.spin.panels import (
-    COLUMNS,
-    IN_REVOLUTIONS,
-    largest_marks,
-    revolution_band,
-    speed_axis,
-    symmetric_limits,
-    time_band,
-    time_figure,
-    time_panel,
-)
+from wm_drake.studies.spin import figures
 from wm_drake.studies.spin.study import CaseResult, SpinResult
 
 DECADES = 3.0
@@ -181,7 +171,7 @@ def _map(
         marks=tuple(marks),
         x=Axis(label="time, s", range=(0.0, float(record.time[-1])), has_grid=False),
         y=Axis(label=f"{dimension}{', Hz' * bool(highest)}", range=(0.0, top), has_grid=False),
-        top=speed_axis(record),
+        top=figures.speed_axis(record),
     )
 
 
@@ -205,14 +195,16 @@ def accelerations_figure(record: Record, values: xr.DataArray) -> Figure:
 
     A band shows the smallest to the largest value in each drum revolution.
     """
-    limits = symmetric_limits(float(abs(values).max()))
+    limits = figures.symmetric_limits(float(abs(values).max()))
     panels = []
     for name in map(str, values.sensor.values):
         signal = values.sel(sensor=name).values
-        shown = time_band(revolution_band(record, signal), limits[1], IN_REVOLUTIONS)
-        marks = [shown, *largest_marks(record, signal, "m/s²")]
-        panels.append(time_panel(record, name, marks, "acceleration, m/s²", limits))
-    return time_figure(panels)
+        shown = figures.time_band(
+            figures.revolution_band(record, signal), limits[1], figures.IN_REVOLUTIONS
+        )
+        marks = [shown, *figures.largest_marks(record, signal, "m/s²")]
+        panels.append(figures.time_panel(record, name, marks, "acceleration, m/s²", limits))
+    return figures.time_figure(panels)
 
 
 def mounts_figure(record: Record, forces: Sequence[MountForce]) -> Figure:
@@ -228,12 +220,14 @@ def mounts_figure(record: Record, forces: Sequence[MountForce]) -> Figure:
         span = (high - low) or 1.0
         limits = low - 0.08 * span, high + 0.28 * span
         for force, signal in zip(of_row, signals, strict=True):
-            shown = time_band(revolution_band(record, signal), limits[1], IN_REVOLUTIONS)
-            marks = [shown, *largest_marks(record, signal, "N")]
+            shown = figures.time_band(
+                figures.revolution_band(record, signal), limits[1], figures.IN_REVOLUTIONS
+            )
+            marks = [shown, *figures.largest_marks(record, signal, "N")]
             name = force.name.replace("_", " ")
-            panels.append(time_panel(record, name, marks, "force, N", limits))
-        panels += [None] * (COLUMNS - len(of_row))
-    return time_figure(panels)
+            panels.append(figures.time_panel(record, name, marks, "force, N", limits))
+        panels += [None] * (figures.COLUMNS - len(of_row))
+    return figures.time_figure(panels)
 
 
 def _rows(forces: Sequence[MountForce]) -> list[list[MountForce]]:
@@ -242,7 +236,7 @@ def _rows(forces: Sequence[MountForce]) -> list[list[MountForce]]:
     for force in forces:
         kinds.setdefault(force.name.split(".")[0], []).append(force)
     return [
-        of_kind[begin : begin + COLUMNS]
+        of_kind[begin : begin + figures.COLUMNS]
         for of_kind in kinds.values()
-        for begin in range(0, len(of_kind), COLUMNS)
+        for begin in range(0, len(of_kind), figures.COLUMNS)
     ]
