@@ -54,7 +54,7 @@ COMMANDS = {
         "wm_drake.studies.rig.options:RIG",
         "Test a component on a bench: harmonic motion, steady force loops.",
     ),
-    "study": ("wm_drake.cli.study:app", "Run a study of many runs and write a report."),
+    "study": ("wm_drake.cli.components:app", "Run a study of many runs and write a report."),
 }
 """Home and line of help of each command: a function, declared studies, or a group of commands."""
 

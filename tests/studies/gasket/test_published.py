@@ -20,12 +20,11 @@ from wm_drake.simulation.cases import Case
 from wm_drake.studies.doe.design import make_design
 from wm_drake.studies.gasket import tables as texts
 from wm_drake.studies.gasket.findings import level_zero_text, summary
-from wm_drake.studies.gasket.level_zero import run_level_zero
 from wm_drake.studies.gasket.page import GasketResult
 from wm_drake.studies.gasket.proposal import Compared
 from wm_drake.studies.gasket.published import published_for
 from wm_drake.studies.gasket.screening import Responses, Words, run_screening
-from wm_drake.studies.gasket.study import GasketTrials
+from wm_drake.studies.gasket.study import GasketTrials, run_level_zero
 from wm_drake.studies.gasket.tables import as_plain_data
 
 NAMES = ("C_L", "K_Lx", "K_Ly")

@@ -7,7 +7,6 @@ import numpy as np
 from wm_drake.report.formatting import CONSEQUENCE, listed, number, percent
 from wm_drake.simulation.measures.responses import GAP
 from wm_drake.studies.doe.anova import Term
-from wm_drake.studies.gasket.level_zero import LevelZero
 from wm_drake.studies.gasket.proposal import NOT_COMPARED, Compared
 from wm_drake.studies.gasket.published import FAR, Published
 from wm_drake.studies.gasket.screening import (
@@ -21,6 +20,7 @@ from wm_drake.studies.gasket.screening import (
     leading_terms,
     main_effects,
 )
+from wm_drake.studies.gasket.study import LevelZero
 from wm_drake.studies.gasket.surface import Check
 from wm_drake.studies.gasket.tables import digits, r2_text
 

@@ -13,7 +13,6 @@ from wm_drake.report.table import Column, Group, Row, Table, line, table_of
 from wm_drake.studies.doe.anova import AnovaTable, Term
 from wm_drake.studies.doe.coding import MODELS
 from wm_drake.studies.doe.design import Design
-from wm_drake.studies.gasket.level_zero import LevelZero
 from wm_drake.studies.gasket.proposal import NOT_COMPARED, Compared
 from wm_drake.studies.gasket.published import FAR, NOT_PUBLISHED, Published
 from wm_drake.studies.gasket.screening import (
@@ -26,6 +25,7 @@ from wm_drake.studies.gasket.screening import (
     contributions,
     leading_terms,
 )
+from wm_drake.studies.gasket.study import LevelZero
 from wm_drake.studies.gasket.surface import Check
 
 OTHER_SIGN = "sign differs"
