@@ -74,8 +74,7 @@ class TableResult(Result):
 
     def page(self, facts: Facts) -> str:
         """Return the page: figures, tables, facts and the numbers of the machine."""
-        from wm_drake.report.page import picture
-        from wm_drake.report.sections import Section, SectionedPage
+        from wm_drake.report.page import Section, SectionedPage, picture
 
         pictures = tuple(picture(*figure) for figure in self.figures)
         sections = [Section("figures", "Figures", pictures)] if pictures else []

@@ -10,8 +10,7 @@ import pandas as pd
 from wm_drake.parameters import MachineParameters
 from wm_drake.report import figure as fig
 from wm_drake.report.formatting import GM_PER_KGM, MM_PER_M, RPM_PER_RAD_S, number, plain
-from wm_drake.report.page import Picture, picture
-from wm_drake.report.sections import Section, SectionedPage
+from wm_drake.report.page import Picture, Section, SectionedPage, picture
 from wm_drake.report.table import Column, Table, table_of
 from wm_drake.report.terminal import Printed
 from wm_drake.studies.balancer.study import SWING, Curve, Pair, Release, is_within, picked_up_from

@@ -8,8 +8,7 @@ import pandas as pd
 
 from wm_drake.model.build import build_machine
 from wm_drake.report.formatting import MM_PER_M, number, percent
-from wm_drake.report.page import Picture, picture, versions_of
-from wm_drake.report.sections import Section, SectionedPage
+from wm_drake.report.page import Picture, Section, SectionedPage, picture, versions_of
 from wm_drake.report.table import Column, Group, Row, Table, line
 from wm_drake.simulation.cases import case_of
 from wm_drake.studies.calibration.calibration import BEYOND_LIMIT, Calibration

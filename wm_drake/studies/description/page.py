@@ -12,8 +12,7 @@ from wm_drake.model.scene import Outline, Scene
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import listed, number, shape_name, significant
-from wm_drake.report.page import as_json, fragment
-from wm_drake.report.sections import Section, SectionedPage
+from wm_drake.report.page import Section, SectionedPage, as_json, fragment
 from wm_drake.report.table import Column, Table, line
 from wm_drake.studies.description.description import describe
 

@@ -10,8 +10,7 @@ from wm_drake.parameters import MachineParameters, SpinProfile
 from wm_drake.parameters.units import Unit
 from wm_drake.report import figure as fig
 from wm_drake.report.formatting import GM_PER_KGM, MISSING, RPM_PER_RAD_S, number, plain
-from wm_drake.report.page import Picture, picture
-from wm_drake.report.sections import Section, SectionedPage
+from wm_drake.report.page import Picture, Section, SectionedPage, picture
 from wm_drake.report.table import Column, Table, line, table_of
 from wm_drake.report.terminal import Printed
 from wm_drake.studies.drive.study import PASSES, Estimation, Threshold, TorqueMap, motor_with_limit

@@ -11,8 +11,7 @@ from markupsafe import Markup
 
 from wm_drake.report.formatting import number
 from wm_drake.report.interactive import packed
-from wm_drake.report.page import Picture, as_json, fragment, picture
-from wm_drake.report.sections import Section, SectionedPage
+from wm_drake.report.page import Picture, Section, SectionedPage, as_json, fragment, picture
 from wm_drake.report.table import Table
 from wm_drake.report.terminal import Console, Printed
 from wm_drake.studies.doe.design import write_design

@@ -10,8 +10,7 @@ from scipy.interpolate import griddata
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report import figure as fig
 from wm_drake.report.formatting import MM_PER_M, number, percent, significant
-from wm_drake.report.page import Picture, picture, versions_of
-from wm_drake.report.sections import Section, SectionedPage
+from wm_drake.report.page import Picture, Section, SectionedPage, picture, versions_of
 from wm_drake.report.table import Column, Group, Row, Table, line
 from wm_drake.simulation.displacements import envelopes, percent_difference
 from wm_drake.studies.gasket_damping.study import (

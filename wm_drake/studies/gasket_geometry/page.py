@@ -14,8 +14,7 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.report.figure import MEASURED, OURS, Axis, Figure, Line, Panel, Points, in_grid
 from wm_drake.report.formatting import number, plain, significant
-from wm_drake.report.page import Picture, picture
-from wm_drake.report.sections import Section, SectionedPage
+from wm_drake.report.page import Picture, Section, SectionedPage, picture
 from wm_drake.report.table import Column, Table, line
 from wm_drake.report.terminal import Printed
 from wm_drake.studies.gasket_geometry.drawings import Factor

@@ -7,8 +7,7 @@ import numpy as np
 import pandas as pd
 
 from wm_drake.report.formatting import MISSING
-from wm_drake.report.page import Picture, picture
-from wm_drake.report.sections import Section, SectionedPage
+from wm_drake.report.page import Picture, Section, SectionedPage, picture
 from wm_drake.report.table import Column, Group, Row, Table, line, table_of
 from wm_drake.studies.fitting.page import estimates_frame, values_table
 from wm_drake.studies.identification.comparison import Comparison

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from wm_drake.report.page import picture
-from wm_drake.report.sections import Section, SectionedPage
+from wm_drake.report.page import Section, SectionedPage, picture
 from wm_drake.report.table import Column, Table, table_of
 from wm_drake.rigs.measured import HarmonicMotion, MeasuredMotion, RecordedMotion
 from wm_drake.studies.fitting.fit import Fit

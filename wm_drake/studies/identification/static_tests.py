@@ -14,8 +14,7 @@ from wm_drake.errors import input_error
 from wm_drake.parameters import Component, MeasuredLoop
 from wm_drake.report.figure import MEASURED, QUIET, Figure, Line, Mark, Panel, in_grid
 from wm_drake.report.formatting import MM_PER_M
-from wm_drake.report.page import picture
-from wm_drake.report.sections import Section, SectionedPage
+from wm_drake.report.page import Section, SectionedPage, picture
 from wm_drake.report.table import Table, line
 from wm_drake.rigs import AXES
 from wm_drake.studies.components import axes_of, target_of

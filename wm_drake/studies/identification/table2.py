@@ -15,8 +15,7 @@ from wm_drake.parameters import read_loops
 from wm_drake.parameters.damper_laws import DamperNumbers
 from wm_drake.parameters.units import Unit
 from wm_drake.report.figure import Figure, Line, Mark, Points, in_grid
-from wm_drake.report.page import picture
-from wm_drake.report.sections import Section, SectionedPage
+from wm_drake.report.page import Section, SectionedPage, picture
 from wm_drake.report.table import Column, Columns, Table, line, table_of
 from wm_drake.rigs import Harmonic
 from wm_drake.rigs.measured import HarmonicMotion, measured_motion

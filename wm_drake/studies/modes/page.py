@@ -12,8 +12,7 @@ import pandas as pd
 from wm_drake.engines.trajectory import COORDINATES
 from wm_drake.model.scene import Scene
 from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, listed, number, plain
-from wm_drake.report.page import Picture, picture
-from wm_drake.report.sections import Section, SectionedPage
+from wm_drake.report.page import Picture, Section, SectionedPage, picture
 from wm_drake.report.table import Column, Group, Row, Table, line, table_of
 from wm_drake.report.terminal import Printed
 from wm_drake.studies.modes.figures import (

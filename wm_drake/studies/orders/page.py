@@ -6,8 +6,7 @@ import numpy as np
 
 from wm_drake.report import figure as fig
 from wm_drake.report.formatting import RPM_PER_RAD_S, number
-from wm_drake.report.page import picture
-from wm_drake.report.sections import Section, SectionedPage
+from wm_drake.report.page import Section, SectionedPage, picture
 from wm_drake.report.table import Column, Group, Row, Table
 from wm_drake.simulation.orders import REVOLUTIONS
 from wm_drake.simulation.records import versions

@@ -10,8 +10,7 @@ import pandas as pd
 
 from wm_drake.parameters import machine_yaml
 from wm_drake.report.formatting import MISSING, MM_PER_M, listed, plain, significant, with_interval
-from wm_drake.report.page import Picture, as_json, fragment, picture
-from wm_drake.report.sections import Section, SectionedPage
+from wm_drake.report.page import Picture, Section, SectionedPage, as_json, fragment, picture
 from wm_drake.report.table import Table, Value, line
 from wm_drake.studies.pareto.envelopes import Envelopes
 from wm_drake.studies.pareto.figures import (

@@ -8,8 +8,7 @@ import numpy as np
 import pandas as pd
 
 from wm_drake.report.formatting import MISSING, MM_PER_M, number
-from wm_drake.report.page import Picture, picture
-from wm_drake.report.sections import Section, SectionedPage
+from wm_drake.report.page import Picture, Section, SectionedPage, picture
 from wm_drake.report.table import Column, Table, line, table_of
 from wm_drake.rigs import ForceLoop, RigRun
 from wm_drake.rigs.run import stroke_points

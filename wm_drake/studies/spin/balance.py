@@ -8,8 +8,7 @@ import pandas as pd
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report import figure as fig
 from wm_drake.report.formatting import GM_PER_KGM, RPM_PER_RAD_S, listed, number, plain, shape_name
-from wm_drake.report.page import Picture, picture
-from wm_drake.report.sections import Section
+from wm_drake.report.page import Picture, Section, picture
 from wm_drake.report.table import Column, Table, table_of
 from wm_drake.simulation.balance import Balance, balance_of
 from wm_drake.studies.spin.figures import speed_axis

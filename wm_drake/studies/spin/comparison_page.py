@@ -10,8 +10,7 @@ import pandas as pd
 from wm_drake.parameters import quantities
 from wm_drake.report.figure import MEASURED, OURS, QUIET, Axis, Figure, Line, Mark, Panel, Rule
 from wm_drake.report.formatting import MISSING, MM_PER_M, listed, number, percent
-from wm_drake.report.page import Picture, picture, versions_of
-from wm_drake.report.sections import Section, SectionedPage
+from wm_drake.report.page import Picture, Section, SectionedPage, picture, versions_of
 from wm_drake.report.table import Column, Columns, Group, Row, Table, line, readable, table_of
 from wm_drake.simulation.displacements import envelopes, filtered_displacement
 from wm_drake.studies.spin import figures, tables

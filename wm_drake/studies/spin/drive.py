@@ -7,8 +7,7 @@ from wm_drake.parameters.drive import motor_of
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report import figure as fig
 from wm_drake.report.formatting import MISSING, RPM_PER_RAD_S, number
-from wm_drake.report.page import Picture, picture
-from wm_drake.report.sections import Section
+from wm_drake.report.page import Picture, Section, picture
 from wm_drake.report.table import Group, Row, Table
 from wm_drake.simulation.drive import CAPTURE_LAG, CAPTURE_TIME, over_revolutions
 from wm_drake.simulation.records import profile_of

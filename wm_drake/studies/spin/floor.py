@@ -8,8 +8,7 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.report import figure as fig
 from wm_drake.report.formatting import number
-from wm_drake.report.page import Picture, picture
-from wm_drake.report.sections import Section
+from wm_drake.report.page import Picture, Section, picture
 from wm_drake.report.table import Group, Row, Table
 from wm_drake.simulation.cabinet import walk
 from wm_drake.simulation.feet import MARGINS

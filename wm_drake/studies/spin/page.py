@@ -8,8 +8,7 @@ import pandas as pd
 
 from wm_drake.parameters.plausibility import unusual_numbers
 from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number, percent, slack_warning
-from wm_drake.report.page import Picture, picture, versions_of
-from wm_drake.report.sections import Section, SectionedPage
+from wm_drake.report.page import Picture, Section, SectionedPage, picture, versions_of
 from wm_drake.simulation.measures.registry import tabulated
 from wm_drake.simulation.spring_tension import slack_springs
 from wm_drake.studies.modes.page import natural_modes_table

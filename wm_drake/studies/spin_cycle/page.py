@@ -8,8 +8,7 @@ import numpy as np
 
 from wm_drake.parameters.unbalance_cases import UnbalanceCase
 from wm_drake.report.formatting import MM_PER_M, number, plain, slack_warning
-from wm_drake.report.page import Picture, picture
-from wm_drake.report.sections import Section, SectionedPage
+from wm_drake.report.page import Picture, Section, SectionedPage, picture
 from wm_drake.report.terminal import Printed
 from wm_drake.simulation.measures.as_json import as_json
 from wm_drake.simulation.spring_tension import slack_springs

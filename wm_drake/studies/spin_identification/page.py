@@ -8,8 +8,7 @@ import pandas as pd
 
 from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import MISSING, number
-from wm_drake.report.page import Picture, picture
-from wm_drake.report.sections import Section, SectionedPage
+from wm_drake.report.page import Picture, Section, SectionedPage, picture
 from wm_drake.report.table import Column, Table, line, table_of
 from wm_drake.simulation.records import versions
 from wm_drake.studies.fitting.page import (

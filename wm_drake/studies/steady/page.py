@@ -12,8 +12,7 @@ from wm_drake.model.scene import Scene
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number, percent, plain
-from wm_drake.report.page import Picture, picture
-from wm_drake.report.sections import Section, SectionedPage
+from wm_drake.report.page import Picture, Section, SectionedPage, picture
 from wm_drake.report.table import Column, Group, Row, Table, table_of
 from wm_drake.report.terminal import Printed
 from wm_drake.simulation.mounts import KINDS

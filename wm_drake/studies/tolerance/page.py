@@ -8,8 +8,7 @@ import numpy as np
 import pandas as pd
 
 from wm_drake.report.formatting import MISSING, plain, shape_name, significant, with_interval
-from wm_drake.report.page import Picture, picture
-from wm_drake.report.sections import Section, SectionedPage
+from wm_drake.report.page import Picture, Section, SectionedPage, picture
 from wm_drake.report.table import Column, Table, line, table_of
 from wm_drake.studies.study import Facts, Result
 from wm_drake.studies.tolerance.figures import distributions_figure, gap_figure, sobol_figure

@@ -17,8 +17,7 @@ from wm_drake.report.formatting import (
     plain,
     shape_name,
 )
-from wm_drake.report.page import Picture, picture
-from wm_drake.report.sections import Section, SectionedPage
+from wm_drake.report.page import Picture, Section, SectionedPage, picture
 from wm_drake.report.table import Column, Table, table_of
 from wm_drake.report.terminal import Printed
 from wm_drake.simulation.measures.responses import GAP, Response
