@@ -43,13 +43,18 @@ from wm_drake.parameters.measured import (
 from wm_drake.parameters.published import CONSTANT, published_results
 from wm_drake.report.progress import progress_bar
 from wm_drake.simulation.measures.responses import known_responses
-from wm_drake.studies.calibration.calibration import Calibration, Plan, calibrate, identity_of
+from wm_drake.studies.calibration.calibration import (
+    Calibration,
+    Plan,
+    calibrate,
+    fit_with_fewer,
+    identity_of,
+)
 from wm_drake.studies.calibration.computed import Runner
-from wm_drake.studies.calibration.fewer import fit_with_fewer
 from wm_drake.studies.calibration.prediction import Prediction, predict
 from wm_drake.studies.calibration.response_targets import with_deviations
 from wm_drake.studies.calibration.solutions import Solution, percents_of, solved_machine
-from wm_drake.studies.calibration.tables import FITS, fewer_table, prediction_table
+from wm_drake.studies.calibration.study import FITS, fewer_table, prediction_table
 from wm_drake.studies.calibration.targets import EXPERIMENT, Targets, targets_of
 from wm_drake.studies.gasket.published import published_for
 

@@ -33,7 +33,7 @@ from wm_drake.rigs import (
     force_loops,
     measures_of,
 )
-from wm_drake.studies.rig.printed import printed_table
+from wm_drake.studies.rig.study import printed_table
 from wm_drake.studies.spin_cycle.study import SpinCycleResult, average_errors, run_spin_cycle
 from wm_drake.studies.spin_cycle.task import compiled_runs
 

@@ -7,7 +7,7 @@ from pydantic import ValidationError
 
 from wm_drake.errors import InputError
 from wm_drake.parameters import quantities, with_value
-from wm_drake.parameters.allowed import AllowedRange, allowed_range
+from wm_drake.parameters.keys import AllowedRange, allowed_range
 
 
 @pytest.mark.parametrize(

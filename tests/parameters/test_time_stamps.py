@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from wm_drake.errors import InputNotice
+from wm_drake.parameters.csv_files import with_distinct_times
 from wm_drake.parameters.loop_files import read_loop
-from wm_drake.parameters.time_stamps import with_distinct_times
 
 
 def test_neighbours_of_equal_time_become_their_mean():

@@ -4,7 +4,7 @@ import pytest
 
 import wm_drake as wm
 from wm_drake.rigs import MATRICES, bushing_bench, damper_bench
-from wm_drake.studies.rig.printed import VERDICTS, printed_errors, printed_table
+from wm_drake.studies.rig.study import VERDICTS, printed_errors, printed_table
 
 MACHINE = wm.load_machine("free_stroke")
 

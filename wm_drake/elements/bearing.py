@@ -15,7 +15,7 @@ from wm_drake.elements.motion import (
     tub_motion,
     write_generalized_force,
 )
-from wm_drake.parameters.bearing import Bearing
+from wm_drake.parameters.machine import Bearing
 
 FORCE_SIZE = 12
 """Own numbers: displacement and rotation vector of the drum's carrier against the tub, force and

@@ -7,7 +7,6 @@ Enters: YAML and CSV files, and text with units. Leaves: frozen types in SI unit
 May import: `laws`, `compiler` and `errors`; no pydrake.
 """
 
-from wm_drake.parameters.bearing import Bearing
 from wm_drake.parameters.components import Component, load_component, shipped_components
 from wm_drake.parameters.damper_laws import (
     DAMPER_LAWS,
@@ -57,6 +56,7 @@ from wm_drake.parameters.inertia import InertiaMatrix
 from wm_drake.parameters.keys import quantities, source_of, with_value, with_values
 from wm_drake.parameters.loop_files import MeasuredLoop, read_loop, read_loops
 from wm_drake.parameters.machine import (
+    Bearing,
     BodyOverride,
     Clearance,
     FrameOverride,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wm_drake.errors import input_error
+from wm_drake.errors import InputNotice, Problem, input_error
 from wm_drake.parameters.text_files import read_text
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import LARGEST_NUMBER, comma_hint
@@ -113,3 +113,31 @@ def _table(text: str, **options: Any) -> "pd.DataFrame":
     if head.count(",") >= MOST_COLUMNS:
         raise ValueError(f"{head.count(',') + 1} columns; allowed are up to {MOST_COLUMNS}")
     return pd.read_csv(io.StringIO(text), comment="#", skipinitialspace=True, **options)
+
+
+def with_distinct_times(samples: FloatArray, where: str) -> FloatArray:
+    """Return samples with those of equal time stamps averaged, with a notice.
+
+    Instruments that store few digits of the time give neighbouring samples the same one.
+
+    Args:
+        samples: (n, k) with the time in the first column.
+        where: File, for the notice.
+
+    Returns:
+        (m, k), m <= n; the same array if no neighbours have the same time.
+    """
+    is_first = np.ones(len(samples), dtype=bool)
+    is_first[1:] = np.diff(samples[:, 0]) != 0.0
+    first = np.flatnonzero(is_first)
+    if len(first) == len(samples):
+        return samples
+    sizes = np.diff(np.append(first, len(samples)))
+    averaged = np.add.reduceat(samples, first) / sizes[:, None]
+    averaged[:, 0] = samples[first, 0]
+    message = (
+        f"{int(sizes[sizes > 1].sum())} samples share their time stamp with a neighbour; they were "
+        f"averaged to {int(np.sum(sizes > 1))}"
+    )
+    warnings.warn(str(Problem(where, "", message)), InputNotice, stacklevel=3)
+    return averaged

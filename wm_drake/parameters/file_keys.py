@@ -15,10 +15,9 @@ from pydantic.fields import FieldInfo
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
-from wm_drake.parameters.allowed import declared_range
 from wm_drake.parameters.damper_laws import DamperNumbers
 from wm_drake.parameters.element_kinds import ELEMENT_KINDS, OfKind
-from wm_drake.parameters.keys import models_in, unit_of
+from wm_drake.parameters.keys import declared_range, models_in, unit_of
 from wm_drake.parameters.machine import MachineParameters
 from wm_drake.parameters.units import PureNumber, Unit
 

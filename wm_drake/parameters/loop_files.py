@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from wm_drake.errors import InputError, Problem, input_error, shortened
+from wm_drake.parameters.csv_files import with_distinct_times
 from wm_drake.parameters.lab_files import Channel, chosen, is_lab_file, read_channels
 from wm_drake.parameters.text_files import read_text
-from wm_drake.parameters.time_stamps import with_distinct_times
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import LARGEST_NUMBER, Unit, comma_hint, factor_of, plain_number
 

@@ -7,7 +7,6 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from wm_drake.errors import nearest_names
 from wm_drake.parameters import units as u
-from wm_drake.parameters.bearing import Bearing
 from wm_drake.parameters.cabinet import Cabinet
 from wm_drake.parameters.damper_laws import DamperType
 from wm_drake.parameters.drive import AnyDrive, Drive, MotorDrive
@@ -137,6 +136,53 @@ class UnbalancePlanes(Frozen):
 
     front: UnbalancePlace
     rear: UnbalancePlace
+
+
+class Bearing(Frozen):
+    """A compliant bearing between drum and tub.
+
+    A machine without these parameters has a rigid bearing: a revolute joint. None of the numbers is
+    published; every number in a machine file is an assumption of its author.
+
+    Attributes:
+        radial_stiffness: Stiffness perpendicular to the drum axis. [N/m]
+        axial_stiffness: Stiffness along the drum axis. [N/m]
+        tilting_stiffness: Stiffness against tilting of the drum axis. [N m/rad]
+        torsional_stiffness: Stiffness about the drum axis, in the path of the motor's reaction
+            torque to the tub; if None, the tilting stiffness is used. [N m/rad]
+        radial_damping, axial_damping: Damping in the same directions. [N s/m]
+        tilting_damping, torsional_damping: Damping of the rotations; if the torsional one is None,
+            the tilting one is used. [N m s/rad]
+        y: Position of the bearing along the axis of the drum's joint, from the joint's origin. [m]
+    """
+
+    radial_stiffness: Annotated[u.LinearStiffness, Field(gt=0.0)]
+    axial_stiffness: Annotated[u.LinearStiffness, Field(gt=0.0)]
+    tilting_stiffness: Annotated[u.RotationalStiffness, Field(gt=0.0)]
+    torsional_stiffness: Annotated[u.RotationalStiffness, Field(gt=0.0)] | None = None
+    radial_damping: Annotated[u.LinearDamping, Field(ge=0.0)]
+    axial_damping: Annotated[u.LinearDamping, Field(ge=0.0)]
+    tilting_damping: Annotated[u.RotationalDamping, Field(ge=0.0)]
+    torsional_damping: Annotated[u.RotationalDamping, Field(ge=0.0)] | None = None
+    y: u.Length
+
+    def as_bushing(self) -> BushingType:
+        """Return the bearing as a bushing in a frame whose y axis is the drum axis."""
+        stiffness, damping = self.torsional_stiffness, self.torsional_damping
+        return BushingType(
+            stiffness_x=self.radial_stiffness,
+            stiffness_y=self.axial_stiffness,
+            stiffness_z=self.radial_stiffness,
+            rotational_stiffness_x=self.tilting_stiffness,
+            rotational_stiffness_y=self.tilting_stiffness if stiffness is None else stiffness,
+            rotational_stiffness_z=self.tilting_stiffness,
+            damping_x=self.radial_damping,
+            damping_y=self.axial_damping,
+            damping_z=self.radial_damping,
+            rotational_damping_x=self.tilting_damping,
+            rotational_damping_y=self.tilting_damping if damping is None else damping,
+            rotational_damping_z=self.tilting_damping,
+        )
 
 
 class Imperfections(Frozen):

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from wm_drake.parameters import MachineParameters, quantities, source_of
-from wm_drake.parameters.allowed import AllowedRange, allowed_range
 from wm_drake.parameters.elements import Table
-from wm_drake.parameters.keys import is_index
+from wm_drake.parameters.keys import AllowedRange, allowed_range, is_index
 from wm_drake.parameters.plausibility import UsualRange, usual_range
 from wm_drake.parameters.units import Unit
 from wm_drake.parameters.variation import Number, number_at, value_at

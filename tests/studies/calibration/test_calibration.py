@@ -13,13 +13,17 @@ from wm_drake.model.build import build_machine
 from wm_drake.parameters import load_machine
 from wm_drake.parameters.files import yaml_text
 from wm_drake.parameters.free import Measured, load_free
-from wm_drake.studies.calibration.calibration import Plan, calibrate, identity_of
+from wm_drake.studies.calibration.calibration import (
+    Plan,
+    calibrate,
+    fit_with_fewer,
+    identity_of,
+)
 from wm_drake.studies.calibration.computed import Evaluation, Runner
-from wm_drake.studies.calibration.fewer import fit_with_fewer
 from wm_drake.studies.calibration.parameter_map import parameter_map_of
 from wm_drake.studies.calibration.prediction import predict
 from wm_drake.studies.calibration.solutions import Solution, distinct, solved_machine
-from wm_drake.studies.calibration.tables import (
+from wm_drake.studies.calibration.study import (
     amplitude_rows,
     fewer_table,
     prediction_table,

@@ -23,7 +23,7 @@ from wm_drake.studies.calibration.response_targets import (
     with_deviations,
 )
 from wm_drake.studies.calibration.solutions import Solution
-from wm_drake.studies.calibration.tables import prediction_table
+from wm_drake.studies.calibration.study import prediction_table
 from wm_drake.studies.calibration.targets import targets_of
 from wm_drake.studies.doe.orthogonal import orthogonal_levels
 from wm_drake.studies.fitting.posterior import Posterior

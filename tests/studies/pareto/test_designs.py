@@ -14,16 +14,20 @@ from wm_drake.parameters import load_machine
 from wm_drake.parameters.designs import DESIGNS, DesignTask, load_design
 from wm_drake.parameters.tolerances import Tolerances
 from wm_drake.simulation.cases import Case, case_of
-from wm_drake.studies.pareto.envelopes import front_envelopes
 from wm_drake.studies.pareto.page import (
     DesignResult,
     front_table,
     promises_table,
 )
 from wm_drake.studies.pareto.problem import machine_designs
-from wm_drake.studies.pareto.robust import _is_kept, promises, summary_of
 from wm_drake.studies.pareto.search import SearchSettings
-from wm_drake.studies.pareto.study import run_designs
+from wm_drake.studies.pareto.study import (
+    _is_kept,
+    front_envelopes,
+    promises,
+    run_designs,
+    summary_of,
+)
 from wm_drake.studies.study import Facts
 from wm_drake.studies.tolerance.distributions import base_samples
 from wm_drake.studies.tolerance.variables import uncertain_machine

@@ -15,8 +15,8 @@ from wm_drake.studies.calibration.calibration import BEYOND_LIMIT, Calibration
 from wm_drake.studies.calibration.figures import errors_figure, modes_figure, quantities_figure
 from wm_drake.studies.calibration.prediction import Prediction
 from wm_drake.studies.calibration.solutions import percents_of, solved_machine
-from wm_drake.studies.calibration.study import CalibrateResult
-from wm_drake.studies.calibration.tables import (
+from wm_drake.studies.calibration.study import (
+    CalibrateResult,
     fewer_shown,
     predictions_shown,
     quantities_shown,

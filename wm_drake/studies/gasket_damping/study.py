@@ -20,9 +20,8 @@ from wm_drake.parameters import (
     load_factors,
     with_values,
 )
-from wm_drake.parameters.csv_files import finite_numbers, read_csv
+from wm_drake.parameters.csv_files import finite_numbers, read_csv, with_distinct_times
 from wm_drake.parameters.machine import OUTPUT_PERIOD
-from wm_drake.parameters.time_stamps import with_distinct_times
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.report.terminal import say

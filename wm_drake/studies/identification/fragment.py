@@ -22,8 +22,7 @@ from wm_drake.parameters.units import Unit
 from wm_drake.studies.components import Target
 from wm_drake.studies.fitting.fit import Fit
 from wm_drake.studies.fitting.page import unit_text
-from wm_drake.studies.identification.models import ComponentModel
-from wm_drake.studies.identification.scales import ANGLE, FORCE, LENGTH, TORQUE
+from wm_drake.studies.identification.models import ANGLE, FORCE, LENGTH, TORQUE, ComponentModel
 
 FIXED = "fixed by the user in an identification"
 """Source of a number that was not searched."""

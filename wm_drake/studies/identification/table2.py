@@ -1,7 +1,13 @@
-"""`identify table2`: the Coulomb model fitted to each test, as in [C] Table 2."""
+"""`identify table2`: k1 and c1 of the Coulomb model fitted to each test, beside [C] Table 2.
+
+[C] fits k1 and c1 of the Coulomb model to each test and prints how they drift with frequency and
+amplitude. Here the tests are loops of the MSTV model with the numbers of [C] section 4.2, or
+measured ones. Assumptions: both models have the same f_max and the same c2 ([C] Eq. (3) holds for
+all laws); f_max is not printed.
+"""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -9,33 +15,149 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from rich.table import Table as TerminalTable
+from scipy.optimize import brentq
 
 from wm_drake.errors import input_error
-from wm_drake.parameters import read_loops
+from wm_drake.parameters import MeasuredLoop, load_component, read_loops
+from wm_drake.parameters.components import COMPONENTS_FOLDER
 from wm_drake.parameters.damper_laws import DamperNumbers
 from wm_drake.parameters.units import Unit
 from wm_drake.report.figure import Figure, Line, Mark, Points, in_grid
 from wm_drake.report.page import Section, SectionedPage, picture
 from wm_drake.report.table import Column, Columns, Table, line, table_of
-from wm_drake.rigs import Harmonic
+from wm_drake.rigs import Harmonic, damper_bench, force_loops
 from wm_drake.rigs.measured import HarmonicMotion, measured_motion
 from wm_drake.studies.components import existing_files
-from wm_drake.studies.identification.drift import (
-    MM,
-    FrequencyTrend,
-    coulomb_fits,
-    frequency_trend,
-    mstv_motions,
-    mstv_of_c,
-    printed_table,
-)
+from wm_drake.studies.fitting.methods import least_squares
 from wm_drake.studies.identification.figures import LAW_COLOURS
 from wm_drake.studies.identification.inputs import units_of
+from wm_drake.studies.identification.models import Given, damper_model
 from wm_drake.studies.identification.options import Table2Options
+from wm_drake.studies.identification.problem import fit_problem
 from wm_drake.studies.inputs import quantities_of
 from wm_drake.studies.rig.figures import loop_panel
 from wm_drake.studies.run import Executor
 from wm_drake.studies.study import Facts, Result, Task
+
+BOUNDS = {"sponge_stiffness": (50e3, 300e3), "sponge_damping": (0.0, 10e3)}
+"""Bounds of [C] section 3.3. [N/m, N s/m]"""
+
+MM = 1e-3
+SAME = 0.02
+"""Relative difference of frequency and amplitude up to which a test is one of the printed ones."""
+
+
+def printed_table() -> pd.DataFrame:
+    """Return [C] Table 2: frequency_hz, amplitude_mm, k1 (N/mm), c1 (N s/mm)."""
+    return pd.read_csv(COMPONENTS_FOLDER / "mstv_table2_coulomb.csv", comment="#")
+
+
+def mstv_motions(damper: DamperNumbers, motions: Sequence[Harmonic]) -> list[HarmonicMotion]:
+    """Return loops of a damper as if they had been measured."""
+    measured_loops = []
+    for loop in force_loops(damper_bench(damper), motions):
+        name = f"{loop.motion.frequency:g} Hz, {loop.motion.amplitude / MM:g} mm"
+        measured = measured_motion(
+            MeasuredLoop(name, name, loop.time, loop.displacement, loop.force, False)
+        )
+        assert isinstance(measured, HarmonicMotion)
+        measured_loops.append(measured)
+    return measured_loops
+
+
+def coulomb_fits(
+    motions: Sequence[HarmonicMotion],
+    f_max: float,
+    slider_damping: float,
+    progress: Callable[[int], None] = lambda done: None,
+) -> pd.DataFrame:
+    """Return k1 and c1 of the Coulomb model of each test beside the printed ones, and their ratios.
+
+    Units are those of [C], N/mm and N s/mm; a test that is not printed has NaN there.
+
+    Args:
+        motions: Measured tests.
+        f_max: Friction force of the Coulomb model. [N]
+        slider_damping: Its c2. [N s/m]
+        progress: Called after each test with the number of tests that are done.
+    """
+    known = {"friction_force": f_max, "transition_velocity": 0.0, "slider_damping": slider_damping}
+    printed, rows = printed_table(), []
+    for measured in motions:
+        model = damper_model("stv_sponge", [measured], Given(BOUNDS, known))
+        fit = least_squares(fit_problem(model, [measured]), starts=3, screened=16)
+        f, a = measured.motion.frequency, measured.motion.amplitude / MM
+        near = (np.abs(printed.frequency_hz / f - 1.0) < SAME) & (
+            np.abs(printed.amplitude_mm / a - 1.0) < SAME
+        )
+        same = printed[near]
+        row = {"frequency_hz": f, "amplitude_mm": a}
+        for name, field in (("k1", "sponge_stiffness"), ("c1", "sponge_damping")):
+            value = float(same[name].iloc[0]) if len(same) else float("nan")
+            fitted = fit[field].value * MM
+            row |= {name: value, f"{name} fitted": fitted, f"{name} ratio": fitted / value}
+        rows.append({**row, "RMSE/peak": fit.tests[0].normalised})
+        progress(len(rows))
+    return pd.DataFrame(rows)
+
+
+@dataclass(frozen=True)
+class FrequencyTrend:
+    """Peak force of MSTV loops of one amplitude over frequency, for [C] section 4.1.
+
+    Attributes:
+        frequencies: Rising. [Hz]
+        printed: Peak force with the numbers of the damper. [N]
+        without_dashpots: Peak force with c1 and c2 of nearly zero. [N]
+        friction: f_max at each frequency with which the peak would be that of the lowest. [N]
+    """
+
+    frequencies: tuple[float, ...]
+    printed: tuple[float, ...]
+    without_dashpots: tuple[float, ...]
+    friction: tuple[float, ...]
+
+
+def frequency_trend(
+    damper: DamperNumbers, frequencies: Sequence[float], amplitude: float
+) -> FrequencyTrend:
+    """Return how the peak force goes with frequency, and the friction that would keep it level.
+
+    Without c1 and c2 the law depends on quotients of rates only, so its loops do not depend on the
+    frequency; each dashpot makes the force grow. A force that falls with frequency, as [C] section
+    4.1 says, needs a friction that falls with velocity.
+
+    Args:
+        damper: MSTV damper.
+        frequencies: Rising. [Hz]
+        amplitude: Of the motion. [m]
+    """
+
+    def peaks(**changes: float) -> tuple[float, ...]:
+        bench = damper_bench(damper.model_copy(update=changes))
+        motions = [Harmonic(f, amplitude) for f in frequencies]
+        return tuple(float(np.max(np.abs(x.force))) for x in force_loops(bench, motions))
+
+    printed = peaks()
+    least = float(getattr(damper, "friction_force"))  # noqa: B009
+    ends = 1e-3 * least, least
+    friction = [
+        float(brentq(lambda f, k=k: peaks(friction_force=f)[k] - printed[0], *ends, rtol=1e-3))
+        for k in range(1, len(frequencies))
+    ]
+    return FrequencyTrend(
+        tuple(frequencies),
+        printed,
+        peaks(sponge_damping=1e-3, slider_damping=1e-3),
+        (least, *friction),
+    )
+
+
+def mstv_of_c() -> DamperNumbers:
+    """Return the shipped damper of [C]."""
+    parameters = load_component("mstv_damper").parameters
+    assert isinstance(parameters, DamperNumbers)
+    return parameters
 
 
 def table2_page(result: "Table2Result", facts: Facts) -> str:

@@ -7,8 +7,7 @@ import numpy as np
 
 from wm_drake.report import figure as fig
 from wm_drake.report.formatting import MM_PER_M
-from wm_drake.studies.pareto.envelopes import Envelopes
-from wm_drake.studies.pareto.study import COMPROMISE, ParetoFront
+from wm_drake.studies.pareto.study import COMPROMISE, Envelopes, ParetoFront
 
 PICKED = "picked design"
 """Label of what belongs to the picked design."""

@@ -12,7 +12,6 @@ from wm_drake.parameters import machine_yaml
 from wm_drake.report.formatting import MISSING, MM_PER_M, listed, plain, significant, with_interval
 from wm_drake.report.page import Picture, Section, SectionedPage, as_json, fragment, picture
 from wm_drake.report.table import Table, Value, line
-from wm_drake.studies.pareto.envelopes import Envelopes
 from wm_drake.studies.pareto.figures import (
     DESIGNS,
     PICKED,
@@ -23,8 +22,7 @@ from wm_drake.studies.pareto.figures import (
     pairs_of,
 )
 from wm_drake.studies.pareto.problem import Goal
-from wm_drake.studies.pareto.robust import FRESH, Promise
-from wm_drake.studies.pareto.study import COMPROMISE, ParetoFront
+from wm_drake.studies.pareto.study import COMPROMISE, FRESH, Envelopes, ParetoFront, Promise
 from wm_drake.studies.study import Facts, Result
 
 if TYPE_CHECKING:

@@ -12,13 +12,11 @@ from wm_drake.parameters import designs as design_files
 from wm_drake.parameters.tolerances import TOLERANCES, Tolerances, check_load, load_tolerances
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.studies.inputs import problems_of_file, selected_cases
-from wm_drake.studies.pareto.envelopes import front_envelopes
 from wm_drake.studies.pareto.options import DesignOptions
 from wm_drake.studies.pareto.page import DesignResult
 from wm_drake.studies.pareto.problem import MachineDesigns, machine_designs
-from wm_drake.studies.pareto.robust import promises
 from wm_drake.studies.pareto.search import SearchSettings
-from wm_drake.studies.pareto.study import SEARCHES, run_designs
+from wm_drake.studies.pareto.study import SEARCHES, front_envelopes, promises, run_designs
 from wm_drake.studies.run import Executor, machine_text
 from wm_drake.studies.study import Task
 from wm_drake.studies.tolerance.distributions import base_samples

@@ -9,10 +9,9 @@ import xarray as xr
 
 from wm_drake.errors import check_known, input_error
 from wm_drake.parameters import SpinProfile
-from wm_drake.parameters.csv_files import read_csv
+from wm_drake.parameters.csv_files import read_csv, with_distinct_times
 from wm_drake.parameters.lab_files import SUFFIXES, is_lab_file
 from wm_drake.parameters.lab_signals import ACCELERATION, lab_signals
-from wm_drake.parameters.time_stamps import with_distinct_times
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.band import HIGH_PASS_HZ
 from wm_drake.simulation.vibration import high_passed, integrated_twice, region_rms

@@ -23,7 +23,7 @@ from wm_drake.parameters import (
     machine_yaml,
     with_values,
 )
-from wm_drake.parameters.allowed import allowed_range
+from wm_drake.parameters.keys import allowed_range
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.unbalance_cases import UnbalanceCase
 from wm_drake.parameters.variation import number_at, range_of
