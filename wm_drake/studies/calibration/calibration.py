@@ -11,7 +11,7 @@ from wm_drake.errors import check_known, input_error
 from wm_drake.model.machine import Machine
 from wm_drake.parameters.free import FreeFile
 from wm_drake.parameters.types import FloatArray
-from wm_drake.studies.calibration.computed import Runner, StoredValues
+from wm_drake.studies.calibration.computed import Evaluation, Runner
 from wm_drake.studies.calibration.parameter_map import ParameterMap, parameter_map_of
 from wm_drake.studies.calibration.solutions import Percents, Solution, distinct, percents_of
 from wm_drake.studies.calibration.targets import Targets
@@ -144,7 +144,7 @@ def calibrate(runner: Runner, free: FreeFile, targets: Targets, plan: Plan) -> C
     parameter_map = parameter_map_of(runner.machine, free)
     values = runner.values(parameter_map, targets)
     if np.isnan(values(parameter_map.start[None]).amplitude).all():
-        values.evaluation.check(parameter_map.start)
+        values.check(parameter_map.start)
     problem = calibration_problem(values, plan)
     ended = []
     for number in range(plan.starts):
@@ -156,13 +156,13 @@ def calibrate(runner: Runner, free: FreeFile, targets: Targets, plan: Plan) -> C
     return Calibration(parameter_map, targets, plan, tuple(distinct(ended)), tuple(ended))
 
 
-def calibration_problem(values: StoredValues, plan: Plan) -> PriorProblem:
+def calibration_problem(values: Evaluation, plan: Plan) -> PriorProblem:
     """Return the problem of the free quantities of an evaluation.
 
     The first `targets.count` residuals are those of the data. Those of values that have a limit
     follow, then those of what is known beside the priors of the quantities.
     """
-    parameter_map, targets = values.evaluation.parameter_map, values.evaluation.targets
+    parameter_map, targets = values.parameter_map, values.targets
     spread = plan.spread(targets.amplitude)
     m = parameter_map
     columns = np.stack([m.lower, m.upper, np.clip(m.start, m.lower, m.upper), *m.prior])
@@ -197,10 +197,10 @@ def costs_at(problem: PriorProblem, point: FloatArray, targets: Targets) -> tupl
 
 
 def _solution(
-    number: int, search: Search[PriorProblem], coordinates: FloatArray, values: StoredValues
+    number: int, search: Search[PriorProblem], coordinates: FloatArray, values: Evaluation
 ) -> Solution:
     """Return the end of a search as a solution."""
-    problem, targets = search.problem, values.evaluation.targets
+    problem, targets = search.problem, values.targets
     point = problem.points_at(coordinates)
     data, prior = costs_at(problem, coordinates, targets)
     computed = values(point[None])
@@ -209,7 +209,7 @@ def _solution(
     limits = slice(targets.count, targets.count + limited)
     slopes = np.delete(smooth_jacobian(search, coordinates), limits, axis=0)
     return Solution(
-        parameter_map=values.evaluation.parameter_map,
+        parameter_map=values.parameter_map,
         targets=targets,
         start=number,
         point=point,

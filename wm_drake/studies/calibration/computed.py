@@ -44,7 +44,10 @@ class Computed:
 
 @dataclass
 class Evaluation:
-    """Function that computes values at points.
+    """Function that computes values at points, and stores them in a ledger if it has one.
+
+    Values that are in the ledger already are not computed again. Evaluations of other loads and
+    responses have other keys.
 
     Attributes:
         parameter_map: Map from points to machines.
@@ -56,6 +59,7 @@ class Evaluation:
     parameter_map: ParameterMap
     targets: Targets
     workers: int | None = None
+    ledger: Ledger | None = None
 
     @cached_property
     def _responses(self) -> ComputedResponses:
@@ -64,12 +68,31 @@ class Evaluation:
 
     def __call__(self, points: FloatArray) -> Computed:
         """Return the values at points (point, quantity), in SI units."""
+        ledger = self.ledger
+        if ledger is None:
+            return self._computed(points)
+        computes = [(t.load, t.gasket, t.of, t.response.name) for t in self.targets.responses]
+        part = key_of(loads=self.targets.loads, responses=computes)
+        keys = [key_of(point=point, part=part) for point in points]
+        new = [index for index, key in enumerate(keys) if key not in ledger]
+        for begin in range(0, len(new), AT_ONCE):
+            rows = new[begin : begin + AT_ONCE]
+            computed = self._computed(points[rows])
+            results = {
+                keys[i]: Result({kind: getattr(computed, kind)[row] for kind in _KINDS})
+                for row, i in enumerate(rows)
+            }
+            ledger.put_all(results)
+        stored = [ledger.get(key).values for key in keys]
+        return Computed(*(np.array([values[kind] for values in stored]) for kind in _KINDS))
+
+    def _computed(self, points: FloatArray) -> Computed:
         try:
             return self._run(points)
         except InputError:  # only the runs show that a machine needs a shorter step
             if len(points) == 1:
                 return self._empty(1)
-            return _joined([self(half) for half in np.array_split(points, 2)])
+            return _joined([self._computed(half) for half in np.array_split(points, 2)])
 
     def check(self, point: FloatArray) -> None:
         """Check that the machine at a point can be run.
@@ -144,36 +167,6 @@ class Evaluation:
             yield index, setup
 
 
-@dataclass(frozen=True)
-class StoredValues:
-    """Evaluation that stores its values in a ledger.
-
-    Values that are in the ledger already are not computed again. Evaluations of other loads and
-    responses have other keys.
-    """
-
-    evaluation: Evaluation
-    ledger: Ledger
-
-    def __call__(self, points: FloatArray) -> Computed:
-        """Return the values at points (point, quantity), in SI units."""
-        targets = self.evaluation.targets
-        computes = [(t.load, t.gasket, t.of, t.response.name) for t in targets.responses]
-        part = key_of(loads=targets.loads, responses=computes)
-        keys = [key_of(point=point, part=part) for point in points]
-        new = [index for index, key in enumerate(keys) if key not in self.ledger]
-        for begin in range(0, len(new), AT_ONCE):
-            rows = new[begin : begin + AT_ONCE]
-            computed = self.evaluation(points[rows])
-            results = {
-                keys[i]: Result({kind: getattr(computed, kind)[row] for kind in _KINDS})
-                for row, i in enumerate(rows)
-            }
-            self.ledger.put_all(results)
-        stored = [self.ledger.get(key).values for key in keys]
-        return Computed(*(np.array([values[kind] for values in stored]) for kind in _KINDS))
-
-
 def _joined(parts: list[Computed]) -> Computed:
     return Computed(*(np.concatenate([getattr(part, kind) for part in parts]) for kind in _KINDS))
 
@@ -194,10 +187,9 @@ class Runner:
     workers: int | None = None
     report: Callable[[int, int, float], None] = lambda search, evaluations, best: None
 
-    def values(self, parameter_map: ParameterMap, targets: Targets) -> StoredValues:
+    def values(self, parameter_map: ParameterMap, targets: Targets) -> Evaluation:
         """Return the function that computes and stores the values at points."""
-        evaluation = Evaluation(self.machine, parameter_map, targets, self.workers)
-        return StoredValues(evaluation, self.ledger)
+        return Evaluation(self.machine, parameter_map, targets, self.workers, self.ledger)
 
     def report_of(self, search: int) -> Callable[[int, float], None]:
         """Return the report of a search with a number."""

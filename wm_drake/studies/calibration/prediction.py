@@ -14,7 +14,7 @@ from wm_drake.errors import check_known, input_error
 from wm_drake.parameters.free import FreeFile
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.calibration.calibration import Calibration, Plan, calibrate
-from wm_drake.studies.calibration.computed import Runner, StoredValues
+from wm_drake.studies.calibration.computed import Evaluation, Runner
 from wm_drake.studies.calibration.response_targets import ResponseTarget
 from wm_drake.studies.calibration.solutions import Solution
 from wm_drake.studies.calibration.targets import AMPLITUDE, Targets
@@ -150,7 +150,7 @@ def predict(
 
 
 def _predicted(
-    calibration: Calibration, values: StoredValues
+    calibration: Calibration, values: Evaluation
 ) -> tuple[FloatArray, FloatArray, float]:
     """Return `amplitude`, `responses` and `scatter` of a prediction.
 
@@ -180,9 +180,7 @@ def _predicted(
         generator.normal(0.0, scatter, computed.amplitude.shape)
     )
     noise = generator.normal(0.0, 1.0, computed.responses.shape)
-    responses = _scattered(
-        calibration, values.evaluation.targets.responses, computed.responses, noise
-    )
+    responses = _scattered(calibration, values.targets.responses, computed.responses, noise)
     tails = [50.0 * (1.0 - LEVEL), 50.0 * (1.0 + LEVEL)]
     pairs = (best.amplitude, amplitude), (best.responses, responses)
     ends = [np.vstack([at, np.nanpercentile(drawn, tails, axis=0)]) for at, drawn in pairs]
