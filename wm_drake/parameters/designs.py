@@ -5,7 +5,7 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from wm_drake.errors import input_error, nearest_names
+from wm_drake.errors import check_known, input_error
 from wm_drake.parameters.elements import Frozen
 from wm_drake.parameters.files import read_model
 from wm_drake.parameters.machine import MachineParameters
@@ -136,10 +136,8 @@ def check_loads(task: DesignTask, machine: MachineParameters) -> None:
     """Raise an InputError for a load that the machine does not have, or that is named twice."""
     for number, name in enumerate(task.loads):
         key = f"loads.{number}"
-        if name not in machine.loads:
-            hint = nearest_names(name, machine.loads)
-            message = f"'{name}' is not a load of machine '{machine.name}'{hint}"
-            raise input_error(message, key=key)
+        message = f"'{name}' is not a load of machine '{machine.name}'"
+        check_known(name, machine.loads, message, key=key)
         if name in task.loads[:number]:
             raise input_error(f"'{name}' is named twice", key=key)
 

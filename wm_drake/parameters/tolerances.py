@@ -8,7 +8,7 @@ from typing import Literal, Self, TypeAlias
 import numpy as np
 from pydantic import Field, model_validator
 
-from wm_drake.errors import input_error, nearest_names
+from wm_drake.errors import check_known
 from wm_drake.parameters.elements import Frozen
 from wm_drake.parameters.files import read_model
 from wm_drake.parameters.machine import MachineParameters
@@ -244,10 +244,9 @@ def load_tolerances(name_or_path: str | Path = "laundry") -> Tolerances:
 def check_load(tolerances: Tolerances, machine: MachineParameters, path: Path) -> None:
     """Raise an InputError if the machine lacks the load that a tolerance file names."""
     name = tolerances.load
-    if name and name not in machine.loads:
-        hint = nearest_names(name, machine.loads)
-        message = f"'{name}' is not a load of machine '{machine.name}'{hint}"
-        raise input_error(message, where=str(path), key="load")
+    if name:
+        message = f"'{name}' is not a load of machine '{machine.name}'"
+        check_known(name, machine.loads, message, where=str(path), key="load")
 
 
 def load_limits(path: Path) -> tuple[Limit, ...]:

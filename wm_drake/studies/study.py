@@ -31,7 +31,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from wm_drake.errors import input_error, nearest_names
+from wm_drake.errors import check_known
 from wm_drake.registry import Registry
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
@@ -142,8 +142,8 @@ MOST_ROWS = 12
 
 def _chosen(name: str, known: Sequence[str], kind: str) -> str:
     """Return the name of a table or figure of a result; the first one if the name is empty."""
-    if not known or (name and name not in known):
-        raise input_error(f"no {kind} '{name}'{nearest_names(name, known)}", key=kind)
+    if name or not known:
+        check_known(name, known, f"no {kind} '{name}'", key=kind)
     return name or known[0]
 
 
