@@ -79,8 +79,33 @@ class StaticResult(Result):
         return [measures_shown(list(self.curves.values())).terminal("Quasi-static tests")]
 
     def page(self, facts: Facts) -> str:
-        """Return the page."""
-        return static_page(self.title, list(self.curves.values()), facts)
+        """Return the page as text of one self-contained HTML file."""
+        curves = list(self.curves.values())
+        fallen = [
+            f"{_name(c)}: the mean of loading and unloading falls by up to {c.fallen:.3g} "
+            f"{units_of(c.rotates).force_unit}; a table cannot fall, so it stays level there."
+            for c in curves
+            if c.fallen > 0.02 * float(np.max(np.abs(c.elastic)))
+        ]
+        shown = picture(
+            static_figure(curves),
+            "Force over displacement and moment over angle of each axis.",
+            "Force over displacement and moment over angle (form of [B] Fig. 6): samples, loading "
+            "and unloading, and their mean, which is the table. The offset of the instrument is "
+            "removed.",
+        )
+        return SectionedPage(
+            f"Quasi-static tests of {self.title}",
+            summary(curves),
+            [
+                Section("curves", "Force and hysteresis", (shown,)),
+                Section("measures", "Values", tables=(measures_shown(curves),)),
+            ],
+            [("Files", ", ".join(loop.path for c in curves for loop in c.loops)), *facts.rows()],
+            warnings=fallen,
+            about=f"{len(curves)} {'axis' if len(curves) == 1 else 'axes'}.",
+            method=METHOD,
+        ).html()
 
 
 def _source(curve: StaticCurve) -> str:
@@ -158,34 +183,6 @@ METHOD = (
     "taken off. The mean curve is shifted to zero force at zero displacement, the rest position of "
     "the component."
 )
-
-
-def static_page(title: str, curves: Sequence[StaticCurve], facts: Facts) -> str:
-    """Return the page as text of one self-contained HTML file. `title`: of the component."""
-    fallen = [
-        f"{_name(c)}: the mean of loading and unloading falls by up to {c.fallen:.3g} "
-        f"{units_of(c.rotates).force_unit}; a table cannot fall, so it stays level there."
-        for c in curves
-        if c.fallen > 0.02 * float(np.max(np.abs(c.elastic)))
-    ]
-    shown = picture(
-        static_figure(curves),
-        "Force over displacement and moment over angle of each axis.",
-        "Force over displacement and moment over angle (form of [B] Fig. 6): samples, loading and "
-        "unloading, and their mean, which is the table. The offset of the instrument is removed.",
-    )
-    return SectionedPage(
-        f"Quasi-static tests of {title}",
-        summary(curves),
-        [
-            Section("curves", "Force and hysteresis", (shown,)),
-            Section("measures", "Values", tables=(measures_shown(curves),)),
-        ],
-        [("Files", ", ".join(loop.path for c in curves for loop in c.loops)), *facts.rows()],
-        warnings=fallen,
-        about=f"{len(curves)} {'axis' if len(curves) == 1 else 'axes'}.",
-        method=METHOD,
-    ).html()
 
 
 def summary(curves: Sequence[StaticCurve]) -> str:

@@ -160,31 +160,6 @@ def mstv_of_c() -> DamperNumbers:
     return parameters
 
 
-def table2_page(result: "Table2Result", facts: Facts) -> str:
-    """Return the page as text of one self-contained HTML file."""
-    drift = picture(
-        drift_figure(result.fits),
-        "Fitted and printed k1 and c1 over frequency, one line per amplitude.",
-        "k1 and c1 of the Coulomb model over frequency: fitted (lines) and printed in [C] Table 2 "
-        "(crosses).",
-    )
-    claim = (
-        '[C] section 4.1: "the friction forces decrease when the exciting frequencies become '
-        'higher".'
-    )
-    return SectionedPage(
-        "Coulomb model fitted to each test ([C] Table 2)",
-        " ".join(sentences(result.fits, result.trend)),
-        [
-            Section("comparison", "Fitted against printed", (drift,)),
-            Section("fits", "Fitted and printed values", tables=(fits_shown(result.fits),)),
-            Section("trend", "Force over frequency", tables=(_trends(result.trend),), text=claim),
-        ],
-        facts.rows(),
-        about=result.source,
-    ).html()
-
-
 def sentences(fits: pd.DataFrame, trend: FrequencyTrend) -> list[str]:
     """Return what the fits and the trends say, in words."""
     texts = []
@@ -283,7 +258,6 @@ class Table2Result(Result):
     fits: pd.DataFrame
     trend: FrequencyTrend
     source: str
-    page = table2_page
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """Return the fits."""
@@ -297,6 +271,30 @@ class Table2Result(Result):
     def terminal(self) -> list[TerminalTable | str]:
         """Return the fits, and what they and the trend say."""
         return [fits_shown(self.fits).terminal(self.source), *sentences(self.fits, self.trend)]
+
+    def page(self, facts: Facts) -> str:
+        """Return the page as text of one self-contained HTML file."""
+        drift = picture(
+            drift_figure(self.fits),
+            "Fitted and printed k1 and c1 over frequency, one line per amplitude.",
+            "k1 and c1 of the Coulomb model over frequency: fitted (lines) and printed in [C] "
+            "Table 2 (crosses).",
+        )
+        claim = (
+            '[C] section 4.1: "the friction forces decrease when the exciting frequencies become '
+            'higher".'
+        )
+        return SectionedPage(
+            "Coulomb model fitted to each test ([C] Table 2)",
+            " ".join(sentences(self.fits, self.trend)),
+            [
+                Section("comparison", "Fitted against printed", (drift,)),
+                Section("fits", "Fitted and printed values", tables=(fits_shown(self.fits),)),
+                Section("trend", "Force over frequency", tables=(_trends(self.trend),), text=claim),
+            ],
+            facts.rows(),
+            about=self.source,
+        ).html()
 
 
 class Table2Task(Task):
