@@ -234,6 +234,8 @@ CASES = {  # command -> arguments, message, more files
     "study tolerance t.yaml --profile p.yaml --subset 0 --out out": [
         ("--samples 100", "--samples: 100 is not a power of two"),
         ("--sensitivity 100", "--sensitivity: 100 is not a power of two"),
+        ("--subset 1001", "--subset: 1001 is not allowed; allowed are 0 and multiples of 10 from 100"),
+        ("--samples 16 --sensitivity 32", "--sensitivity: 32 is more than the samples, 16"),
         ("--samples 16", "low must be below high", {"t.yaml": TOLERANCES.replace("high: 12 kg", "high: 0.5 kg")}),
         ("--samples 16", "lower end is not allowed", {"t.yaml": TOLERANCES.replace("low: 1 kg", "low: -1 kg")}),
         ("--samples 16", "t.yaml", {"t.yaml": TOLERANCES.replace("unbalances.0.mass", "unbalances.0.mas")}),

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import scipy.io
+from lab_writers import WRITERS
 
 from wm_drake.errors import InputError
 from wm_drake.parameters import SpinProfile
@@ -20,53 +21,16 @@ PROFILE = SpinProfile(
     time=(0.0, 20.0), speed=(10.0, 10.0), regions=(Region(name="all", begin=2.0, end=18.0),)
 )
 G = 9.80665
+SUFFIXES = [*WRITERS, ".mat"]
 
 
-def write_mdf(path, channels):
-    asammdf = pytest.importorskip("asammdf")
-    file = asammdf.MDF(version="4.10")
-    for name, (values, unit) in channels.items():
-        file.append([asammdf.Signal(samples=values, timestamps=TIME, name=name, unit=unit)])
-    file.save(path, overwrite=True)
-    file.close()
-
-
-def write_tdms(path, channels):
-    nptdms = pytest.importorskip("nptdms")
-    clock = {"wf_increment": TIME[1], "wf_start_offset": 0.0}
-    with nptdms.TdmsWriter(path) as writer:
-        writer.write_segment(
-            [
-                nptdms.ChannelObject("machine", name, values, {**clock, "unit_string": unit})
-                for name, (values, unit) in channels.items()
-            ]
-        )
-
-
-def write_uff(path, channels):
-    pyuff = pytest.importorskip("pyuff")
-    common = dict.fromkeys(
-        ("func_type", "rsp_node", "rsp_dir", "ref_node", "ref_dir", "abscissa_spacing"), 1
-    ) | dict.fromkeys(("orddenom_spec_data_type", "z_axis_spec_data_type", "binary"), 0)
-    sets = [
-        pyuff.prepare_58(
-            **common, id1=name, abscissa_min=0.0, abscissa_inc=TIME[1], num_pts=len(TIME),
-            ord_data_type=4, abscissa_spec_data_type=17, abscissa_axis_units_lab="s",
-            ordinate_spec_data_type=8, ordinate_axis_units_lab=unit, data=values, x=TIME,
-        )
-        for name, (values, unit) in channels.items()
-    ]  # fmt: skip
-    pyuff.UFF(str(path)).write_sets(sets, mode="overwrite")
-
-
-def write_mat(path, channels):
-    """Write a MAT file, which has no units: accelerations are in m/s^2, the speed in rpm."""
-    factors = {"g": G}
-    values = {name: value * factors.get(unit, 1.0) for name, (value, unit) in channels.items()}
-    scipy.io.savemat(path, {"time": TIME, **values})
-
-
-WRITERS = {".mf4": write_mdf, ".tdms": write_tdms, ".uff": write_uff, ".mat": write_mat}
+def write(path, channels):
+    """Write a file; MAT has no units: accelerations are in m/s^2 there, the speed in rpm."""
+    if path.suffix == ".mat":
+        values = {n: value * (G if unit == "g" else 1.0) for n, (value, unit) in channels.items()}
+        scipy.io.savemat(path, {"time": TIME, **values})
+    else:
+        WRITERS[path.suffix](path, TIME, channels)
 
 
 def write_csv(path, columns):
@@ -89,20 +53,20 @@ def by_csv(tmp_path_factory):
     return read_accelerations(folder, LABELS, PROFILE)
 
 
-@pytest.mark.parametrize("suffix", WRITERS)
+@pytest.mark.parametrize("suffix", SUFFIXES)
 def test_accelerations_of_a_laboratory_are_those_of_a_csv(tmp_path, by_csv, suffix):
     channels = {n: (a / G, "g") for n, a in zip(NAMES, ACCELERATIONS, strict=True)}
-    WRITERS[suffix](tmp_path / f"front{suffix}", channels)
+    write(tmp_path / f"front{suffix}", channels)
     found = read_accelerations(tmp_path, LABELS, PROFILE)
     np.testing.assert_allclose(found, by_csv, rtol=2e-5)  # UFF keeps single precision
     expected = 2.0 / (2.0 * np.pi * 3.0) ** 2 / np.sqrt(2.0)  # m
     assert float(found[0, 0, 0, 0]) == pytest.approx(expected, rel=0.02)
 
 
-@pytest.mark.parametrize("suffix", WRITERS)
+@pytest.mark.parametrize("suffix", SUFFIXES)
 def test_a_record_of_a_laboratory_is_that_of_a_csv(tmp_path, suffix):
     path = tmp_path / f"run{suffix}"
-    WRITERS[suffix](path, {"speed_rpm": (SPEED, "rpm"), "Xr": (1e3 * ACCELERATIONS[0], "mm")})
+    write(path, {"speed_rpm": (SPEED, "rpm"), "Xr": (1e3 * ACCELERATIONS[0], "mm")})
     write_csv(
         tmp_path / "run.csv", {"time_s": TIME, "speed_rpm": SPEED, "Xr": 1e3 * ACCELERATIONS[0]}
     )
@@ -114,7 +78,7 @@ def test_a_record_of_a_laboratory_is_that_of_a_csv(tmp_path, suffix):
 
 def test_wrong_files_are_refused(tmp_path):
     path = tmp_path / "front.mat"
-    write_mat(path, {"S1_x": (ACCELERATIONS[0], "g")})
+    write(path, {"S1_x": (ACCELERATIONS[0], "g")})
     with pytest.raises(InputError, match="has no channel 'S1_y'; its channels are time, S1_x"):
         read_accelerations(tmp_path, LABELS, PROFILE)
     (tmp_path / "front.csv").write_text("time_s\n")
@@ -142,8 +106,8 @@ def test_channels_are_chosen_by_name(tmp_path, suffix):
         named = {name.replace(" ", "_"): value for name, value in named.items()}
     names = dict(zip(NAMES, named, strict=False))
     clock = {"time": "Clock"} if suffix == ".csv" else {}
-    write = {".csv": write_named_csv, **WRITERS}[suffix]
-    write(tmp_path / f"front{suffix}", named)
+    write_it = write_named_csv if suffix == ".csv" else write
+    write_it(tmp_path / f"front{suffix}", named)
     plain = tmp_path / "plain"
     plain.mkdir()
     write_csv(plain / "front.csv", {"time_s": TIME, **dict(zip(NAMES, ACCELERATIONS, strict=True))})
