@@ -56,7 +56,7 @@ from wm_drake.studies.calibration.response_targets import with_deviations
 from wm_drake.studies.calibration.solutions import Solution, percents_of, solved_machine
 from wm_drake.studies.calibration.study import FITS, fewer_table, prediction_table
 from wm_drake.studies.calibration.targets import EXPERIMENT, Targets, targets_of
-from wm_drake.studies.gasket.published import published_for
+from wm_drake.studies.gasket.screening import published_for
 
 REFERENCE, EARLIER = "reference", "reference_2026_11"
 ADAMS_SOURCE = "Adams model of [B]"

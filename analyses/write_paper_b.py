@@ -30,8 +30,7 @@ from wm_drake.parameters.free import FreeFile
 from wm_drake.studies.calibration.calibration import Plan, calibrate, identity_of
 from wm_drake.studies.calibration.computed import Runner
 from wm_drake.studies.calibration.targets import EXPERIMENT, targets_of
-from wm_drake.studies.gasket.published import Published, published_for
-from wm_drake.studies.gasket.screening import Screening
+from wm_drake.studies.gasket.screening import Published, Screening, published_for
 
 REFERENCE = "reference"
 MACHINES = (REFERENCE, "reference_2026_11")

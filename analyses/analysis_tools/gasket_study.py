@@ -17,8 +17,7 @@ from wm_drake.parameters import (
 )
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.doe.design import make_design
-from wm_drake.studies.gasket.published import Published
-from wm_drake.studies.gasket.screening import Screening, run_screening
+from wm_drake.studies.gasket.screening import Published, Screening, run_screening
 from wm_drake.studies.gasket.study import GasketTrials
 
 ORTHOGONAL = 243

@@ -6,7 +6,7 @@ import pytest
 
 from wm_drake.errors import InputError
 from wm_drake.model.bodies import SDF_FOLDER
-from wm_drake.model.sdf_shapes import check_shapes
+from wm_drake.model.sdf_files import check_shapes
 
 CUBE = "".join(f"v {x} {y} {z}\n" for x in (0, 0.1) for y in (0, 0.1) for z in (0, 0.1)) + "f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\n"  # fmt: skip
 

@@ -23,9 +23,8 @@ from pydrake.multibody.tree import (
 
 from wm_drake.errors import InputError, Problem, check_known, input_error, nearest_names, shortened
 from wm_drake.model.rotor import set_rotor
-from wm_drake.model.sdf_files import LARGEST_SDF, check_mass_properties, sdf_roots
+from wm_drake.model.sdf_files import LARGEST_SDF, check_mass_properties, check_shapes, sdf_roots
 from wm_drake.model.sdf_names import frame_problems, sdf_names
-from wm_drake.model.sdf_shapes import check_shapes
 from wm_drake.model.state_layout import CABINET, CARRIER
 from wm_drake.parameters import BodyOverride, InertiaMatrix, Load, MachineParameters, with_value
 from wm_drake.parameters.cabinet import Cabinet

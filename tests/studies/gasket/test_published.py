@@ -22,8 +22,7 @@ from wm_drake.studies.gasket import tables as texts
 from wm_drake.studies.gasket.findings import level_zero_text, summary
 from wm_drake.studies.gasket.page import GasketResult
 from wm_drake.studies.gasket.proposal import Compared
-from wm_drake.studies.gasket.published import published_for
-from wm_drake.studies.gasket.screening import Responses, Words, run_screening
+from wm_drake.studies.gasket.screening import Responses, Words, published_for, run_screening
 from wm_drake.studies.gasket.study import GasketTrials, run_level_zero
 from wm_drake.studies.gasket.tables import as_plain_data
 

@@ -24,8 +24,7 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.variation import number_at
 from wm_drake.report.formatting import significant
 from wm_drake.simulation.measures.responses import GAP
-from wm_drake.studies.gasket.published import NOT_PUBLISHED, Published
-from wm_drake.studies.gasket.screening import Screening
+from wm_drake.studies.gasket.screening import NOT_PUBLISHED, Published, Screening
 from wm_drake.studies.gasket.study import LevelZero
 from wm_drake.studies.gasket.surface import Check, Setting, Surfaces, model_rows
 

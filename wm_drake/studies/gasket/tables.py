@@ -14,12 +14,14 @@ from wm_drake.studies.doe.anova import AnovaTable, Term
 from wm_drake.studies.doe.coding import MODELS
 from wm_drake.studies.doe.design import Design
 from wm_drake.studies.gasket.proposal import NOT_COMPARED, Compared
-from wm_drake.studies.gasket.published import FAR, NOT_PUBLISHED, Published
 from wm_drake.studies.gasket.screening import (
+    FAR,
     LEADING_INTERACTION_PERCENT,
     LEADING_MAIN_PERCENT,
     LEVELS,
+    NOT_PUBLISHED,
     Label,
+    Published,
     Screening,
     Words,
     contributions,

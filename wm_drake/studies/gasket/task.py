@@ -38,8 +38,12 @@ from wm_drake.studies.gasket.proposal import (
     is_level_zero,
     settings_of,
 )
-from wm_drake.studies.gasket.published import Published, published_for
-from wm_drake.studies.gasket.screening import check_degrees_of_freedom, run_screening
+from wm_drake.studies.gasket.screening import (
+    Published,
+    check_degrees_of_freedom,
+    published_for,
+    run_screening,
+)
 from wm_drake.studies.gasket.study import GasketTrials, Run, run_level_zero
 from wm_drake.studies.gasket.surface import Check, Setting, run_check, surfaces
 from wm_drake.studies.inputs import existing_file, pairs_of, selected_cases
