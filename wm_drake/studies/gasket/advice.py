@@ -11,8 +11,9 @@ from wm_drake.parameters import FactorLevels
 from wm_drake.report.formatting import MISSING, listed, percent
 from wm_drake.report.table import Column, Group, Row, Table, table_of
 from wm_drake.simulation.measures.responses import GAP
+from wm_drake.studies.doe.coding import LEVELS
 from wm_drake.studies.gasket.proposal import MOST_LOSS, Change, Compared, Proposal
-from wm_drake.studies.gasket.screening import LEVELS, Screening, Words
+from wm_drake.studies.gasket.screening import Screening, Words
 from wm_drake.studies.gasket.tables import digits
 
 ADVICE_PERCENT = 5.0

@@ -10,10 +10,10 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.report import figure as fig
 from wm_drake.report.formatting import number
 from wm_drake.studies.doe.anova import AnovaTable, Term
+from wm_drake.studies.doe.coding import LEVELS
 from wm_drake.studies.gasket.screening import (
     LEADING_INTERACTION_PERCENT,
     LEADING_MAIN_PERCENT,
-    LEVELS,
     Label,
     Screening,
     Words,

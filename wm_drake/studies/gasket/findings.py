@@ -7,13 +7,13 @@ import numpy as np
 from wm_drake.report.formatting import CONSEQUENCE, listed, number, percent
 from wm_drake.simulation.measures.responses import GAP
 from wm_drake.studies.doe.anova import Term
+from wm_drake.studies.doe.coding import LEVELS
 from wm_drake.studies.gasket.proposal import NOT_COMPARED, Compared
 from wm_drake.studies.gasket.screening import (
     FAR,
     LEADING_INTERACTION_PERCENT,
     LEADING_MAIN_PERCENT,
     LEAST_PREDICTED_R2,
-    LEVELS,
     Label,
     Published,
     Screening,

@@ -17,7 +17,7 @@ from wm_drake.parameters import FactorLevels, PublishedResults, PublishedTerm
 from wm_drake.parameters.published import CONSTANT, INTERACTIONS, MAIN, OF_RESPONSE, RANGE
 from wm_drake.report.formatting import significant
 from wm_drake.studies.doe.anova import AnovaTable, Combination, Term, anova
-from wm_drake.studies.doe.coding import efficiency
+from wm_drake.studies.doe.coding import LEVELS, efficiency
 from wm_drake.studies.doe.design import Design
 
 LEADING_MAIN_PERCENT = 10.0
@@ -217,9 +217,6 @@ def mean_at(
         )
         means[tuple(level[name] for name in factors)] = table.constant + deviation
     return means
-
-
-LEVELS = (-1, 0, 1)
 
 
 class Words:

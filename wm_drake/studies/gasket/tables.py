@@ -11,14 +11,13 @@ from wm_drake.parameters.published import CONSTANT, INTERACTIONS, MAIN, RANGE
 from wm_drake.report.formatting import MISSING, number, percent, plain, significant
 from wm_drake.report.table import Column, Group, Row, Table, line, table_of
 from wm_drake.studies.doe.anova import AnovaTable, Term
-from wm_drake.studies.doe.coding import MODELS
+from wm_drake.studies.doe.coding import LEVELS, MODELS
 from wm_drake.studies.doe.design import Design
 from wm_drake.studies.gasket.proposal import NOT_COMPARED, Compared
 from wm_drake.studies.gasket.screening import (
     FAR,
     LEADING_INTERACTION_PERCENT,
     LEADING_MAIN_PERCENT,
-    LEVELS,
     NOT_PUBLISHED,
     Label,
     Published,

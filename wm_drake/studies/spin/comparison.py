@@ -108,8 +108,6 @@ class ComparisonResult(Result):
             "differences": self.differences.to_dict("records"),
         }
         if self.effect is not None:
-            from wm_drake.studies.spin.comparison import steady_window
-
             tree["effect"] = self.effect.to_dict("records")
             tree["steady_window_s"] = steady_window(first.results[0].case.profile)
         return dict(plain(tree))  # JSON has no NaN

@@ -27,6 +27,7 @@ from wm_drake.engines.compiled.slopes import SlopedDerivative
 from wm_drake.model.machine import Setup
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.modes.linearisation import check_fixed_cabinet
+from wm_drake.studies.modes.shapes import ANGLE_ARM
 from wm_drake.studies.steady.kinematics import kinematics_of
 from wm_drake.studies.steady.series import Series, write_derivative
 
@@ -39,9 +40,6 @@ reference machine, displacements deviate by up to 0.29, 0.08, 0.04, 0.016 and 0.
 
 SAMPLES = 128
 """Default number of samples of a period."""
-
-ANGLE_ARM = 0.25
-"""Length that converts angles to displacements: about the radius of the tub. [m]"""
 
 HOLD = 1e-6
 """Rate at which held numbers of the state return to their values at rest. [1/s]
