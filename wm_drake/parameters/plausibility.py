@@ -97,7 +97,7 @@ def unusual_numbers(
             continue
         outside = [number for number in shown if not usual.low <= number <= usual.high]
         if outside:
-            name = unit.shown.replace("*", " ")
+            name = unit.label
             remarks.append(
                 Problem(
                     "",

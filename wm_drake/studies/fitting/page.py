@@ -20,11 +20,6 @@ FIXED = "fixed"
 """Remark on a number that was not searched."""
 
 
-def unit_text(unit: Unit) -> str:
-    """Return the display unit of a number for reading."""
-    return unit.shown.replace("*", " ")
-
-
 def estimate_rows(fit: Fit) -> list[dict[str, Any]]:
     """Return value, interval, unit and bounds of each unknown, in its unit for reading."""
     rows = []
@@ -110,7 +105,7 @@ def correlations_table(fit: Fit) -> Table:
         correlation = fit.covariance / np.outer(deviation, deviation)
     groups = []
     for u, s, row in zip(fit.problem.unknowns, deviation, correlation, strict=True):
-        size = f"{u.unit.from_si(s):.3g} {unit_text(u.unit)}" if np.isfinite(s) else MISSING
+        size = u.unit.reading(s, 3) if np.isfinite(s) else MISSING
         groups.append(line(u.name, [size, *(number(value, 2) for value in row)]))
     caption = "Standard deviations of the unknowns, and the correlations between them."
     names = [u.name for u in fit.problem.unknowns]

@@ -18,10 +18,8 @@ from wm_drake.parameters import (
     quantities,
     shipped_machines,
 )
-from wm_drake.parameters.units import Unit
 from wm_drake.studies.components import Target
 from wm_drake.studies.fitting.fit import Fit
-from wm_drake.studies.fitting.page import unit_text
 from wm_drake.studies.identification.models import ANGLE, FORCE, LENGTH, TORQUE, ComponentModel
 
 FIXED = "fixed by the user in an identification"
@@ -136,7 +134,7 @@ def _entries(fit: Fit, model: ComponentModel) -> tuple[dict[str, Any], list[str]
                     "the table's rises there are not to be trusted."
                 )
         elif name in model.fixed:
-            entries[name] = {"value": _text(value, units[name], 10), "source": FIXED}
+            entries[name] = {"value": units[name].reading(value, 10), "source": FIXED}
         elif name in estimates:
             estimate, unit = estimates[name], units[name]
             if not estimate.determined:
@@ -149,8 +147,8 @@ def _entries(fit: Fit, model: ComponentModel) -> tuple[dict[str, Any], list[str]
                 text += f"; at the {estimate.at_bound} bound of the search"
             elif np.isfinite(estimate.lower):
                 lower, upper = unit.from_si(estimate.lower), unit.from_si(estimate.upper)
-                text += f"; 95 % interval {lower:.4g} to {upper:.4g} {unit_text(unit)}"
-            entries[name] = {"value": _text(value, unit, 7), "source": text}
+                text += f"; 95 % interval {lower:.4g} to {upper:.4g} {unit.label}"
+            entries[name] = {"value": unit.reading(value, 7), "source": text}
     return entries, comments
 
 
@@ -168,10 +166,6 @@ def _keeps_law(entries: Mapping[str, Any], target: Component) -> bool:
     return "law" not in entries or entries["law"] == getattr(target.parameters, "law", None)
 
 
-def _text(value: float, unit: Unit, digits: int) -> str:
-    return f"{unit.from_si(value):.{digits}g} {unit_text(unit)}"
-
-
 def _normalised(fit: Fit) -> float:
     return float(np.sqrt(np.mean([test.normalised**2 for test in fit.tests])))
 
@@ -186,7 +180,7 @@ def table_entry(value: Mapping[str, Sequence[float]], source: str) -> dict[str, 
     """Return a table in SI as an entry of a YAML file, with its source."""
     units = {"displacement": LENGTH, "angle": ANGLE, "force": FORCE, "torque": TORQUE}
     shown = {
-        name: f"({', '.join(f'{unit.from_si(x):.6g}' for x in given)}) {unit_text(unit)}"
+        name: f"({', '.join(f'{unit.from_si(x):.6g}' for x in given)}) {unit.label}"
         for name, given in value.items()
         for unit in [units[name]]
     }

@@ -40,7 +40,7 @@ def front_figure(front: ParetoFront) -> fig.Figure:
         front: Front with at least one design and two objectives.
     """
     goals = front.designs.objectives
-    labels = [f"{g.given.quantity}, {g.unit.shown.replace('*', ' ')}" for g in goals]
+    labels = [f"{g.given.quantity}, {g.unit.label}" for g in goals]
     chosen, picked = sorted(set(front.chosen.values())), first_picked(front)
     panels = []
     for pair in pairs_of(front):

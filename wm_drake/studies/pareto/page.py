@@ -21,7 +21,6 @@ from wm_drake.studies.pareto.figures import (
     history_figure,
     pairs_of,
 )
-from wm_drake.studies.pareto.problem import Goal
 from wm_drake.studies.pareto.study import COMPROMISE, FRESH, Envelopes, ParetoFront, Promise
 from wm_drake.studies.study import Facts, Result
 
@@ -142,7 +141,7 @@ def summary(
     for goal, value, nominal in zip(
         designs.objectives, front.objectives[number], front.nominal_objectives, strict=True
     ):
-        unit = _unit(goal)
+        unit = goal.unit.label
         parts.append(
             f"{goal.given.quantity} {_text(value)} {unit} in place of {_text(nominal)} {unit}"
         )
@@ -173,10 +172,6 @@ def _growth(shown: Envelopes, number: int) -> str:
 
 def _text(value: float) -> str:
     return significant(float(value)) if np.isfinite(value) else MISSING
-
-
-def _unit(goal: Goal) -> str:
-    return goal.unit.shown.replace("*", " ")
 
 
 def _front(front: ParetoFront) -> Picture:
@@ -217,10 +212,11 @@ def _rows(front: ParetoFront) -> list[list[tuple[str, str, str]]]:
     for number in range(len(front.objectives)):
         objectives, constraints = front.goals(number)
         rows = [
-            ("objective", g.given.quantity, f"{_text(value)} {_unit(g)}") for g, value in objectives
+            ("objective", g.given.quantity, f"{_text(value)} {g.unit.label}")
+            for g, value in objectives
         ]
         for goal, value in constraints:
-            unit = _unit(goal)
+            unit = goal.unit.label
             side = "at most" if goal.is_small_better else "at least"
             margin = abs(value - goal.limit)
             text = f"{_text(value)} {unit}, {side} {_text(goal.limit)} {unit}"
@@ -251,7 +247,7 @@ def _promises(kept: Sequence[Promise]) -> Table:
     """Return what the chosen designs of a robust front promised and keep on fresh samples."""
     groups = []
     for p in kept:
-        cells: list[Value] = [f"{p.goal.given.quantity}, {p.goal.given.over}", _unit(p.goal)]
+        cells: list[Value] = [f"{p.goal.given.quantity}, {p.goal.given.over}", p.goal.unit.label]
         cells += [with_interval(v.value, v.lower, v.upper) for v in (p.promised, p.fresh)]
         groups.append(line(p.design, [*cells, p.is_kept], "alarm" if p.is_kept is False else ""))
     caption = (

@@ -11,12 +11,7 @@ from wm_drake.report.formatting import MISSING, number
 from wm_drake.report.page import Picture, Section, SectionedPage, picture
 from wm_drake.report.table import Column, Table, line, table_of
 from wm_drake.simulation.records import versions
-from wm_drake.studies.fitting.page import (
-    estimate_rows,
-    search_facts,
-    undetermined_sentences,
-    unit_text,
-)
+from wm_drake.studies.fitting.page import estimate_rows, search_facts, undetermined_sentences
 from wm_drake.studies.spin_cycle.figures import bars_figure, profile_figure
 from wm_drake.studies.spin_cycle.page import case_description
 from wm_drake.studies.spin_cycle.study import average_errors, region_errors
@@ -167,7 +162,7 @@ def values_table(result: SpinIdentification) -> pd.DataFrame:
 
 
 def _with_unit(value: float | None, unit: Unit) -> str:
-    return MISSING if value is None else f"{unit.from_si(value):.5g} {unit_text(unit)}"
+    return MISSING if value is None else unit.reading(value, 5)
 
 
 def errors(result: SpinIdentification) -> Table:
