@@ -153,6 +153,14 @@ def difference(machine, *, load=LOAD, **options):
     return BothEngines(machine, machine.set_up(load, **options)).largest_difference(STATES)
 
 
+def check_alike(found, expected, variables, part):
+    """Check that variables of a record are those of another, up to a part of the largest value."""
+    assert list(found.data_vars) == list(expected.data_vars)
+    for name in variables:
+        size = float(np.abs(expected[name]).max())
+        np.testing.assert_allclose(found[name], expected[name], atol=part * size, err_msg=name)
+
+
 def redrawn(tmp_path, sdf, *changes):
     """Return the path of a shipped SDF with pieces of its text replaced; frames and shapes stay.
 

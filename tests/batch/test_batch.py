@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from machines_of_each_kind import machines_of_each_kind
+from side_by_side import check_runs_alone, recorded
 from simple_machines import with_gasket_tables
 
 from wm_drake.batch import SimulationInterrupted, simulate_many, work_items
@@ -22,6 +23,7 @@ from wm_drake.simulation.measures import measure
 from wm_drake.simulation.runs import DivergenceWarning, simulate
 
 RUN_UP = SpinProfile(time=(0.0, 12.0), speed=(5.0, 30.0))
+SHORT = SpinProfile(time=(0.0, 2.0), speed=(5.0, 25.0))
 LONGER = SpinProfile(time=(0.0, 11.0, 13.0), speed=(5.0, 28.0, 28.0))
 VARIABLES = (
     "detergent_displacement", "gasket_force", "gasket_moment", "amplitude", "critical_speed",
@@ -109,13 +111,6 @@ def test_scenes_are_used_again_and_change_no_bit(machine, cases):
         simulate_many(built, cases[:9], measures=["gap", "contacts"], workers=1), first
     )
     assert len(built.cache.scenes) == count
-
-
-def recorded(machine, cases):
-    """Run cases side by side; return their records in the order of the cases, and the table."""
-    ended = []
-    table = simulate_many(machine, cases, histories=True, finished=ended.append)
-    return [run.record for run in sorted(ended, key=lambda run: run.number)], table
 
 
 def silent(machine, case):
@@ -283,34 +278,19 @@ def test_machines_whose_tables_are_elsewhere_do_not_run_side_by_side(reference):
         parameters = MachineParameters.model_validate(reference.model_dump() | {"gasket": gasket})
         cases.append(Case(axis, reference.loads["middle"], RUN_UP, parameters=parameters))
     built = build_machine(cases[0].parameters)
-    told = simulate_many(built, cases)
-    for index, case in enumerate(cases):
-        alone = measure(simulate(built, case))
-        np.testing.assert_allclose(
-            told.gasket_force.values[index], alone.gasket_force.values, rtol=1e-9
-        )
+    told = check_runs_alone(built, cases)
     assert abs(told.gasket_force.values[0] / told.gasket_force.values[1] - 1.0).max() > 0.01
 
 
-def test_machines_with_tables_and_sponges_run_side_by_side():
-    for name in (
-        "gasket tables",
-        "spring tables",
-        "free_stroke",
-        "two bushings, five dampers of three laws",
-    ):
-        parameters = machines_of_each_kind()[name]
-        built = build_machine(parameters)
-        jobs = [
-            Case(load, parameters.loads[load], RUN_UP) for load in ("middle", "counter", "back")
-        ]
-        told = simulate_many(built, jobs)
-        for index, job in enumerate(jobs):
-            alone = measure(simulate(built, job))
-            for variable in VARIABLES:
-                np.testing.assert_allclose(
-                    told[variable].values[index], getattr(alone, variable).values, rtol=1e-9
-                )
+@pytest.mark.parametrize(
+    "name",
+    ["gasket tables", "spring tables", "free_stroke", "two bushings, five dampers of three laws"],
+)
+def test_machines_with_tables_and_sponges_run_side_by_side(name):
+    parameters = machines_of_each_kind()[name]
+    loads = ("middle", "counter", "back")
+    cases = [Case(load, parameters.loads[load], SHORT) for load in loads]
+    check_runs_alone(build_machine(parameters), cases)
 
 
 def test_overlapping_batches_leave_the_turns_of_threads_alone(machine, cases):

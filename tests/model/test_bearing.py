@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from element_ports import own_outputs
 from machine_with_bearing import BEARING, stiffer, with_bearing
+from side_by_side import check_runs_alone
 from simple_machines import DAMPING, STIFFNESS, constant_speed, isotropic_machine, unbalance
 from tube_energy import Motion, dense_run, energies_of_bodies, energy_of_bushings, still
 
@@ -21,7 +22,6 @@ from wm_drake.parameters import (
     with_value,
 )
 from wm_drake.simulation.cases import Case
-from wm_drake.simulation.measures import measure
 from wm_drake.simulation.runs import simulate
 from wm_drake.studies.description.description import natural_modes
 
@@ -198,26 +198,7 @@ def test_runs_side_by_side_are_those_of_simulate(name):
             ("imperfections.residual_imbalance.mass", 0.1),
         )
     ]
-    ended = []
-    table = simulate_many(
-        whirling,
-        cases,
-        measures=["extremes", "amplitudes", "regions"],
-        histories=True,
-        finished=ended.append,
-    )
-    for index, case in enumerate(cases):
-        record = simulate(whirling, case)
-        alone = measure(record)
-        for name in ("detergent_displacement", "gasket_force", "gasket_moment", "amplitude"):
-            np.testing.assert_allclose(
-                table[name].values[index], getattr(alone, name).values, rtol=1e-9
-            )
-        for name in ("drum_displacement", "drum_tilt", "bearing_force", "motor_torque"):
-            size = float(np.abs(record[name]).max())
-            np.testing.assert_allclose(
-                ended[index].record[name], record[name], rtol=0.0, atol=1e-9 * size
-            )
+    table = check_runs_alone(whirling, cases)
     assert table.amplitude.values[0] != pytest.approx(table.amplitude.values[1], rel=1e-6)
 
 
