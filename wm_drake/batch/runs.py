@@ -15,7 +15,7 @@ from wm_drake.elements.mount import WRENCH_SIZE
 from wm_drake.elements.sensor import POINT_SIZE
 from wm_drake.elements.state_map import RATES_SIZE
 from wm_drake.engines.compiled.mechanics import DRUM_ANGLE, DRUM_RATE, STATE_SIZE
-from wm_drake.engines.compiled.run import integrate_runs
+from wm_drake.engines.compiled.run import RunLanes, integrate_runs
 from wm_drake.engines.compiled.samples import trajectory_of
 from wm_drake.engines.schedule import Schedule, schedule_of
 from wm_drake.engines.trajectory import (
@@ -154,7 +154,8 @@ class Runner:
         if key.stepping.integrator == "midpoint":
             matrices = [item.numbers.stepping.relaxation for item in work_items]
             relaxation = self._lanes("relaxation", matrices)
-        for done in integrate_runs(schedule, one_derivative, key.layout, p, x, samples, relaxation):
+        lanes = RunLanes(p, x, samples, relaxation)
+        for done in integrate_runs(schedule, one_derivative, key.layout, lanes):
             if self.stopped.is_set():
                 return []
             progress(done)

@@ -1,6 +1,7 @@
 """Run machines through a spin profile with the compiled engine, at fixed steps."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,6 +22,23 @@ from wm_drake.parameters.types import FloatArray
 
 PAUSE_STEPS = 4000
 """Steps between two checks for divergence and reports of progress: some milliseconds."""
+
+
+@dataclass(frozen=True)
+class RunLanes:
+    """Flat arrays of lanes of `WIDTH` runs side by side.
+
+    Attributes:
+        p: Packed numbers.
+        x: States; the integration advances them.
+        samples: The samples, as `integrate_lanes` writes them.
+        relaxation: Matrices of the midpoint rule; None for other integrators.
+    """
+
+    p: FloatArray
+    x: FloatArray
+    samples: FloatArray
+    relaxation: FloatArray | None = None
 
 
 def run_compiled(
@@ -58,27 +76,26 @@ def run_compiled(
     begin = initial_state(setup, profile)
     schedule = schedule_of(profile, step, period, layout.control_period)
     rows, size = len(schedule.time), len(begin) + layout.states.begins.rates
-    samples = aligned(rows * size * WIDTH)
-    numbers, x = (aligned(len(values) * WIDTH) for values in (p, begin))
-    fill_lanes(numbers, [p])
-    fill_lanes(x, [begin])
-    one_derivative = Stepping(integrator, step).one_derivative(schedule)
-    matrices = None
+    relaxed = None
     if integrator == "midpoint" and relaxation is not None:
-        matrices = fill_lanes(aligned(len(relaxation) * WIDTH), [relaxation])
-    for done in integrate_runs(schedule, one_derivative, layout, numbers, x, samples, matrices):
+        relaxed = _in_lanes(relaxation)
+    lanes = RunLanes(_in_lanes(p), _in_lanes(begin), aligned(rows * size * WIDTH), relaxed)
+    one_derivative = Stepping(integrator, step).one_derivative(schedule)
+    for done in integrate_runs(schedule, one_derivative, layout, lanes):
         progress(done)
-    return trajectory_of(samples.reshape(rows, size, WIDTH)[..., 0].copy(), schedule, p, layout)
+    samples = lanes.samples.reshape(rows, size, WIDTH)[..., 0].copy()
+    return trajectory_of(samples, schedule, p, layout)
+
+
+def _in_lanes(values: FloatArray) -> FloatArray:
+    return fill_lanes(aligned(len(values) * WIDTH), [values])
 
 
 def integrate_runs(
     schedule: Schedule,
     one_derivative: np.ndarray,
     layout: Layout,
-    p: FloatArray,
-    x: FloatArray,
-    samples: FloatArray,
-    relaxation: FloatArray | None = None,
+    lanes: RunLanes,
 ) -> Iterator[float]:
     """Integrate `WIDTH` runs side by side until the schedule ends or all of them have diverged.
 
@@ -89,16 +106,13 @@ def integrate_runs(
         schedule: The steps.
         one_derivative: Whether each step takes one derivative; see `Stepping`.
         layout: What the runs have in common.
-        p, x: Packed numbers and states as flat arrays of lanes; x is advanced.
-        samples: Flat array of lanes for the samples, as `integrate` writes them; NaN behind the
-            last one that was reached.
-        relaxation: Matrices of the midpoint rule as a flat array of lanes; None for others.
+        lanes: Their numbers; samples behind the last one that was reached become NaN.
 
     Yields:
         The fraction done, after each `PAUSE_STEPS` steps.
     """
-    advance = _advance(schedule, one_derivative, layout, p, x, samples, relaxation)
-    by_sample = samples.reshape(len(schedule.time), -1, WIDTH)
+    advance = _advance(schedule, one_derivative, layout, lanes)
+    by_sample = lanes.samples.reshape(len(schedule.time), -1, WIDTH)
     done, steps, last, diverged = 0, len(schedule.step), 0, False
     while done < steps and not diverged:
         begin, done = done, min(done + PAUSE_STEPS, steps)
@@ -113,20 +127,18 @@ def _advance(
     schedule: Schedule,
     one_derivative: np.ndarray,
     layout: Layout,
-    p: FloatArray,
-    x: FloatArray,
-    samples: FloatArray,
-    relaxation: FloatArray | None,
+    lanes: RunLanes,
 ) -> Callable[[int, int], None]:
     """Return the function that integrates from one number of a step to another.
 
     Arguments as for `integrate_runs`.
     """
-    sizes, elements = (len(x) // WIDTH, layout.states.begins.inputs), layout.elements
-    if relaxation is None:
+    p, x, samples, elements = lanes.p, lanes.x, lanes.samples, layout.elements
+    sizes = len(x) // WIDTH, layout.states.begins.inputs
+    if lanes.relaxation is None:
         work, steps = work_arrays(*sizes), (*schedule.steps, one_derivative)
         return lambda begin, end: integrate_lanes(steps, begin, end, p, elements, x, work, samples)
     middle = midpoint_work(*sizes)
     return lambda begin, end: integrate_midpoint_lanes(
-        schedule.steps[:4], begin, end, p, elements, relaxation, x, middle, samples
+        schedule.steps[:4], begin, end, p, elements, lanes.relaxation, x, middle, samples
     )
