@@ -112,25 +112,6 @@ class AnovaTable:
         return pd.Series({term.name: term.percent for term in self.terms})
 
 
-@dataclass(frozen=True)
-class LeastSquares:
-    """A least-squares fit of a model with a constant to a response.
-
-    Attributes:
-        params: Coefficients.
-        fitted, residual: (trials,) Fitted value and residual.
-        ssr, total: Sums of squares about the fit and about the mean.
-        df_resid: Degrees of freedom of the residual.
-    """
-
-    params: FloatArray
-    fitted: FloatArray
-    residual: FloatArray
-    ssr: float
-    total: float
-    df_resid: int
-
-
 class SumCoding:
     """Sum-coded columns of a design: main effects and, optionally, two-factor interactions."""
 
@@ -167,37 +148,24 @@ class SumCoding:
         self._grid_size = math.prod(len(values) for values in self.levels.values())
 
     @functools.cached_property
-    def _inverse(self) -> FloatArray:
+    def inverse(self) -> FloatArray:
         """The pseudoinverse of the columns, which all responses share."""
         return np.asarray(np.linalg.pinv(self.matrix))
 
     @functools.cached_property
     def covariance(self) -> FloatArray:
         """The covariance of the coefficients for responses of unit variance."""
-        return np.asarray(self._inverse @ self._inverse.T)
+        return np.asarray(self.inverse @ self.inverse.T)
 
     @functools.cached_property
     def leverages(self) -> FloatArray:
         """The diagonal of the hat matrix. (trials,)"""
-        return np.asarray(np.einsum("ij,ji->i", self.matrix, self._inverse))
+        return np.asarray(np.einsum("ij,ji->i", self.matrix, self.inverse))
 
     @functools.cached_property
-    def _rank(self) -> int:
+    def rank(self) -> int:
+        """The number of coefficients that the design determines."""
         return int(np.linalg.matrix_rank(self.matrix))
-
-    def fit(self, response: FloatArray) -> LeastSquares:
-        """Return the least-squares fit to a response (trials,)."""
-        params = self._inverse @ response
-        fitted = self.matrix @ params
-        residual = response - fitted
-        return LeastSquares(
-            params,
-            fitted,
-            residual,
-            float(residual @ residual),
-            float(np.sum((response - response.mean()) ** 2)),
-            len(response) - self._rank,
-        )
 
     def residual_variance(self, sum_sq: float) -> float:
         """Return the variance over the grid of what the model does not explain.
@@ -253,49 +221,49 @@ def anova(
 
 
 def _analysed(coding: SumCoding, response: FloatArray) -> AnovaTable:
-    fit = coding.fit(response)
-    noise = fit.ssr / fit.df_resid if fit.df_resid > 0 else np.nan
+    params = coding.inverse @ response
+    fitted = coding.matrix @ params
+    residual = response - fitted
+    df_resid, ssr = len(response) - coding.rank, float(residual @ residual)
+    total = float(np.sum((response - response.mean()) ** 2))
+    noise = ssr / df_resid if df_resid > 0 else np.nan
     effects = {
-        term: coding.effects(term, fit.params[columns]) for term, columns in coding.columns.items()
+        term: coding.effects(term, params[columns]) for term, columns in coding.columns.items()
     }
     variances = {
         term: float(np.mean(np.square(list(values.values())))) for term, values in effects.items()
     }
-    unexplained = coding.residual_variance(fit.ssr)
+    unexplained = coding.residual_variance(ssr)
     variance = sum(variances.values()) + (0.0 if math.isnan(unexplained) else unexplained)
     # the variance of a constant response is not 0 but about 1e-32 of its square, by rounding
     scale = 100.0 / variance if variance > 1e-20 * float(np.mean(response**2)) else np.nan
     terms = []
     for term, columns in coding.columns.items():
-        df, coefficients = columns.stop - columns.start, fit.params[columns]
+        df, coefficients = columns.stop - columns.start, params[columns]
         sum_sq = float(
             coefficients @ np.linalg.solve(coding.covariance[columns, columns], coefficients)
         )
         with np.errstate(divide="ignore", invalid="ignore"):
             f = float(np.divide(sum_sq / df, noise))
-        p = float(fdtrc(df, fit.df_resid, f)) if fit.df_resid > 0 else np.nan
+        p = float(fdtrc(df, df_resid, f)) if df_resid > 0 else np.nan
         terms.append(Term(term, scale * variances[term], sum_sq, df, f, p, effects[term]))
-    adjusted_r2 = math.nan
-    if math.isfinite(scale) and fit.df_resid:
-        adjusted_r2 = 1.0 - (len(response) - 1) / fit.df_resid * (fit.ssr / fit.total)
+    adjusted_r2 = predicted_r2 = math.nan
+    if math.isfinite(scale) and df_resid:
+        adjusted_r2 = 1.0 - (len(response) - 1) / df_resid * (ssr / total)
+        if np.max(coding.leverages) <= LARGEST_LEVERAGE:  # else a trial alone determines a term
+            press = np.sum((residual / (1.0 - coding.leverages)) ** 2)
+            predicted_r2 = 1.0 - float(press) / total
     return AnovaTable(
-        constant=float(fit.params[0]),
+        constant=float(params[0]),
         terms=tuple(terms),
         main_percent=sum(term.percent for term in terms if len(term.factors) == 1),
         interaction_percent=sum(term.percent for term in terms if len(term.factors) > 1),
         residual_percent=scale * unexplained,
-        total_sum_sq=fit.total,
-        residual_sum_sq=fit.ssr,
-        residual_df=fit.df_resid,
+        total_sum_sq=total,
+        residual_sum_sq=ssr,
+        residual_df=df_resid,
         adjusted_r2=adjusted_r2,
-        predicted_r2=_predicted_r2(fit, coding.leverages) if math.isfinite(scale) else math.nan,
-        fitted=fit.fitted,
-        residual=fit.residual,
+        predicted_r2=predicted_r2,
+        fitted=fitted,
+        residual=residual,
     )
-
-
-def _predicted_r2(fit: LeastSquares, leverages: FloatArray) -> float:
-    """Return the predicted R2 of a fit; NaN if a trial alone determines a coefficient."""
-    if fit.df_resid == 0 or np.max(leverages) > LARGEST_LEVERAGE:
-        return math.nan
-    return 1.0 - float(np.sum((fit.residual / (1.0 - leverages)) ** 2)) / fit.total

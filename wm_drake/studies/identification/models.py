@@ -6,6 +6,7 @@ steepest loop by orders of magnitude. They are where a search begins; the user m
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -274,7 +275,7 @@ def damper_model(
     known = {**(kept or {}), **given.fixed}
     numbers = unknowns_of(searched, _units(registered), scale, given.bounds, known)
     unknowns = (*numbers, *_free_rises(rises, given))
-    fields = _Fields({"law": law, **known}, unknowns, tables)
+    fields = partial(_fields_at, known={"law": law, **known}, unknowns=unknowns, tables=tables)
     return ComponentModel(
         law,
         unknowns,
@@ -378,7 +379,7 @@ def bushing_model(
     unknowns = (*numbers, *_free_rises(rises, given))
     known = {name: value for name, value in given.fixed.items() if name in searched}
     _check_fixed(base, {unknown.name: unknown.upper for unknown in numbers} | known)
-    fields = _Fields(given.fixed, unknowns, tables)
+    fields = partial(_fields_at, known=given.fixed, unknowns=unknowns, tables=tables)
 
     def bench(point: FloatArray) -> Bench:
         kind = TorqueTable if about else ForceTable
@@ -422,25 +423,23 @@ _OF_RUBBER = {4, 5, 6, 7}
 """Which of `_bushing_kinds` belong to branches of rubber."""
 
 
-@dataclass(frozen=True)
-class _Fields:
-    """Fields of a component at a point (p,): known numbers, then unknown ones, then tables.
+def _fields_at(
+    point: FloatArray,
+    known: Mapping[str, Any],
+    unknowns: Sequence[Unknown],
+    tables: Sequence[MonotoneCurve],
+) -> dict[str, Any]:
+    """Return the fields of a component at a point (p,): known numbers, unknown ones, then tables.
 
     Rises of the tables are known or unknown numbers.
     """
-
-    known: Mapping[str, Any]
-    unknowns: tuple[Unknown, ...]
-    tables: tuple[MonotoneCurve, ...]
-
-    def __call__(self, point: FloatArray) -> dict[str, Any]:
-        named = {u.name: float(value) for u, value in zip(self.unknowns, point, strict=True)}
-        fields = {**self.known, **named}
-        curves = {
-            table.name: table.curve(np.array([fields.pop(rise.name) for rise in table.unknowns]))
-            for table in self.tables
-        }
-        return {**fields, **curves}
+    named = {u.name: float(value) for u, value in zip(unknowns, point, strict=True)}
+    fields = {**known, **named}
+    curves = {
+        table.name: table.curve(np.array([fields.pop(rise.name) for rise in table.unknowns]))
+        for table in tables
+    }
+    return {**fields, **curves}
 
 
 def _free_rises(rises: Sequence[Unknown], given: Given) -> tuple[Unknown, ...]:

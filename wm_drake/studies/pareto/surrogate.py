@@ -5,6 +5,7 @@ objectives and constraints of the designs that were evaluated. NSGA finds the fr
 surfaces, and the designs of it that lie farthest from known objectives are evaluated next.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -113,7 +114,7 @@ def _next_designs(known: _Known, count: int, settings: SearchSettings) -> FloatA
     others = random.random((count, size))
     if len(rows) <= size + 1:  # too few for a linear trend
         return others
-    surfaces = _Surfaces(known.x[rows], np.hstack([known.f[rows], known.g[rows]]))
+    surfaces = _surfaces(known.x[rows], np.hstack([known.f[rows], known.g[rows]]))
     objectives = known.problem.objectives
 
     def predicted(x: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -169,16 +170,10 @@ def _spread(
     return np.array(chosen)
 
 
-class _Surfaces:
-    """Interpolating surfaces of several values of a design."""
-
-    def __init__(self, x: FloatArray, values: FloatArray) -> None:
-        """Fit designs (n, d) and their values (n, m)."""
-        self.low, self.scale = values.mean(axis=0), np.maximum(values.std(axis=0), 1e-12)
-        scaled = (values - self.low) / self.scale
-        # a little smoothing keeps designs that differ by rounding only from upsetting the fit
-        self.surface = RBFInterpolator(x, scaled, kernel="cubic", degree=1, smoothing=1e-6)
-
-    def __call__(self, x: FloatArray) -> FloatArray:
-        """Return the values of designs. (n, m)"""
-        return np.asarray(self.low + self.scale * self.surface(x))
+def _surfaces(x: FloatArray, values: FloatArray) -> Callable[[FloatArray], FloatArray]:
+    """Return interpolating surfaces of designs (n, d) and their values (n, m)."""
+    low, scale = values.mean(axis=0), np.maximum(values.std(axis=0), 1e-12)
+    scaled = (values - low) / scale
+    # a little smoothing keeps designs that differ by rounding only from upsetting the fit
+    surface = RBFInterpolator(x, scaled, kernel="cubic", degree=1, smoothing=1e-6)
+    return lambda at: np.asarray(low + scale * surface(at))
