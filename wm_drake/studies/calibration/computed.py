@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,11 +20,8 @@ from wm_drake.studies.calibration.targets import Targets
 AT_ONCE = 100
 """Largest number of points that are evaluated before their values are stored."""
 
-_KINDS = ("amplitude", "power_mean", "responses", "preload", "elongation")
 
-
-@dataclass(frozen=True)
-class Computed:
+class Computed(NamedTuple):
     """Computed values at points. They are NaN if no machine exists at a point or a run diverged.
 
     Attributes:
@@ -79,12 +77,12 @@ class Evaluation:
             rows = new[begin : begin + AT_ONCE]
             computed = self._computed(points[rows])
             results = {
-                keys[i]: Result({kind: getattr(computed, kind)[row] for kind in _KINDS})
+                keys[i]: Result({kind: array[row] for kind, array in computed._asdict().items()})
                 for row, i in enumerate(rows)
             }
             ledger.put_all(results)
         stored = [ledger.get(key).values for key in keys]
-        return Computed(*(np.array([values[kind] for values in stored]) for kind in _KINDS))
+        return Computed(**{k: np.array([values[k] for values in stored]) for k in Computed._fields})
 
     def _computed(self, points: FloatArray) -> Computed:
         try:
@@ -92,7 +90,8 @@ class Evaluation:
         except InputError:  # only the runs show that a machine needs a shorter step
             if len(points) == 1:
                 return self._empty(1)
-            return _joined([self._computed(half) for half in np.array_split(points, 2)])
+            halves = [self._computed(half) for half in np.array_split(points, 2)]
+            return Computed(*map(np.concatenate, zip(*halves, strict=True)))
 
     def check(self, point: FloatArray) -> None:
         """Check that the machine at a point can be run.
@@ -165,10 +164,6 @@ class Evaluation:
                 continue
             context = setup.context
             yield index, setup
-
-
-def _joined(parts: list[Computed]) -> Computed:
-    return Computed(*(np.concatenate([getattr(part, kind) for part in parts]) for kind in _KINDS))
 
 
 @dataclass(frozen=True)

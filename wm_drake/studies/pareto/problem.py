@@ -156,10 +156,6 @@ class MachineDesigns:
         """Objectives, then constraints."""
         return (*self.objectives, *self.constraints)
 
-    def with_scores(self, scores: FloatArray) -> "MachineDesigns":
-        """Return the same designs with other samples."""
-        return replace(self, scores=scores)
-
     @property
     def responses(self) -> tuple[Response, ...]:
         """Responses that the goals need."""

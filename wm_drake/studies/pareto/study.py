@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -149,7 +149,7 @@ def promises(front: ParetoFront, run: Run, seed: int) -> list[Promise]:
     count, size = scores.shape
     fresh, _ = base_samples(size, FRESH * count, seed + OTHER_SEED)
     before = designs.scenario_values(points, run)
-    after = designs.with_scores(fresh).scenario_values(points, run)
+    after = replace(designs, scores=fresh).scenario_values(points, run)
     promises = []
     for name, number in front.chosen.items():
         row = numbers.index(number)

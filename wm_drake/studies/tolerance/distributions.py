@@ -44,11 +44,6 @@ class Marginal:
         )
         return np.exp(quantiles) if self.is_log else quantiles
 
-    def ends(self) -> tuple[float, float]:
-        """Return the smallest and the largest value that any sample has."""
-        low, high = self.values(np.array([-LARGEST_SCORE, LARGEST_SCORE]))
-        return float(low), float(high)
-
 
 def normal(
     mean: float, deviation: float, low: float = -math.inf, high: float = math.inf
