@@ -179,14 +179,6 @@ def test_held_out_tables_of_b_are_judged_by_leading_factors_points_and_intervals
     assert table["counter: mean difference of 13 contributions"].ours == "11.9 points"
 
 
-def test_part_ends_with_tables_without_verdicts(amplitude_table):
-    table = pd.DataFrame({"free quantities": ["40"], "cost": ["137"]})
-    text = compared(amplitude_rows(amplitude_table), FITTED, {"Fewer": "Why."}, {"Fewer": table})
-    assert text.endswith(
-        "\n### Fewer\n\nWhy.\n\n| free quantities | cost |\n| --- | --- |\n| 40 | 137 |\n"
-    )
-
-
 def test_part_counts_and_explains(amplitude_table):
     rows = amplitude_rows(amplitude_table)
     assert counts(rows).iloc[0].tolist() == [1, 2, 0]
