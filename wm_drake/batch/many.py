@@ -19,6 +19,7 @@ from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case, case_of, notice_jumping_friction
 from wm_drake.simulation.feet import cabinet_of
+from wm_drake.simulation.first_call import compile_in_two_processes
 from wm_drake.simulation.measures import MEASURES, Variable
 from wm_drake.simulation.measures.labels import LABELS
 from wm_drake.simulation.steps import checked_integrator, checked_step
@@ -90,6 +91,7 @@ def simulate_many(
         {'run': 2, 'sensor': 6}
     """
     machine = machine_of(machine)
+    compile_in_two_processes(machine.parameters)
     chosen = tuple(dict.fromkeys(measures))
     if any("feet" in MEASURES.find(name, key="measures").needs for name in chosen):
         cabinet_of(machine.parameters)

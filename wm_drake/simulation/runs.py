@@ -13,6 +13,7 @@ from wm_drake.engines.trajectory import Trajectory
 from wm_drake.errors import check_known
 from wm_drake.model.build import AnyMachine, machine_of
 from wm_drake.simulation.cases import Case, case_of, notice_jumping_friction
+from wm_drake.simulation.first_call import compile_in_two_processes
 from wm_drake.simulation.records import Record, as_record
 from wm_drake.simulation.steps import checked_integrator, checked_step
 
@@ -76,6 +77,8 @@ def simulate(
     """
     machine = machine_of(machine)
     check_known(engine, ENGINES, f"no engine '{engine}'", key="engine")
+    if engine == DEFAULT_ENGINE:
+        compile_in_two_processes(machine.parameters)
     step = checked_step(machine.parameters, step)
     if isinstance(case, str):
         case = case_of(machine.parameters, case)

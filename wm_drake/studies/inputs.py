@@ -214,7 +214,10 @@ def existing_file(path: Path, option: str) -> Path:
 
 
 def build_checked(file: str, parameters: "MachineParameters") -> "Machine":
-    """Return the built machine, after the checks of `built_with_problems`."""
+    """Return the built machine, after the checks of `built_with_problems`, to run it."""
+    from wm_drake.simulation.first_call import compile_in_two_processes
+
+    compile_in_two_processes(parameters)
     return built_with_problems(file, parameters)[0]
 
 

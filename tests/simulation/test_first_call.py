@@ -1,0 +1,46 @@
+"""Test the second process of the first call after an installation."""
+
+import os
+import pickle
+import subprocess
+import sys
+
+import pytest
+
+from wm_drake.simulation import first_call
+
+
+@pytest.mark.slow
+def test_the_second_process_compiles_what_reads_samples_and_no_integration(reference, tmp_path):
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    command = [sys.executable, "-m", "wm_drake.simulation.first_call"]
+    subprocess.run(command, input=pickle.dumps(reference), env=environment, check=True)
+    compiled = {path.name.split("-")[0] for path in tmp_path.rglob("*.nbi")}
+    functions = {name.rpartition(".")[2] for name in compiled}
+    readers = {"mount_wrench_history", "output_history", "torque_history", "filter_both_ways"}
+    assert readers <= functions
+    assert "integrate_lanes" not in functions
+
+
+def test_one_process_is_started_for_a_folder_of_compiled_code(reference, tmp_path, monkeypatch):
+    ended = [sys.executable, "-c", "import sys; sys.stdin.buffer.read()"]
+    real, started = subprocess.Popen, []
+
+    def start(_command, **options):
+        started.append(real(ended, **options))
+        return started[-1]
+
+    monkeypatch.setattr(first_call, "CACHE_FOLDER", str(tmp_path))
+    monkeypatch.setattr(os, "cpu_count", lambda: 2)
+    monkeypatch.setattr(subprocess, "Popen", start)
+    first_call.compile_in_two_processes(reference)
+    first_call.compile_in_two_processes(reference)
+    assert [process.wait() for process in started] == [0]
+
+
+def test_no_process_is_started_without_a_folder_or_a_second_core(reference, monkeypatch):
+    monkeypatch.setattr(subprocess, "Popen", None)
+    monkeypatch.setattr(first_call, "CACHE_FOLDER", "")
+    first_call.compile_in_two_processes(reference)
+    monkeypatch.setattr(os, "cpu_count", lambda: 1)
+    first_call.compile_in_two_processes(reference)

@@ -1,0 +1,78 @@
+"""The first run after an installation compiles in two processes; this module is the second one.
+
+A run compiles the integration, for some ten seconds, and then what reads its samples. The second
+process compiles the latter meanwhile. Files of compiled code take it from process to process, so
+nobody waits for it, and nothing is lost if it ends early.
+"""
+
+import atexit
+import contextlib
+import os
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from wm_drake.compiler.compilation import CACHE_FOLDER
+from wm_drake.engines.compiled.packing import initial_state, pack
+from wm_drake.engines.compiled.samples import trajectory_of
+from wm_drake.engines.schedule import schedule_of
+from wm_drake.model.build import build_machine
+from wm_drake.parameters import Load, MachineParameters, SpinProfile
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.measures import measure
+from wm_drake.simulation.records import as_record
+
+STANDSTILL = SpinProfile(time=(0.0, 10.0), speed=(0.0, 0.0))
+"""Long enough for the filter of the displacements."""
+
+
+def compile_in_two_processes(parameters: MachineParameters) -> None:
+    """Start the second process, once for each folder of compiled code.
+
+    Args:
+        parameters: The machine that is about to run.
+    """
+    started = Path(CACHE_FOLDER, "second_process")
+    if not CACHE_FOLDER or (os.cpu_count() or 1) < 2:
+        return
+    try:
+        machine = pickle.dumps(parameters)
+        started.open("x").close()
+    except (OSError, pickle.PicklingError, AttributeError):  # started before, or a type of a script
+        return
+    second = subprocess.Popen(
+        [sys.executable, "-m", __name__],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    atexit.register(_end, second, started)
+    assert second.stdin is not None
+    with contextlib.suppress(OSError), second.stdin:
+        second.stdin.write(machine)
+
+
+def _end(second: "subprocess.Popen[bytes]", started: Path) -> None:
+    """End the second process if it still runs; the next run starts it again."""
+    if second.poll() is None:
+        second.terminate()
+        started.unlink(missing_ok=True)
+
+
+def compile_readers(parameters: MachineParameters) -> None:
+    """Compile what makes a record of samples and measures it, with samples at rest."""
+    setup = build_machine(parameters).set_up()
+    p, layout = pack(setup)
+    period = parameters.output_period
+    schedule = schedule_of(STANDSTILL, period, period, layout.control_period)
+    at_rest = np.pad(initial_state(setup, STANDSTILL), (0, layout.states.begins.rates))
+    samples = np.tile(at_rest, (len(schedule.time), 1))
+    trajectory = trajectory_of(samples, schedule, p, layout)
+    measure(as_record(setup, Case("at rest", Load(unbalances=()), STANDSTILL), trajectory))
+
+
+if __name__ == "__main__":
+    compile_readers(pickle.load(sys.stdin.buffer))
