@@ -34,8 +34,12 @@ from wm_drake.rigs import (
     measures_of,
 )
 from wm_drake.studies.rig.study import printed_table
-from wm_drake.studies.spin_cycle.study import SpinCycleResult, average_errors, run_spin_cycle
-from wm_drake.studies.spin_cycle.task import compiled_runs
+from wm_drake.studies.spin_cycle.study import (
+    SpinCycleResult,
+    average_errors,
+    compiled_runs,
+    run_spin_cycle,
+)
 
 MM = 1e-3
 CASES = ("2", "5", "11", "20", "29")

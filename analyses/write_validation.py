@@ -43,8 +43,7 @@ from wm_drake.studies.identification.table2 import (
 from wm_drake.studies.spin.comparison import effect_table
 from wm_drake.studies.spin.study import run_spin
 from wm_drake.studies.spin.tables import amplitude_table
-from wm_drake.studies.spin_cycle.study import run_spin_cycle
-from wm_drake.studies.spin_cycle.task import compiled_runs
+from wm_drake.studies.spin_cycle.study import compiled_runs, run_spin_cycle
 
 HERE = Path(__file__).parent
 REASONS, VERIFICATION = HERE / "validation_reasons.yaml", HERE / "verification.yaml"

@@ -15,8 +15,7 @@ from wm_drake.parameters.unbalance_cases import load_unbalance_cases
 from wm_drake.rigs import Harmonic, bushing_bench, damper_bench, force_loops
 from wm_drake.simulation.runs import simulate
 from wm_drake.studies.spin_cycle.measured import rms_table
-from wm_drake.studies.spin_cycle.study import run_spin_cycle
-from wm_drake.studies.spin_cycle.task import compiled_runs
+from wm_drake.studies.spin_cycle.study import compiled_runs, run_spin_cycle
 
 PAGES = [README, *(path for path in MANUAL if path.parent.name != "decisions")]
 SHELL = ("text", "bash", "sh")

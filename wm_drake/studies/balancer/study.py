@@ -13,7 +13,7 @@ must release them somewhere: further runs begin at such a speed, with the balls 
 import itertools
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -33,10 +33,7 @@ from wm_drake.simulation.steps import checked_step
 from wm_drake.studies.balancer.options import BalancerOptions
 from wm_drake.studies.inputs import quantities_of
 from wm_drake.studies.run import Executor
-from wm_drake.studies.study import Task
-
-if TYPE_CHECKING:
-    from wm_drake.studies.balancer.page import BalancerResult
+from wm_drake.studies.study import Result, Task
 
 MEASURES = ("amplitudes in regions",)
 """Measures of `simulate_many` that the study needs."""
@@ -389,7 +386,7 @@ class BalancerTask(Task):
         high, rate = RPM.from_si(self.high), RPM.from_si(self.rate)
         return {"run-up": f"to {high:g} rpm at {rate:g} rpm/s"}
 
-    def run(self, executor: Executor) -> "BalancerResult":
+    def run(self, executor: Executor) -> Result:
         """Run loads, rings and releases."""
         from wm_drake.studies.balancer.page import BalancerResult
 

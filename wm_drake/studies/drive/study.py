@@ -16,7 +16,7 @@ does: m r = |T_1 - J w'_1| / g. An appliance knows T from its current and w' fro
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -38,10 +38,7 @@ from wm_drake.simulation.cases import Case
 from wm_drake.studies.drive.options import DriveOptions
 from wm_drake.studies.inputs import selected_cases
 from wm_drake.studies.run import Executor
-from wm_drake.studies.study import Task
-
-if TYPE_CHECKING:
-    from wm_drake.studies.drive.page import DriveResult
+from wm_drake.studies.study import Result, Task
 
 MEASURES = ("drive",)
 """Measures of `simulate_many` that the study needs."""
@@ -317,7 +314,7 @@ class DriveTask(Task):
         """Return what determines the runs beside the machine."""
         return {"profile": self.cases[0].profile, "seed": str(self.options.seed)}
 
-    def run(self, executor: Executor) -> "DriveResult":
+    def run(self, executor: Executor) -> Result:
         """Find thresholds, draw the map for the load that needs most, and estimate unbalance."""
         from wm_drake.studies.drive.page import DriveResult
 

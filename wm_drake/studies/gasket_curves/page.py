@@ -22,8 +22,7 @@ from wm_drake.report.terminal import Printed
 from wm_drake.solid.curves import AXIAL, RADIAL, TILT, TWIST, Curve, Mesh, Motion, Point
 from wm_drake.solid.mesh import Ring, axes_at
 from wm_drake.solid.touching import Faces
-from wm_drake.studies.gasket_curves.machine import coupling
-from wm_drake.studies.gasket_curves.study import Checked
+from wm_drake.studies.gasket_curves.study import Checked, coupling
 from wm_drake.studies.rig.units import units_of
 from wm_drake.studies.study import Facts, Result
 

@@ -3,7 +3,7 @@
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -20,21 +20,20 @@ from wm_drake.parameters.units import Unit, plain_number
 from wm_drake.simulation.cases import Case
 from wm_drake.solid.curves import MOTIONS, Gasket, Mesh
 from wm_drake.solid.deformed import deformed
-from wm_drake.studies.gasket_curves.machine import (
+from wm_drake.studies.gasket_curves.study import (
     GasketStiffness,
+    check_gasket,
+    curve_values,
     damping_per_stiffness,
+    positive,
     stiffness_of,
     with_gasket,
 )
-from wm_drake.studies.gasket_curves.study import check_gasket, curve_values, positive
 from wm_drake.studies.gasket_geometry import drawings
 from wm_drake.studies.gasket_geometry.options import GeometryOptions
 from wm_drake.studies.inputs import pairs_of, selected_cases
 from wm_drake.studies.run import Executor
-from wm_drake.studies.study import Task
-
-if TYPE_CHECKING:
-    from wm_drake.studies.gasket_geometry.page import GeometryResult
+from wm_drake.studies.study import Result, Task
 
 MEASURES = ("amplitudes", "gap", "extremes")
 """Measures of the runs."""
@@ -241,7 +240,7 @@ class GeometryTask(Task):
             "seed": str(options.seed),
         }
 
-    def run(self, executor: Executor) -> "GeometryResult":
+    def run(self, executor: Executor) -> Result:
         """Compute all drawings, fit the surfaces, and verify the best drawing."""
         from wm_drake.studies.gasket_geometry.page import GeometryResult
 

@@ -34,8 +34,14 @@ from wm_drake.studies.fitting.problem import FitProblem, Measurement, Progress, 
 from wm_drake.studies.inputs import runnable_profile
 from wm_drake.studies.run import Executor
 from wm_drake.studies.spin_cycle.measured import rms_table
-from wm_drake.studies.spin_cycle.study import DIMS, average_errors, labels_of, runs_of
-from wm_drake.studies.spin_cycle.task import cases_of_table, measured_displacements
+from wm_drake.studies.spin_cycle.study import (
+    DIMS,
+    average_errors,
+    cases_of_table,
+    labels_of,
+    measured_displacements,
+    runs_of,
+)
 from wm_drake.studies.spin_identification.options import SpinIdentifyOptions
 from wm_drake.studies.study import Facts, Result, Task
 

@@ -27,7 +27,7 @@ from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.measures.responses import GAP, has_gap, known_responses, measures_of
 from wm_drake.simulation.steps import checked_step
 from wm_drake.studies.inputs import profile_of, selected_cases
-from wm_drake.studies.study import Task
+from wm_drake.studies.study import Result, Task
 from wm_drake.studies.tolerance.options import ToleranceOptions
 from wm_drake.studies.tolerance.shares import bound_if_none, share_of
 from wm_drake.studies.tolerance.study import CONTACTS
@@ -37,7 +37,6 @@ from wm_drake.studies.verdict.options import VerdictOptions
 if TYPE_CHECKING:
     from wm_drake.parameters.types import FloatArray
     from wm_drake.studies.run import Executor
-    from wm_drake.studies.verdict.page import VerdictResult
 
 MM = Unit("m", "mm")
 
@@ -303,7 +302,7 @@ class VerdictTask(Task):
         """Return what determines the runs."""
         return {**self.laundry.identity, "change": f"{self.options.change:g} %"}
 
-    def run(self, executor: "Executor") -> "VerdictResult":
+    def run(self, executor: "Executor") -> Result:
         """Run the loads, the changes, and the laundry before and after the best change."""
         from wm_drake.studies.verdict.page import VerdictResult
 
