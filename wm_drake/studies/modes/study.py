@@ -2,9 +2,10 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 
 from wm_drake.batch import simulate_many
@@ -27,9 +28,6 @@ from wm_drake.studies.modes.shapes import ANGLE_ARM, Mode, modes_of
 from wm_drake.studies.run import Executor
 from wm_drake.studies.study import Result, Task
 from wm_drake.studies.threads import on_one_thread
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 STUCK, SLIDING, AMPLITUDE = "stuck", "sliding", "amplitude"
 """Linearisations.
@@ -109,7 +107,7 @@ class MachineModes(NaturalModes):
         """Return the speeds at which the unbalance meets a mode with sliding friction. [rad/s]"""
         return np.array([c.speed for c in self.critical[SLIDING] if c.order == 1.0])
 
-    def to_dataframe(self) -> "pd.DataFrame":
+    def to_dataframe(self) -> pd.DataFrame:
         """Return a row for each mode of each linearisation, in units for reading."""
         from wm_drake.studies.modes.page import modes_frame
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
+import pandas as pd
 
 from wm_drake.batch.runs import Runner
 from wm_drake.batch.work_items import Preparation
@@ -37,8 +38,6 @@ from wm_drake.studies.spin.processes import can_start_processes, map_in_processe
 from wm_drake.studies.study import Facts, Result
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from wm_drake.studies.modes.study import NaturalModes
 
 _IN_PROCESSES = {"drake"}
@@ -159,7 +158,7 @@ class SpinResult(Result):
     def _name_of(self, case: CaseResult) -> str:
         return "_".join(filter(None, [self.files.part, case.case.name]))
 
-    def tables(self) -> "dict[str, pd.DataFrame]":
+    def tables(self) -> dict[str, pd.DataFrame]:
         """Return the amplitudes, and of a machine with rings of balls what they do."""
         from wm_drake.studies.spin.balance import balance_frame, ball_table
         from wm_drake.studies.spin.tables import banded_amplitudes

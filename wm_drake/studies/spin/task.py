@@ -3,7 +3,6 @@
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from wm_drake.errors import check_known, input_error, shortened
 from wm_drake.model.machine import Machine
@@ -11,6 +10,7 @@ from wm_drake.parameters import MachineParameters
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.runs import DEFAULT_ENGINE, ENGINES
 from wm_drake.studies.inputs import selected_cases
+from wm_drake.studies.run import Executor
 from wm_drake.studies.spin.comparison import (
     MOST_VARIANTS,
     ComparisonResult,
@@ -22,9 +22,6 @@ from wm_drake.studies.spin.comparison import (
 from wm_drake.studies.spin.options import SpinOptions
 from wm_drake.studies.spin.study import Comparison, Files, SpinResult, run_spin
 from wm_drake.studies.study import Task
-
-if TYPE_CHECKING:
-    from wm_drake.studies.run import Executor
 
 LONGEST_FILE_PART = 60
 """Largest number of characters of a variant in the name of a file."""
@@ -91,7 +88,7 @@ class SpinTask(Task):
             return machine
         return words if len(self.options.machine) == 1 else f"{machine}, {words}"
 
-    def run(self, executor: "Executor") -> SpinResult | ComparisonResult:
+    def run(self, executor: Executor) -> SpinResult | ComparisonResult:
         """Run all cases of all variants."""
         is_one, options = len(self.planned) == 1, self.options
         is_changed = options.sets or options.drive

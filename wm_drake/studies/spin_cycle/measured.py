@@ -15,7 +15,8 @@ from wm_drake.parameters.lab_signals import ACCELERATION, lab_signals
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.band import HIGH_PASS_HZ
 from wm_drake.simulation.vibration import high_passed, integrated_twice, region_rms
-from wm_drake.studies.spin_cycle.study import DIMS
+
+DIMS = ("case", "region", "accelerometer", "axis")
 
 RMS_COLUMNS = ["case", "region", "sensor", "axis", "rms_mm"]
 """Columns of a table of RMS displacements, as read by `read_rms` and returned by `rms_table`."""

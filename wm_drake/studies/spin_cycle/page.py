@@ -2,9 +2,10 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from wm_drake.parameters.unbalance_cases import UnbalanceCase
 from wm_drake.report.formatting import MM_PER_M, number, plain, slack_warning
@@ -25,9 +26,6 @@ from wm_drake.studies.spin_cycle.study import (
 )
 from wm_drake.studies.study import Facts, Result
 
-if TYPE_CHECKING:
-    import pandas as pd
-
 SHOWN_MASSES = ((0.4, 0.0, 0.0), (0.0, 0.4, 0.0), (0.4, 0.4, 180.0))
 """Front mass, rear mass and phase of the cases of [A] Figs. 24 to 26. [kg, kg, deg]"""
 
@@ -39,7 +37,7 @@ class SpinCycleReport(Result):
     result: SpinCycleResult
     engine: str
 
-    def tables(self) -> "dict[str, pd.DataFrame]":
+    def tables(self) -> dict[str, pd.DataFrame]:
         """Return RMS displacements, cases and, if measured, feet and drive."""
         result, drive = self.result, tables.drive_frame(self.result)
         shown = {"rms": rms_table(result.displacement), "cases": tables.case_frame(result)}

@@ -26,7 +26,7 @@ from wm_drake.simulation.vibration import relative_error
 from wm_drake.studies.inputs import channels_of, existing_file, runnable_profile
 from wm_drake.studies.run import Executor
 from wm_drake.studies.spin.study import run_spin
-from wm_drake.studies.spin_cycle.measured import read_accelerations, read_rms
+from wm_drake.studies.spin_cycle.measured import DIMS, read_accelerations, read_rms
 from wm_drake.studies.spin_cycle.options import CycleOptions, SpinCycleOptions
 from wm_drake.studies.study import Result, Task
 
@@ -41,8 +41,6 @@ FEET = ("feet", "feet regions")
 
 DRIVE = ("drive",)
 """Measures of each run of a machine with a motor."""
-
-DIMS = ("case", "region", "accelerometer", "axis")
 
 Evaluate: TypeAlias = Callable[[Iterable[Case]], xr.Dataset]
 """Function that runs cases and returns their table with `MEASURES`, as `simulate_many` does."""

@@ -33,9 +33,8 @@ from wm_drake.studies.fitting.methods import least_squares
 from wm_drake.studies.fitting.problem import FitProblem, Measurement, Progress, Unknown
 from wm_drake.studies.inputs import runnable_profile
 from wm_drake.studies.run import Executor
-from wm_drake.studies.spin_cycle.measured import rms_table
+from wm_drake.studies.spin_cycle.measured import DIMS, rms_table
 from wm_drake.studies.spin_cycle.study import (
-    DIMS,
     average_errors,
     cases_of_table,
     labels_of,

@@ -6,7 +6,7 @@ time, more and less; the best ones are then combined one after the other, as lon
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -20,6 +20,7 @@ from wm_drake.model.sdf_names import sdf_names
 from wm_drake.parameters import MachineParameters, with_values
 from wm_drake.parameters.elements import Table
 from wm_drake.parameters.keys import quantities
+from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.parameters.variation import value_at
 from wm_drake.simulation.cases import Case, load_of
@@ -27,16 +28,13 @@ from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.measures.responses import GAP, has_gap, known_responses, measures_of
 from wm_drake.simulation.steps import checked_step
 from wm_drake.studies.inputs import profile_of, selected_cases
+from wm_drake.studies.run import Executor
 from wm_drake.studies.study import Result, Task
 from wm_drake.studies.tolerance.options import ToleranceOptions
 from wm_drake.studies.tolerance.shares import bound_if_none, share_of
 from wm_drake.studies.tolerance.study import CONTACTS
 from wm_drake.studies.tolerance.task import ToleranceTask
 from wm_drake.studies.verdict.options import VerdictOptions
-
-if TYPE_CHECKING:
-    from wm_drake.parameters.types import FloatArray
-    from wm_drake.studies.run import Executor
 
 MM = Unit("m", "mm")
 
@@ -78,7 +76,7 @@ class Outcome:
     table: xr.Dataset
 
     @property
-    def gaps(self) -> "FloatArray":
+    def gaps(self) -> FloatArray:
         """Return the smallest gap of each load; minus infinity for a run that failed. [m]"""
         failed = self.table.diverged.values != ""
         return np.where(failed, -np.inf, self.table.smallest_gap.values)
@@ -132,7 +130,7 @@ class Laundry:
         clearance: Gap that must remain. [m]
     """
 
-    gaps: "FloatArray"
+    gaps: FloatArray
     clearance: float
 
     @property
@@ -150,7 +148,7 @@ class Trials:
     machine: Machine
     cases: Sequence[Case]
     measures: tuple[str, ...]
-    executor: "Executor"
+    executor: Executor
 
     def outcomes(self, changes: Iterable[Mapping[str, str]], what: str) -> list[Outcome]:
         """Return the outcome of each set of changes that the machine and its step allow."""
@@ -302,7 +300,7 @@ class VerdictTask(Task):
         """Return what determines the runs."""
         return {**self.laundry.identity, "change": f"{self.options.change:g} %"}
 
-    def run(self, executor: "Executor") -> Result:
+    def run(self, executor: Executor) -> Result:
         """Run the loads, the changes, and the laundry before and after the best change."""
         from wm_drake.studies.verdict.page import VerdictResult
 
@@ -333,7 +331,7 @@ class VerdictTask(Task):
             executor.runs,
         )
 
-    def _samples(self, task: ToleranceTask, executor: "Executor") -> Laundry:
+    def _samples(self, task: ToleranceTask, executor: Executor) -> Laundry:
         """Return the gaps of the samples of a tolerance study."""
         (gaps,) = (column for _, column in task.sampled(executor).values.items())
         return Laundry(np.nan_to_num(1e-3 * gaps.to_numpy(), nan=-np.inf), self.clearance)
