@@ -16,6 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from wm_drake.compiler.compilation import CACHE_FOLDER
+from wm_drake.compiler.lanes import WIDTH
+from wm_drake.engines.compiled.linear import is_followed
 from wm_drake.engines.compiled.packing import initial_state, pack
 from wm_drake.engines.compiled.samples import trajectory_of
 from wm_drake.engines.schedule import schedule_of
@@ -63,7 +65,11 @@ def _end(second: "subprocess.Popen[bytes]", started: Path) -> None:
 
 
 def compile_readers(parameters: MachineParameters) -> None:
-    """Compile what makes a record of samples and measures it, with samples at rest."""
+    """Compile what makes a record of samples and measures it, with samples at rest.
+
+    Before that comes what judges the step: the first process needs it soonest.
+    """
+    is_followed(np.zeros((WIDTH, 1, 1)), np.zeros(1, dtype=int), 1.0)
     setup = build_machine(parameters).set_up()
     p, layout = pack(setup)
     period = parameters.output_period
