@@ -27,15 +27,11 @@ from analysis_tools.sdf_text import sdf_with
 from wm_drake.batch.ledger import open_ledger
 from wm_drake.model.bodies import sdf_path
 from wm_drake.model.build import build_machine
-from wm_drake.parameters import (
-    MachineParameters,
-    load_machine,
-    machine_file_with,
-    machine_path,
-)
+from wm_drake.parameters import MachineParameters, load_machine, machine_file_with, machine_path
 from wm_drake.parameters.free import FreeFile, load_free
 from wm_drake.parameters.measured import (
     DESIGN,
+    EXPERIMENT,
     NamedValue,
     measured_amplitudes,
     measured_responses,
@@ -55,7 +51,7 @@ from wm_drake.studies.calibration.prediction import Prediction, predict
 from wm_drake.studies.calibration.response_targets import with_deviations
 from wm_drake.studies.calibration.solutions import Solution, percents_of, solved_machine
 from wm_drake.studies.calibration.study import FITS, fewer_table, prediction_table
-from wm_drake.studies.calibration.targets import EXPERIMENT, Targets, targets_of
+from wm_drake.studies.calibration.targets import Targets, targets_of
 from wm_drake.studies.gasket.screening import published_for
 
 REFERENCE, EARLIER = "reference", "reference_2026_11"

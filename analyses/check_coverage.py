@@ -24,12 +24,7 @@ from wm_drake.model.machine import Machine
 from wm_drake.parameters import load_machine
 from wm_drake.parameters.free import FreeFile, load_free
 from wm_drake.parameters.types import FloatArray
-from wm_drake.studies.calibration.calibration import (
-    Calibration,
-    Plan,
-    calibrate,
-    identity_of,
-)
+from wm_drake.studies.calibration.calibration import Calibration, Plan, calibrate, identity_of
 from wm_drake.studies.calibration.computed import Evaluation, Runner
 from wm_drake.studies.calibration.options import CalibrateOptions
 from wm_drake.studies.calibration.parameter_map import ParameterMap, parameter_map_of

@@ -31,12 +31,7 @@ WAYS = (
 )
 """Integrator and step [ms]."""
 CONVERGED_TUBES_MS = 0.0625
-WAYS_OF_TUBES = (
-    ("auto", 0.25),
-    ("midpoint", 0.5),
-    ("midpoint", 0.125),
-    ("runge_kutta", 0.25),
-)
+WAYS_OF_TUBES = (("auto", 0.25), ("midpoint", 0.5), ("midpoint", 0.125), ("runge_kutta", 0.25))
 PEAKS = ("amplitude", "detergent_displacement", "gasket_force", "gasket_moment")
 BOUND_PERCENT = {True: 0.1, False: 0.3}
 """Largest error of the default step, with and without gasket."""

@@ -69,10 +69,7 @@ def main() -> None:
     middle = at_levels(reference, levels, [0] * len(levels))
     machine = build_machine(middle)
     study = GasketTrials(
-        middle,
-        levels,
-        [Case(name, middle.loads[name], profile) for name in LOADS],
-        ("D", "F", "M"),
+        middle, levels, [Case(name, middle.loads[name], profile) for name in LOADS], ("D", "F", "M")
     )
     made = designs(tuple(known), trials)
     *_, (full, _) = made.values()

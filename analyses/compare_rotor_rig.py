@@ -179,10 +179,7 @@ def frames_figure(machine: Machine) -> Figure:
     panels = [
         Panel(title=title, marks=tuple(marks), x=x, y=y, is_square=True)
         for title, marks, (x, y) in zip(
-            ("from the side", "from the front"),
-            (side, front),
-            axes,
-            strict=True,
+            ("from the side", "from the front"), (side, front), axes, strict=True
         )
     ]
     return Figure(panels=in_grid(panels, 2), height=300.0, widths=(1.8, 1.0))

@@ -97,10 +97,7 @@ ENTRIES = (
     Entry("drive", "How weak may the motor be?", "wm-drake study drive --load middle --loads 12"),
     Entry("cabinet", "A cabinet that walks", "wm-drake spin --machine light_cabinet --load middle"),
     Entry(
-        "studio",
-        "Curves while a slider moves",
-        "wm-drake studio --no-browser --port 8765",
-        page="",
+        "studio", "Curves while a slider moves", "wm-drake studio --no-browser --port 8765", page=""
     ),
     Entry("gasket", "Which number of the gasket matters?", "wm-drake study gasket --trials 200"),
     Entry(

@@ -27,9 +27,10 @@ from wm_drake.parameters import (
     published_results,
 )
 from wm_drake.parameters.free import FreeFile
+from wm_drake.parameters.measured import EXPERIMENT
 from wm_drake.studies.calibration.calibration import Plan, calibrate, identity_of
 from wm_drake.studies.calibration.computed import Runner
-from wm_drake.studies.calibration.targets import EXPERIMENT, targets_of
+from wm_drake.studies.calibration.targets import targets_of
 from wm_drake.studies.gasket.screening import Published, Screening, published_for
 
 REFERENCE = "reference"

@@ -13,12 +13,7 @@ author = "the developers of wm_drake"
 copyright = "2026, the developers of wm_drake"  # noqa: A001
 release = importlib.metadata.version("wm-drake")
 
-extensions = [
-    "myst_nb",
-    "sphinx.ext.autodoc",
-    "sphinx.ext.napoleon",
-    "manual",
-]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "manual"]
 exclude_patterns = ["_build", "README.md", "**/.ipynb_checkpoints"]
 source_suffix = {".md": "myst-nb", ".rst": "restructuredtext"}
 nitpicky = False

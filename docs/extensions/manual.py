@@ -239,10 +239,7 @@ def _commands() -> Iterator[str]:
         yield "| option | meaning |\n|---|---|"
         for option in command.params:
             names, meaning = option.get_help_record(context)
-            cells = (
-                f"`{names}`",
-                escaped(meaning).replace("<", "&lt;").replace("*", "\\*"),
-            )
+            cells = (f"`{names}`", escaped(meaning).replace("<", "&lt;").replace("*", "\\*"))
             yield "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
         yield ""
 

@@ -40,11 +40,7 @@ def fmu(parameters, tmp_path_factory):
 @pytest.mark.slow
 def test_external_controller_equals_the_drake_diagram(parameters, fmu):
     drive = parameters.drive
-    gains = (
-        drive.belt_ratio,
-        drive.controller.proportional_gain,
-        drive.controller.integral_gain,
-    )
+    gains = (drive.belt_ratio, drive.controller.proportional_gain, drive.controller.integral_gain)
     samples = SAMPLE_TIME * np.arange(SAMPLES)
     reference = drive.belt_ratio * PROFILE.speed_at(samples)
     spin_up = runpy.run_path(str(SCRIPT))["spin_up"]

@@ -167,8 +167,7 @@ def test_model_exchange_agrees_with_engine(fmu, record):
 
 def test_parameters_and_unbalances_are_those_of_the_machine_file(fmu, machine):
     changed = wm.with_values(
-        machine.parameters,
-        {"gasket.damping_z": 60.0, "loads.middle.unbalances.0.mass": 0.6},
+        machine.parameters, {"gasket.damping_z": 60.0, "loads.middle.unbalances.0.mass": 0.6}
     )
     case = changed.loads["middle"].unbalances[0]
     setup = machine.set_up("middle", parameters=changed)

@@ -40,11 +40,7 @@ def linear(rpm):
     levers = np.array([[1.0, 1.0], [0.11, -0.15]])
     supports = levers @ levers.T
     c = SUPPORT_DAMPING * supports - 1j * w * np.diag([0.0, 1.24e-3])
-    rotor = (
-        inertia,
-        2j * w * inertia + c,
-        STIFFNESS * supports + 1j * w * c - w**2 * inertia,
-    )
+    rotor = (inertia, 2j * w * inertia + c, STIFFNESS * supports + 1j * w * c - w**2 * inertia)
     ball, frame = (1j, -2.0 * w, -1j * w**2), (1.0, 2j * w, -(w**2))
     turns = np.exp(1j * (BALANCED - PHASE))
     blocks = []

@@ -91,7 +91,7 @@ def test_plotly_accepts_the_picture_of_every_mark():
     cells = next(c for c in plain["data"] if c["type"] == "heatmap")
     assert unpacked(cells["z"])[:3].tolist() == [0.0, 1.0, 2.0]
     assert plain["layout"]["meta"]["keys"] == [
-        *("span", "band", "computed", "measured", "points", "limit", "second"),
+        *("span", "band", "computed", "measured", "points", "limit", "second")
     ]
     assert '"left &lt;b&gt;"' in str(plain["layout"]["annotations"]).replace("'", '"')
 

@@ -14,12 +14,7 @@ from wm_drake.simulation.cases import Case
 from wm_drake.studies.doe.design import make_design
 from wm_drake.studies.gasket import figures
 from wm_drake.studies.gasket.advice import advice
-from wm_drake.studies.gasket.findings import (
-    about_residual,
-    load_findings,
-    summary,
-    warnings,
-)
+from wm_drake.studies.gasket.findings import about_residual, load_findings, summary, warnings
 from wm_drake.studies.gasket.page import GasketResult
 from wm_drake.studies.gasket.proposal import NOT_COMPARED
 from wm_drake.studies.gasket.screening import Meaning, Responses, Words, run_screening

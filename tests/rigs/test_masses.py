@@ -5,14 +5,7 @@ import pandas as pd
 import pytest
 
 from wm_drake.parameters import ForceTable, load_component, load_machine
-from wm_drake.rigs import (
-    MATRICES,
-    Harmonic,
-    beyond_tables,
-    bushing_bench,
-    damper_bench,
-    force_loop,
-)
+from wm_drake.rigs import MATRICES, Harmonic, beyond_tables, bushing_bench, damper_bench, force_loop
 
 FREE_STROKE = load_machine("free_stroke").damper_types["free_stroke"]
 MSTV = load_component("mstv_damper").parameters

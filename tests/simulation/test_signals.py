@@ -8,11 +8,7 @@ from wm_drake.batch import simulate_many
 from wm_drake.parameters import SpinProfile
 from wm_drake.simulation.band import band_warnings, pass_band
 from wm_drake.simulation.cases import Case
-from wm_drake.simulation.displacements import (
-    amplitudes,
-    filtered,
-    filtered_displacement,
-)
+from wm_drake.simulation.displacements import amplitudes, filtered, filtered_displacement
 from wm_drake.simulation.runs import simulate
 
 PERIOD, BAND = 0.005, (0.5, 20.0)

@@ -18,10 +18,7 @@ from wm_drake.elements.bushing import (
     packed_bushing_law,
 )
 from wm_drake.elements.damper_law import packed_damper_law
-from wm_drake.elements.friction_damper import (
-    FRICTION_DAMPER_STRUT,
-    FrictionDamperParameters,
-)
+from wm_drake.elements.friction_damper import FRICTION_DAMPER_STRUT, FrictionDamperParameters
 from wm_drake.elements.layouts import packed_stiffness
 from wm_drake.elements.mount import mounts_at
 from wm_drake.elements.spring import SPRING, SPRING_STRUT, SpringStrutParameters

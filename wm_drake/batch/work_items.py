@@ -8,12 +8,7 @@ from pydrake.systems.framework import Context
 
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.engines.compiled.mechanics import DRUM_RATE
-from wm_drake.engines.compiled.packing import (
-    DrawnBodies,
-    Layout,
-    initial_state,
-    pack_elements,
-)
+from wm_drake.engines.compiled.packing import DrawnBodies, Layout, initial_state, pack_elements
 from wm_drake.engines.compiled.stepping import Stepping, choose_stepping
 from wm_drake.engines.memory import check_size
 from wm_drake.errors import InputError, Problem, input_error

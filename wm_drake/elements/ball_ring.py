@@ -25,13 +25,7 @@ from wm_drake.compiler.compilation import law
 from wm_drake.compiler.elementary import angle_of, sine_cosine, sqrt, where
 from wm_drake.compiler.packed import SCALAR, VECTOR, PackedLayout, generated
 from wm_drake.compiler.vectors import add, cross, dot, rotate, rotate_back, scale, subtract
-from wm_drake.elements.kind import (
-    DrumPlace,
-    ElementKind,
-    Output,
-    PlacedElement,
-    State,
-)
+from wm_drake.elements.kind import DrumPlace, ElementKind, Output, PlacedElement, State
 from wm_drake.parameters import units as u
 from wm_drake.parameters.element_kinds import DrumElement
 from wm_drake.parameters.types import FloatArray

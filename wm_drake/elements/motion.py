@@ -43,8 +43,7 @@ TubMotion = namedtuple("TubMotion", ("rotation", "position", "angular_velocity",
 scalars, in W."""
 
 DrumMotion = namedtuple(
-    "DrumMotion",
-    "rotation position angular_velocity velocity drum_angle drum_rate",
+    "DrumMotion", "rotation position angular_velocity velocity drum_angle drum_rate"
 )
 """A `TubMotion`, and angle and rate of the drum against the tub. [rad, rad/s]"""
 

@@ -36,8 +36,7 @@ WRENCH_SIZE = 6
 """Numbers of the wrench of a mount: moment about the origin of W, then force, in W. [N m, N]"""
 
 Mounts = namedtuple(
-    "Mounts",
-    "springs dampers bushings telescopes branches others sponge_states tube_states",
+    "Mounts", "springs dampers bushings telescopes branches others sponge_states tube_states"
 )
 """Indices at which the mounts of a machine begin.
 

@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from wm_drake.elements.bushing import AXES
 from wm_drake.elements.cabinet import FEET_COUNT
 from wm_drake.elements.mount import WRENCH_SIZE
 from wm_drake.elements.state_map import DRIVE, PLACES
@@ -34,7 +35,6 @@ HOLD_TIME = 1e-2
 """Sample time of the controller whose place the torque input takes. [s] It has no effect."""
 LARGEST_DRUM_TORQUE = 1e4
 """Limit of the torque on the drum of a machine without a motor. [N m]"""
-AXES = ("x", "y", "z")
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,7 @@ where each law is registered; a docstring gives the symbol of the paper in brack
 
 from wm_drake.compiler.compilation import law
 from wm_drake.compiler.elementary import sqrt, where
-from wm_drake.laws.friction import (
-    coulomb_friction,
-    havsin_friction,
-    stv_friction,
-)
+from wm_drake.laws.friction import coulomb_friction, havsin_friction, stv_friction
 from wm_drake.laws.table import stiffness_force
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 
 from wm_drake.compiler.vectors import rotation_from_rpy
+from wm_drake.elements.bushing import AXES
 from wm_drake.elements.sensor import MEASURED_POINT
 from wm_drake.model.bodies import DRUM, set_bodies
 from wm_drake.parameters import MachineParameters
@@ -93,9 +94,6 @@ class FramePoses:
 
 def _are_same(a: Any, b: Any) -> bool:
     return a is b or (type(a) is bytes and a == b)
-
-
-AXES = ("x", "y", "z")
 
 
 @dataclass(frozen=True)

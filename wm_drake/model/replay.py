@@ -353,12 +353,7 @@ def _with_caption(page: str, motion: Motion, title: str, kinds: list[str]) -> st
     return f"{body}{caption}{end}{rest}"
 
 
-LEGEND = {
-    "spring": "#0072b2",
-    "damper": "#e69f00",
-    "gasket": "#009e73",
-    "unbalance": "#d55e00",
-}
+LEGEND = {"spring": "#0072b2", "damper": "#e69f00", "gasket": "#009e73", "unbalance": "#d55e00"}
 """Colours of the legend, the same as those of the shapes."""
 
 CAPTION = """

@@ -18,6 +18,9 @@ if TYPE_CHECKING:  # slow to import: CSV files
 
 _KEYS = ["load", "gasket", "source"]
 
+EXPERIMENT = "experiment"
+"""Source of measured values; rows with another source are only compared with them."""
+
 BAND = "band"
 """Optional last column of amplitudes: the pass band of the displacements."""
 

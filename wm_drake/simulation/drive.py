@@ -73,11 +73,7 @@ class DriveMeasures:
 
 
 def drive_measures(
-    time: FloatArray,
-    angle: FloatArray,
-    speed: FloatArray,
-    torque: FloatArray,
-    profile: SpinProfile,
+    time: FloatArray, angle: FloatArray, speed: FloatArray, torque: FloatArray, profile: SpinProfile
 ) -> DriveMeasures:
     """Return the measures of the drive over a run.
 
@@ -213,11 +209,7 @@ def capture(
 
 
 def measured_drive(
-    time: FloatArray,
-    angle: FloatArray,
-    speed: FloatArray,
-    torque: FloatArray,
-    profile: SpinProfile,
+    time: FloatArray, angle: FloatArray, speed: FloatArray, torque: FloatArray, profile: SpinProfile
 ) -> list[FloatArray]:
     """Return the numbers of the measure `drive`, in its order.
 

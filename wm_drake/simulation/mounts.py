@@ -12,12 +12,7 @@ from wm_drake.model.machine import Setup
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.sections import SECTIONS
 from wm_drake.parameters.types import FloatArray
-from wm_drake.simulation.mount_histories import (
-    SIGNAL_SIZE,
-    SIGNAL_SUMS,
-    VECTOR_SIZE,
-    VECTOR_SUMS,
-)
+from wm_drake.simulation.mount_histories import SIGNAL_SIZE, SIGNAL_SUMS, VECTOR_SIZE, VECTOR_SUMS
 
 POINT = "the origin of W: the drum axis at drum mid-depth, as drawn"
 """The point about which moments on the cabinet are taken."""

@@ -158,11 +158,7 @@ def frequency_map(
         values,
         {
             "time": ("time", centres, {"units": "s"}),
-            "frequency": (
-                "frequency",
-                np.fft.rfftfreq(lines, spacing),
-                {"units": "Hz"},
-            ),
+            "frequency": ("frequency", np.fft.rfftfreq(lines, spacing), {"units": "Hz"}),
         },
         ["time", "frequency", "signal"],
     )

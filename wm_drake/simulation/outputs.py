@@ -13,8 +13,6 @@ from wm_drake.simulation.histories import output_history, position_history
 from wm_drake.simulation.mounts import mount_wrenches, mounts_along
 from wm_drake.simulation.variables import Variables, declared
 
-AXES = ("x", "y", "z")
-
 
 def variables_of(setup: Setup, trajectory: Trajectory) -> Variables:
     """Return all variables that a record holds of a trajectory."""
@@ -69,9 +67,7 @@ def _tubes(trajectory: Trajectory) -> Variables:
     if not tubes.shape[1]:
         return {}
     return declared(
-        tube_angle=tubes[:, :, :3],
-        tube_position=tubes[:, :, 3:6],
-        tube_extension=tubes[:, :, 6],
+        tube_angle=tubes[:, :, :3], tube_position=tubes[:, :, 3:6], tube_extension=tubes[:, :, 6]
     )
 
 

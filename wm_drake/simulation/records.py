@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 import xarray as xr
 
+from wm_drake.elements.bushing import AXES
 from wm_drake.engines.trajectory import COORDINATES, Trajectory, divergence_text
 from wm_drake.errors import input_error
 from wm_drake.model.machine import Setup
@@ -19,7 +20,7 @@ from wm_drake.parameters.cabinet import Cabinet
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.mounts import mount_names
 from wm_drake.simulation.netcdf import netcdf_bytes
-from wm_drake.simulation.outputs import AXES, branch_names, others_by_kind, variables_of
+from wm_drake.simulation.outputs import branch_names, others_by_kind, variables_of
 
 Record: TypeAlias = xr.Dataset
 """Outputs of one run over time, in SI units.

@@ -4,10 +4,7 @@ from typing import Any
 
 from pydrake.systems.framework import LeafSystem_
 
-from wm_drake.elements.cabinet import (
-    evaluate_mounts_on_cabinet,
-    evaluate_tub_in_cabinet,
-)
+from wm_drake.elements.cabinet import evaluate_mounts_on_cabinet, evaluate_tub_in_cabinet
 from wm_drake.elements.motion import GENERALIZED_FORCE_SIZE, PLANT_STATE_SIZE
 from wm_drake.systems.callbacks import NO_SLOTS, callback
 from wm_drake.systems.scalars import define_system, empty, evaluator

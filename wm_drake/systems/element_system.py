@@ -33,11 +33,7 @@ def ElementSystem_(T: type) -> Any:
         __slots__ = NO_SLOTS
 
         def _construct(
-            self,
-            kind: ElementKind,
-            packed: FloatArray,
-            state_size: int = 0,
-            converter: Any = None,
+            self, kind: ElementKind, packed: FloatArray, state_size: int = 0, converter: Any = None
         ) -> None:
             LeafSystem_[T].__init__(self, converter=converter)
             # a scalar-converted copy is constructed from these

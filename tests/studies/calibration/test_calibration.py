@@ -13,12 +13,7 @@ from wm_drake.model.build import build_machine
 from wm_drake.parameters import load_machine
 from wm_drake.parameters.files import yaml_text
 from wm_drake.parameters.free import Measured, load_free
-from wm_drake.studies.calibration.calibration import (
-    Plan,
-    calibrate,
-    fit_with_fewer,
-    identity_of,
-)
+from wm_drake.studies.calibration.calibration import Plan, calibrate, fit_with_fewer, identity_of
 from wm_drake.studies.calibration.computed import Evaluation, Runner
 from wm_drake.studies.calibration.parameter_map import parameter_map_of
 from wm_drake.studies.calibration.prediction import predict

@@ -76,10 +76,7 @@ def test_repeated_tests_are_averaged_and_purely_elastic_ones_have_no_hysteresis(
 
 @pytest.mark.parametrize(
     ("ends", "message"),
-    [
-        ((5e-3, 20e-3, 5e-3), "does not contain zero"),
-        ((0.0, 20e-3), "goes one way only"),
-    ],
+    [((5e-3, 20e-3, 5e-3), "does not contain zero"), ((0.0, 20e-3), "goes one way only")],
 )
 def test_tests_that_give_no_table_are_refused(ends, message):
     with pytest.raises(InputError, match=message):

@@ -14,11 +14,7 @@ from wm_drake.parameters import load_machine
 from wm_drake.parameters.designs import DESIGNS, DesignTask, load_design
 from wm_drake.parameters.tolerances import Tolerances
 from wm_drake.simulation.cases import Case, case_of
-from wm_drake.studies.pareto.page import (
-    DesignResult,
-    front_table,
-    promises_table,
-)
+from wm_drake.studies.pareto.page import DesignResult, front_table, promises_table
 from wm_drake.studies.pareto.problem import machine_designs
 from wm_drake.studies.pareto.search import SearchSettings
 from wm_drake.studies.pareto.study import (

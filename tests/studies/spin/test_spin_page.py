@@ -12,11 +12,7 @@ import xarray as xr
 from hand_made_records import case_result, spin_result
 from pages import without_scripts
 
-from wm_drake.parameters import (
-    MachineParameters,
-    SpinProfile,
-    load_machine,
-)
+from wm_drake.parameters import MachineParameters, SpinProfile, load_machine
 from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import number, percent
 from wm_drake.report.scripts import packed_plotly

@@ -27,11 +27,7 @@ from wm_drake.elements.bushing import BUSHING
 from wm_drake.elements.motion import TubMotion, read_body_state, rpy_rates
 
 TUB = PackedLayout(
-    "TubNumbers",
-    inverse_mass=SCALAR,
-    moment=VECTOR,
-    inertia=SYMMETRIC,
-    inverse_inertia=SYMMETRIC,
+    "TubNumbers", inverse_mass=SCALAR, moment=VECTOR, inertia=SYMMETRIC, inverse_inertia=SYMMETRIC
 )
 """The tub without drum: 1/M [1/kg], S [kg m], I [kg m^2], inverse of the inertia about the centre
 of mass [1/(kg m^2)]."""

@@ -12,7 +12,6 @@ from wm_drake.compiler.compilation import law
 from wm_drake.compiler.elementary import where
 from wm_drake.compiler.matrices import plus, six
 from wm_drake.elements.cabinet import (
-    FEET_SIZE,
     SLIP_SIZE,
     feet_on_floor,
     motion_in,
@@ -33,8 +32,6 @@ from wm_drake.engines.trajectory import LARGEST_TILT
 
 FEET_BEGIN = TUB.fixed_size
 """Index of the feet in the packed numbers of a cabinet."""
-CABINET_SIZE = FEET_BEGIN + FEET_SIZE
-"""Packed numbers of a cabinet."""
 SLIPS_BEGIN = BODY_STATE_SIZE
 """Index of the slips in the state of a cabinet."""
 CABINET_STATE_SIZE = SLIPS_BEGIN + SLIP_SIZE

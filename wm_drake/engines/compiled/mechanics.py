@@ -51,11 +51,7 @@ from wm_drake.engines.compiled.bearing import (
     read_tub_and_bearing,
     tub_accelerations,
 )
-from wm_drake.engines.compiled.cabinet import (
-    seen_from_cabinet,
-    with_cabinet,
-    write_seen_sample,
-)
+from wm_drake.engines.compiled.cabinet import seen_from_cabinet, with_cabinet, write_seen_sample
 from wm_drake.engines.compiled.drum import motor_torque_and_rates, with_free_drum
 from wm_drake.engines.compiled.rubber import write_branches
 from wm_drake.engines.compiled.tubes import add_telescopic_dampers

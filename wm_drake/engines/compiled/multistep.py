@@ -28,10 +28,7 @@ from wm_drake.compiler.compilation import law
 from wm_drake.elements.friction_damper import friction_damper_tension
 from wm_drake.elements.rubber import AXIS_COUNT, read_rubber, read_rubber_bushing
 from wm_drake.engines.compiled.cabinet import cabinet_after_step
-from wm_drake.engines.compiled.mechanics import (
-    STATE_SIZE,
-    read_bodies,
-)
+from wm_drake.engines.compiled.mechanics import STATE_SIZE, read_bodies
 from wm_drake.engines.compiled.rubber import branch_after_step
 
 PAST_RATES, PAST_INPUTS = 6, 3

@@ -92,10 +92,7 @@ def _in_lanes(values: FloatArray) -> FloatArray:
 
 
 def integrate_runs(
-    schedule: Schedule,
-    one_derivative: np.ndarray,
-    layout: Layout,
-    lanes: RunLanes,
+    schedule: Schedule, one_derivative: np.ndarray, layout: Layout, lanes: RunLanes
 ) -> Iterator[float]:
     """Integrate `WIDTH` runs side by side until the schedule ends or all of them have diverged.
 
@@ -124,10 +121,7 @@ def integrate_runs(
 
 
 def _advance(
-    schedule: Schedule,
-    one_derivative: np.ndarray,
-    layout: Layout,
-    lanes: RunLanes,
+    schedule: Schedule, one_derivative: np.ndarray, layout: Layout, lanes: RunLanes
 ) -> Callable[[int, int], None]:
     """Return the function that integrates from one number of a step to another.
 

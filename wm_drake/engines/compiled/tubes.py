@@ -21,12 +21,7 @@ from wm_drake.compiler.elementary import sine_cosine
 from wm_drake.compiler.matrices import about_centre, inverse, less_square, plus, times
 from wm_drake.compiler.packed import SCALAR, SYMMETRIC, VECTOR, PackedLayout
 from wm_drake.compiler.vectors import add, cross, dot, rotate, rotate_back, scale, subtract
-from wm_drake.elements.motion import (
-    motion_from_sines,
-    read_tree_state,
-    rpy_rates,
-    write_tree_state,
-)
+from wm_drake.elements.motion import motion_from_sines, read_tree_state, rpy_rates, write_tree_state
 from wm_drake.elements.telescopic_damper import (
     DEFORMATION,
     TUBES_STATE_SIZE,

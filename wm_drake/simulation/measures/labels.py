@@ -3,9 +3,9 @@
 from collections.abc import Callable, Sequence
 from typing import TypeAlias
 
+from wm_drake.elements.bushing import AXES
 from wm_drake.parameters import MachineParameters, SpinProfile
 from wm_drake.simulation.mounts import mount_names
-from wm_drake.simulation.outputs import AXES
 
 Labels: TypeAlias = Callable[[MachineParameters, SpinProfile], Sequence[str]]
 

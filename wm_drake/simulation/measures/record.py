@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from wm_drake.elements.bushing import AXES
 from wm_drake.model.scene import Gap, Scene
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cabinet import Walk, walk
@@ -20,7 +21,6 @@ from wm_drake.simulation.measures.run import FeetLoaded, Need, Run
 from wm_drake.simulation.mount_forces import speed_ranges
 from wm_drake.simulation.mount_histories import sum_mounts_history
 from wm_drake.simulation.mounts import sums_size
-from wm_drake.simulation.outputs import AXES
 from wm_drake.simulation.records import Record, cabinet_in, profile_of, sample_period
 from wm_drake.simulation.spring_tension import smallest_tensions
 from wm_drake.simulation.vibration import tub_motion_of

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from wm_drake.engines.trajectory import COORDINATES
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report import figure as fig
 from wm_drake.report.formatting import number
@@ -14,7 +15,6 @@ from wm_drake.studies.description.description import Modes
 OTHER = "#8a8f98"
 """Colour of the errors of another model."""
 
-SHAPE_NAMES = ("roll", "pitch", "yaw", "x", "y", "z")
 _SHAPE_ORDER = (3, 4, 5, 0, 1, 2)
 _SHAPE_WEIGHTS = np.array([0.25, 0.25, 0.25, 1.0, 1.0, 1.0])
 """Weights of the components of a mode shape: angles are multiplied by 0.25 m, as in `Modes`."""
@@ -59,7 +59,7 @@ def modes_figure(modes: Sequence[tuple[str, Modes]]) -> fig.Figure:
     scale = fig.Scale(low=-1.3, high=1.3, shades="RdBu")
     count = max(len(state.frequency_hz) for _, state in modes)
     plain = fig.Axis(has_grid=False, has_line=False)
-    x = replace(plain, ticks=fig.named(SHAPE_NAMES[k] for k in _SHAPE_ORDER), range=(-0.5, 5.5))
+    x = replace(plain, ticks=fig.named(COORDINATES[k] for k in _SHAPE_ORDER), range=(-0.5, 5.5))
     panels = []
     for title, state in modes:
         shape = (state.shape * _SHAPE_WEIGHTS)[:, _SHAPE_ORDER]

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 
 from wm_drake.model.build import build_machine
+from wm_drake.parameters.measured import EXPERIMENT
 from wm_drake.report.formatting import MM_PER_M, number, percent
 from wm_drake.report.page import Picture, Section, SectionedPage, picture, versions_of
 from wm_drake.report.table import Column, Group, Row, Table, line
@@ -246,7 +247,7 @@ def effects_table(calibration: Calibration) -> Table | None:
         Group(
             name,
             (
-                Row((tables.EXPERIMENT, *(percent(100 * v) for v in measured[name])), "measured"),
+                Row((EXPERIMENT, *(percent(100 * v) for v in measured[name])), "measured"),
                 Row(("calibrated machine", *(percent(100 * v) for v in computed[name])), "ours"),
             ),
         )
@@ -340,7 +341,7 @@ def searches_table(calibration: Calibration) -> Table:
 
 def _errors_picture(best: SpinResult, table: pd.DataFrame) -> Picture:
     others = list(dict.fromkeys(table["source"]))
-    others = [source for source in others if source not in (tables.EXPERIMENT, tables.OURS)]
+    others = [source for source in others if source not in (EXPERIMENT, tables.OURS)]
 
     def errors(case: object, source: str) -> np.ndarray | None:
         changes = tables.differences(table, case, source)  # type: ignore[arg-type]

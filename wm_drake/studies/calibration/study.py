@@ -17,7 +17,7 @@ from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters, located, machine_yaml
 from wm_drake.parameters.free import load_free
-from wm_drake.parameters.measured import measured_amplitudes, measured_responses
+from wm_drake.parameters.measured import EXPERIMENT, measured_amplitudes, measured_responses
 from wm_drake.parameters.units import plain_number
 from wm_drake.report.table import Column, Table, table_of
 from wm_drake.studies.calibration.calibration import (
@@ -35,13 +35,7 @@ from wm_drake.studies.calibration.parameter_map import parameter_map_of
 from wm_drake.studies.calibration.prediction import Prediction, check_held_out, predict
 from wm_drake.studies.calibration.response_targets import CONTRIBUTION, TRIALS, with_deviations
 from wm_drake.studies.calibration.solutions import percents_of, solved_machine
-from wm_drake.studies.calibration.targets import (
-    AMPLITUDE,
-    EXPERIMENT,
-    MILLIMETRE,
-    Targets,
-    targets_of,
-)
+from wm_drake.studies.calibration.targets import AMPLITUDE, MILLIMETRE, Targets, targets_of
 from wm_drake.studies.inputs import existing_file, pairs_of, with_measured
 from wm_drake.studies.run import Executor
 from wm_drake.studies.study import Facts, Result, Task

@@ -8,7 +8,7 @@ import pandas as pd
 
 from wm_drake.errors import InputError, Problem, check_known, input_error, nearest_names
 from wm_drake.parameters import MachineParameters
-from wm_drake.parameters.measured import NamedValue
+from wm_drake.parameters.measured import EXPERIMENT, NamedValue
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.studies.calibration.response_targets import ResponseTarget, response_targets_of
@@ -284,7 +284,3 @@ def targets_of(
         np.ones(amplitude.shape),
         response_targets_of(parameters, responses),
     )
-
-
-EXPERIMENT = "experiment"
-"""Source of rows with measured values. Rows with another source are used for comparison only."""

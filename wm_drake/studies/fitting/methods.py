@@ -73,12 +73,7 @@ def least_squares(
     return assess(problem, best.point, search.log("least-squares", seed, note))
 
 
-def evolution(
-    problem: FitProblem,
-    *,
-    seed: int = 0,
-    progress: Progress = silent,
-) -> Fit:
+def evolution(problem: FitProblem, *, seed: int = 0, progress: Progress = silent) -> Fit:
     """Search by differential evolution, with least squares from its best point now and then.
 
     The evolution has to find the valley only, not its floor: it ends when least squares from the

@@ -47,10 +47,7 @@ class DesignResult(Result):
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """Return front, history and, of a robust front, the check on fresh samples."""
-        frames = {
-            "front": front_table(self.front),
-            "history": history_table(self.front),
-        }
+        frames = {"front": front_table(self.front), "history": history_table(self.front)}
         return frames | ({"robust": promises_table(self.promises)} if self.promises else {})
 
     def texts(self) -> dict[str, str]:

@@ -11,6 +11,7 @@ import xarray as xr
 
 from wm_drake.errors import input_error
 from wm_drake.parameters import MachineParameters, SpinProfile, measured_amplitudes
+from wm_drake.parameters.measured import EXPERIMENT
 from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import plain
 from wm_drake.report.terminal import Printed
@@ -258,9 +259,6 @@ def remarks(variants: Sequence[Variant]) -> list[str]:
                 )
     return list(dict.fromkeys(sentences))
 
-
-EXPERIMENT = "experiment"
-"""Source of the measured amplitudes that computed ones are compared with."""
 
 STEADY_PART = 0.5
 """Part of a stretch of constant speed, at its end, that counts as the steady state.

@@ -10,7 +10,7 @@ import pandas as pd
 import xarray as xr
 
 from wm_drake.parameters import MachineParameters, measured_amplitudes, quantities
-from wm_drake.parameters.measured import BAND
+from wm_drake.parameters.measured import BAND, EXPERIMENT
 from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number, percent, shape_name
 from wm_drake.report.table import (
@@ -41,9 +41,6 @@ if TYPE_CHECKING:
 
 OURS = "wm_drake"
 """Name of this program in the column `source` of an amplitude table."""
-
-EXPERIMENT = "experiment"
-"""Source of the rows that all other rows are compared with."""
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ import xarray as xr
 
 from wm_drake.batch import simulate_many
 from wm_drake.batch.many import as_table
+from wm_drake.elements.bushing import AXES
 from wm_drake.errors import InputError, check_known, input_error
 from wm_drake.model.machine import Machine
 from wm_drake.model.scene import Scene
@@ -21,7 +22,6 @@ from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import MEASURES as KNOWN_MEASURES
 from wm_drake.simulation.measures import measure
 from wm_drake.simulation.mounts import mount_names
-from wm_drake.simulation.outputs import AXES
 from wm_drake.simulation.vibration import relative_error
 from wm_drake.studies.inputs import channels_of, existing_file, runnable_profile
 from wm_drake.studies.run import Executor

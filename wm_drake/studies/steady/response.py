@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from wm_drake.elements.bushing import AXES
 from wm_drake.elements.state_map import CARRIER, ELEMENT, STRETCHES, TUB
 from wm_drake.engines.compiled.run import run_compiled
 from wm_drake.engines.trajectory import COORDINATES, Trajectory
@@ -15,7 +16,7 @@ from wm_drake.model.machine import Setup
 from wm_drake.parameters import Load, SpinProfile
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.mounts import KINDS, force_measures, mount_names
-from wm_drake.simulation.outputs import AXES, variables_of
+from wm_drake.simulation.outputs import variables_of
 from wm_drake.studies.steady.balance import HARMONICS, SAMPLES, HarmonicBalance
 from wm_drake.studies.steady.continuation import Point, first_motion, follow
 from wm_drake.studies.steady.series import Series
@@ -31,11 +32,7 @@ DECLARED = {
     "gasket_moment": ("axis", "N m", "largest moment of the gasket on the housing"),
     "spring_tension": ("spring", "N", "half the range of the tension in a revolution"),
     "damper_tension": ("damper", "N", "half the range of the tension in a revolution"),
-    "mount_force_peak": (
-        "mount",
-        "N",
-        "largest size of the force on the cabinet in a revolution",
-    ),
+    "mount_force_peak": ("mount", "N", "largest size of the force on the cabinet in a revolution"),
     "mount_force_rms": ("mount", "N", "RMS of the force on the cabinet in a revolution"),
     "mount_force_dynamic_rms": (
         "mount",
