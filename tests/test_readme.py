@@ -43,7 +43,8 @@ def parsed(arguments):
     """Return the command that arguments call; raise its error if it refuses what follows its name."""
     command, context, rest = typer.main.get_command(app), None, list(arguments)
     while hasattr(command, "commands") and rest:
-        context = type(command).context_class(command, parent=context, info_name="wm-drake")
+        settings = {"parent": context, "info_name": "wm-drake", **command.context_settings}
+        context = type(command).context_class(command, **settings)
         _, command, rest = command.resolve_command(context, rest)
     if rest:
         command.make_context(command.name, rest, parent=context)

@@ -33,7 +33,7 @@ COMPUTATIONS = (
     "wm_drake.studies.spin_identification.study.identify_from_spin",
     "wm_drake.studies.gasket_damping.study.virtual_experiment",
     "wm_drake.studies.gasket_damping.study.identify_damping",
-    "wm_drake.studies.fitting.identify",
+    "wm_drake.studies.fitting.methods.identify",
     "wm_drake.solid.curves.Gasket.curve",
     "wm_drake.studies.calibration.calibration.calibrate",
     "wm_drake.studies.tolerance.study.run_tolerances",
