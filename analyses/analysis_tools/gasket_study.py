@@ -85,7 +85,8 @@ class Agreement:
 def agreement(screening: Screening, published: Published) -> Agreement:
     """Return how well a study agrees with the published one."""
     leaders = published.leaders(screening).values()
-    points = list(published.main_points(screening).values())
+    differences = published.differences(screening).items()
+    points = [difference for (_, term), difference in differences if ":" not in term]
     means = [published.mean_difference(screening, label) or 0.0 for label in screening.tables]
     return Agreement(
         sum(ours == theirs for ours, theirs in leaders),
