@@ -33,9 +33,11 @@ def test_one_process_is_started_for_a_folder_of_compiled_code(reference, tmp_pat
     assert [process.wait() for process in started] == [0]
 
 
-def test_no_process_is_started_without_a_folder_or_a_second_core(reference, monkeypatch):
+def test_no_process_is_started_without_a_folder_or_a_second_core(reference, tmp_path, monkeypatch):
     monkeypatch.setattr(subprocess, "Popen", None)
     monkeypatch.setattr(first_call, "CACHE_FOLDER", "")
     first_call.compile_in_two_processes(reference)
+    monkeypatch.setattr(first_call, "CACHE_FOLDER", str(tmp_path))
     monkeypatch.setattr(os, "cpu_count", lambda: 1)
     first_call.compile_in_two_processes(reference)
+    assert not list(tmp_path.iterdir())
