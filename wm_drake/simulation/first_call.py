@@ -43,14 +43,14 @@ def compile_in_two_processes(parameters: MachineParameters) -> None:
     try:
         machine = pickle.dumps(parameters)
         started.open("x").close()
-    except (OSError, pickle.PicklingError, AttributeError):  # started before, or a type of a script
-        return
-    second = subprocess.Popen(
-        [sys.executable, "-m", __name__],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
+        second = subprocess.Popen(
+            [sys.executable, "-m", __name__],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+    except (OSError, pickle.PicklingError, AttributeError):
+        return  # it was started before or cannot start, or a type of the machine is in a script
     atexit.register(_end, second, started)
     assert second.stdin is not None
     with contextlib.suppress(OSError), second.stdin:

@@ -40,12 +40,6 @@ from wm_drake.studies.study import Facts, Result
 if TYPE_CHECKING:
     from wm_drake.studies.modes.study import NaturalModes
 
-_IN_PROCESSES = {"drake"}
-"""Engines whose cases run in separate processes.
-
-One case takes seconds, and Python systems of Drake do not run in parallel threads.
-"""
-
 
 @dataclass(frozen=True)
 class CaseResult:
@@ -303,7 +297,7 @@ def run_spin(
     work_items = [_WorkItem(parameters, case, engine, step) for case in cases]
     if engine == DEFAULT_ENGINE:
         results = _run_side_by_side(built, cases, step, progress)
-    elif engine in _IN_PROCESSES and count > 1 and can_start_processes():
+    elif count > 1 and can_start_processes():  # Python systems of Drake block other threads
         results = map_in_processes(_build_and_run, work_items, count, progress)
     else:
         scene = Scene(parameters)
