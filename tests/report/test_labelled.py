@@ -109,3 +109,12 @@ def test_the_part_in_short_is_a_box_of_the_page_and_lines_of_the_terminal():
     assert "In short" in box
     assert "all of it" in box
     assert list(answer.tables()) == ["gaps"]
+
+
+def test_a_long_table_is_in_files_only_and_a_warning_on_page_and_terminal():
+    table = LabelledTable("gaps", dataset()[["gap"]], is_in_json=False)
+    answer = Answer("Title", "The answer.", None, (Part("", (table,)),), warned=("Careful.",))
+    assert answer.as_json() == {"title": "Title", "answer": "The answer."}
+    assert list(answer.tables()) == ["gaps"]
+    assert answer.warnings() == ("Careful.",)
+    assert "Careful." in answer.page(Facts())

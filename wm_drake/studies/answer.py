@@ -8,7 +8,7 @@ them; it declares no class of its own.
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import pandas as pd
 import xarray as xr
@@ -78,6 +78,8 @@ class Answer(Result):
         details: How the result was computed, as pairs of word and text.
         method: Sentences on the method, below the details.
         files: Other files as text or bytes, by their names.
+        warned: Sentences on what a reader must know before the answer, in a box at the top and on
+            the terminal.
         short: Part in a box between the answer and the contents. Its facts are also printed.
         diverged: A line for each run that diverged.
     """
@@ -89,8 +91,10 @@ class Answer(Result):
     details: tuple[tuple[str, str], ...] = ()
     method: str = ""
     files: Mapping[str, str | bytes] = field(default_factory=dict)
+    warned: tuple[str, ...] = ()
     short: Part | None = None
     diverged: tuple[str, ...] = ()
+    float_format: ClassVar[str] = "%.9g"
 
     def labelled(self) -> dict[str, LabelledTable]:
         """Return the tables by name."""
@@ -102,10 +106,10 @@ class Answer(Result):
         return {name: table.frame() for name, table in self.labelled().items()}
 
     def as_json(self) -> dict[str, Any]:
-        """Return machine, answer, and each table as a list of rows."""
+        """Return title, machine, answer, and each table as a list of rows."""
         about = {} if self.machine is None else {"machine": self.machine.name}
-        tables = {name: table.records() for name, table in self.labelled().items()}
-        return {**about, "answer": self.answer, **tables}
+        tables = {n: table.records() for n, table in self.labelled().items() if table.is_in_json}
+        return {"title": self.title, **about, "answer": self.answer, **tables}
 
     def terminal(self) -> "list[TerminalTable | str]":
         """Return some tables, the answer, and the facts of the part in short."""
@@ -130,7 +134,7 @@ class Answer(Result):
             [_section(part) for part in self.parts],
             [*about, time, *self.details, *facts.rows()],
             self.machine,
-            facts.warnings,
+            [*facts.warnings, *self.warned],
             method=self.method,
             advice=_section(self.short) if self.short else None,
         ).html()
@@ -141,6 +145,10 @@ class Answer(Result):
         for name, content in self.files.items():
             data = content.encode("utf-8") if isinstance(content, str) else content
             (folder / name).write_bytes(data)
+
+    def warnings(self) -> tuple[str, ...]:
+        """Return warnings of the result for the terminal."""
+        return self.warned
 
     def failures(self) -> tuple[str, ...]:
         """Return a line for each run that diverged."""

@@ -1,46 +1,26 @@
-"""A bench test: the component and the motions of the options, and the result."""
+"""A bench test: what is derived from its loops, the effect of masses, and the errors of [A]."""
 
-import json
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, ClassVar
 
+import numpy as np
 import pandas as pd
-from rich.table import Table
+import xarray as xr
 
-from wm_drake.errors import check_known, input_error
-from wm_drake.parameters import Component, quantities
 from wm_drake.parameters.components import COMPONENTS_FOLDER
-from wm_drake.parameters.units import Unit
-from wm_drake.report.table import readable
-from wm_drake.rigs import (
-    JIG_ARM,
-    MATRICES,
-    Bench,
-    BushingBench,
-    Harmonic,
-    RigRun,
-    beyond_tables,
-    bushing_bench,
-    damper_bench,
-    run_rig,
-)
-from wm_drake.studies.components import axes_of, mass_of, target_of
-from wm_drake.studies.inputs import quantities_of
-from wm_drake.studies.rig.options import AxisRigOptions, DamperRigOptions, RigOptions
-from wm_drake.studies.rig.page import (
-    loop_file,
-    loop_table,
-    masses_sentence,
-    masses_table,
-    measures_shown,
-    measures_table,
-    rig_page,
-)
-from wm_drake.studies.run import Executor
-from wm_drake.studies.study import Result, Task
+from wm_drake.parameters.units import Share, Unit
+from wm_drake.report.quantity import TIME, Quantity
+from wm_drake.rigs import Bench, BushingBench, ForceLoop, Harmonic, RigRun
+from wm_drake.studies.rig.units import LINEAR, units_of
 
-MM = 1e-3
+SAMPLES_KEPT = 4
+"""Step between the samples of a loop that are kept."""
+
+FREQUENCY = Quantity("frequency", Unit("Hz", "Hz"), form="{:.3g}".format)
+ENERGY = Quantity("energy per cycle", Unit("J", "mJ"))
+LOSS_ANGLE = Quantity("loss angle", Unit("rad", "deg"), 1)
+RMSE_OF_A = Quantity("RMSE in [A]", decimals=4)
+CHANGE = Quantity("largest difference by peak", Share(), form="{:.2g}".format)
+
 WITHIN = "[A] calls all of them within 10 % of the largest force"
 VERDICTS = {
     ("damper", ""): WITHIN,
@@ -80,7 +60,10 @@ def printed_errors(kind: str, bench: Bench, motions: Sequence[Harmonic]) -> list
     table = printed_table()
     rows = table[(table.component == kind) & (table.axis == printed_axis(bench))]
     rmse = rows.set_index(["frequency_hz", "amplitude_mm"])["rmse"]
-    return [float(rmse[m.frequency, round(m.amplitude / MM, 6)]) for m in motions]
+    return [
+        float(rmse[m.frequency, LINEAR.displacement.values(m.amplitude).round(6).item()])
+        for m in motions
+    ]
 
 
 def printed_verdict(kind: str, bench: Bench) -> str:
@@ -91,143 +74,64 @@ def printed_verdict(kind: str, bench: Bench) -> str:
     )
 
 
-@dataclass(frozen=True)
-class RigResult(Result):
-    """Result of a bench test.
+def loop_data(loop: ForceLoop) -> xr.Dataset:
+    """Return a loop over its samples: time, displacement, velocity, force; or angle, moment."""
+    units = units_of(loop.rotates)
+    values = {
+        TIME: loop.time,
+        units.displacement: loop.displacement,
+        units.velocity: loop.velocity,
+        units.load: loop.force,
+    }
+    return xr.Dataset(
+        {q.words: q.variable("sample", signal[::SAMPLES_KEPT]) for q, signal in values.items()}
+    )
 
-    Attributes:
-        massless: Its loops without masses; None if it has none.
-        beyond: Sentences on tables that the motions leave.
-        printed: Errors that [A] prints of these tests, and a sentence on them; None without.
+
+def measures_data(run: RigRun) -> xr.Dataset:
+    """Return the quantities derived from each loop, as of `LoopMeasures`, over `loop`."""
+    units, measures = units_of(run.bench.rotates), run.measures
+    numbers = {
+        **_motions_of(run),
+        f"peak_{units.force}": (
+            units.load.named(f"peak {units.force}"),
+            [m.peak_force for m in measures],
+        ),
+        "energy_per_cycle": (ENERGY, [m.energy_per_cycle for m in measures]),
+        "equivalent_damping": (units.damping, [m.equivalent_damping for m in measures]),
+        "dynamic_stiffness": (units.stiffness, [m.dynamic_stiffness for m in measures]),
+        "loss_angle": (LOSS_ANGLE, [m.loss_angle for m in measures]),
+    }
+    return xr.Dataset({name: q.variable("loop", values) for name, (q, values) in numbers.items()})
+
+
+def effect_of_masses(run: RigRun, massless: RigRun) -> xr.Dataset:
+    """Return differences of each loop from that without masses, over `loop`.
+
+    Returns:
+        `frequency` [Hz], `amplitude` [m], `peak_force_without` masses, `peak_force`,
+        `rms_difference` and `largest_difference` [N], the last one by the peak without masses.
     """
-
-    run: RigRun
-    massless: RigRun | None = None
-    beyond: Sequence[str] = ()
-    printed: tuple[Sequence[float], str] | None = None
-    float_format: ClassVar[str] = "%.9g"
-    page = rig_page
-
-    def tables(self) -> dict[str, pd.DataFrame]:
-        """Return each loop, what is derived from the loops, and the effect of masses."""
-        loops = {loop_file(loop).removesuffix(".csv"): loop_table(loop) for loop in self.run.loops}
-        shown = {"measures": measures_table(self.run, self.printed), **loops}
-        if self.massless is not None:
-            shown["masses"] = masses_table(self.run, self.massless)
-        return shown
-
-    def as_json(self) -> dict[str, Any]:
-        """Return what is derived from the loops for JSON: of one loop, or a list of several."""
-        text = measures_table(self.run, self.printed).to_json(orient="records", double_precision=15)
-        rows = json.loads(text)
-        shown = rows[0] if len(rows) == 1 else {"loops": rows}
-        return {"component": self.run.title, **shown}
-
-    def terminal(self) -> list[Table | str]:
-        """Return what is derived from the loops, and the effect of masses."""
-        table = measures_shown(self.run, self.printed).terminal(self.run.title)
-        return [table, *([self.effect] if self.effect else [])]
-
-    @property
-    def effect(self) -> str:
-        """Sentence on the effect of masses; "" without masses."""
-        return "" if self.massless is None else masses_sentence(self.run, self.massless)
-
-    def warnings(self) -> Sequence[str]:
-        """Return a warning for a table that the motions leave."""
-        return self.beyond
+    load = units_of(run.bench.rotates).load
+    loops, bare = (np.array([loop.force for loop in one.loops]) for one in (run, massless))
+    peaks, largest = (np.abs(forces).max(axis=1) for forces in (bare, loops - bare))
+    by_peak = np.divide(largest, peaks, out=np.full(len(peaks), np.nan), where=peaks > 0.0)
+    rms = np.sqrt(np.mean(np.square(loops - bare), axis=1))
+    numbers = {
+        **_motions_of(run),
+        "peak_force_without": (load.named("peak force without masses"), peaks),
+        "peak_force": (load.named("peak force"), np.abs(loops).max(axis=1)),
+        "rms_difference": (load.named("root mean square of the difference"), rms),
+        "largest_difference": (load.named("largest difference"), largest),
+        "largest_difference_by_peak": (CHANGE, by_peak),
+    }
+    return xr.Dataset({name: q.variable("loop", values) for name, (q, values) in numbers.items()})
 
 
-class RigTask(Task):
-    """A bench test with checked options."""
-
-    def __init__(self, kind: str, options: RigOptions) -> None:
-        """Find the component, put it on the bench, and read its motions."""
-        self.component = target_of(kind, options).component
-        self.massless: Bench | None = None
-        if isinstance(options, DamperRigOptions):
-            self._set_damper(options)
-        else:
-            assert isinstance(options, AxisRigOptions)
-            self._set_axis(kind, options)
-        self.motions = _motions(kind, self.bench, options)
-        self.printed = (
-            (printed_errors(kind, self.bench, self.motions), printed_verdict(kind, self.bench))
-            if options.matrix == "A"
-            else None
-        )
-
-    def _set_damper(self, options: DamperRigOptions) -> None:
-        sponge = mass_of(options.sponge_mass, "--sponge-mass")
-        driven = mass_of(options.outer_mass, "--outer-mass")
-        driven += mass_of(options.jig_mass, "--jig-mass")
-        damper: Any = self.component.parameters
-        self.bench: Bench = damper_bench(damper, sponge, driven)
-        if sponge or driven:
-            self.massless = damper_bench(damper)
-        parts = [f"damper {self.component.name}", f"law {damper.law}"]
-        parts += [f"sponge of {1e3 * sponge:g} g"] if sponge else []
-        parts += [f"{driven:g} kg at the driven end"] if driven else []
-        self.title = ", ".join(parts)
-
-    def _set_axis(self, kind: str, options: AxisRigOptions) -> None:
-        axis, name = axes_of(options.axis)[0], self.component.name
-        arm = quantities_of(options.arm, Unit("m", "mm"), "--arm")[0] if options.arm else 0.0
-        if options.matrix is not None and axis.startswith("about") and not options.arm:
-            arm = JIG_ARM
-        bushing: Any = self.component.parameters
-        self.bench = bushing_bench(bushing, axis, arm)
-        what = kind if name == kind else f"{kind} {name}"
-        through = f", through an arm of {1e3 * arm:g} mm" if arm else ""
-        self.title = f"{what}, axis {axis.replace('_', ' ')}{through}"
-
-    def run(self, executor: Executor) -> RigResult:
-        """Run all motions, also without the masses if there are any."""
-        numbers = _numbers(self.component)
-        with executor.progress(len(self.motions), "loops") as progress:
-            run = run_rig(self.title, self.bench, self.motions, numbers, progress)
-        massless = None
-        if self.massless is not None:
-            massless = run_rig(self.title, self.massless, self.motions)
-        return RigResult(run, massless, beyond_tables(self.bench, self.motions), self.printed)
-
-
-def _motions(kind: str, bench: Bench, options: RigOptions) -> list[Harmonic]:
-    """Return the motions of `--matrix`, or of `--frequency` and `--amplitude`."""
-    matrix, frequency, amplitude = options.matrix, options.frequency, options.amplitude
-    if matrix is not None:
-        if frequency or amplitude:
-            raise input_error(
-                "has its own frequencies and amplitudes; leave -f and -a out", where="--matrix"
-            )
-        rotates = isinstance(bench, BushingBench) and bench.axis.startswith("about")
-        if kind == "gasket" and rotates:
-            raise input_error("[A] does not rotate the gasket; give -f and -a", where="--matrix")
-        if isinstance(bench, BushingBench) and bench.axis == "about_y":
-            raise input_error(
-                "[A] does not twist the bushing about its axis; give -f and -a", where="--matrix"
-            )
-        papers = MATRICES[f"{kind} about" if rotates else kind]
-        check_known(matrix, papers, f"no matrix '{matrix}' for a {kind}", where="--matrix")
-        return list(papers[matrix])
-    if not (frequency and amplitude):
-        raise input_error(
-            "needs -f and -a (for example -f '3 Hz' -a '5 mm'), or --matrix", where=f"rig {kind}"
-        )
-    unit = Unit("rad", "deg") if bench.rotates else Unit("m", "mm")
-    return [
-        Harmonic(f, a)
-        for f in quantities_of(frequency, Unit("Hz", "Hz"), "--frequency")
-        for a in quantities_of(amplitude, unit, "--amplitude")
-    ]
-
-
-def _numbers(component: Component) -> tuple[tuple[str, str, str], ...]:
-    """Return key, value with unit and source of each number that is on the bench."""
-    rows = []
-    for key, value, unit in quantities(component.parameters):
-        if key.startswith("end_bushing"):
-            continue
-        sources = (component.sources.get(part) for part in (key, key.split(".")[0]))
-        rows.append((key, readable(value, unit), next(filter(None, sources), "")))
-    return tuple(rows)
+def _motions_of(run: RigRun) -> dict[str, tuple[Quantity, list[float]]]:
+    """Return frequency and amplitude of each loop."""
+    amplitude = units_of(run.bench.rotates).displacement.named("amplitude")
+    return {
+        "frequency": (FREQUENCY, [loop.motion.frequency for loop in run.loops]),
+        "amplitude": (amplitude, [loop.motion.amplitude for loop in run.loops]),
+    }
