@@ -45,6 +45,7 @@ def dataset():
 def test_a_value_is_text_in_its_unit_for_reading(quantity, value, text, suffix):
     assert quantity.text(value) == text
     assert quantity.suffix == suffix
+    np.testing.assert_allclose(quantity.to_si(quantity.values(value)), value)
 
 
 def test_a_variable_carries_its_quantity_through_selection_and_concatenation():
@@ -102,12 +103,13 @@ def test_single_numbers_are_one_row():
 
 def test_the_part_in_short_is_a_box_of_the_page_and_lines_of_the_terminal():
     table = LabelledTable("gaps", dataset()[["gap"]])
-    short = Part("In short", (table,), facts=[("Capacity", "all of it")])
+    short = Part("In short", (table,), facts=[("Capacity", "all of it")], body=lambda: "<b/>")
     answer = Answer("Title", "The answer.", None, (), short=short)
     assert answer.terminal() == ["The answer.", "Capacity: all of it"]
     box = answer.page(Facts()).partition('<div class="answer">')[2].partition("</div>")[0]
     assert "In short" in box
     assert "all of it" in box
+    assert "<b/>" in box or "&lt;b/&gt;" in box
     assert list(answer.tables()) == ["gaps"]
 
 

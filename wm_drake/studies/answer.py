@@ -5,7 +5,7 @@ variables carry their quantities (`wm_drake.report.quantity`) and returns an `An
 them; it declares no class of its own.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -47,6 +47,8 @@ class Part:
         links: Names of files beside the page, and the words that link to them.
         remarks: Sentences of a list.
         facts: Pairs of word and text.
+        body: Function that returns other parts as HTML, from `report.page.fragment`; called by each
+            page, whose figures it makes.
         has_long_words: Whether the words of the tables are broken into lines.
         is_folded: Whether a reader must open the section to see more than its heading.
     """
@@ -57,6 +59,7 @@ class Part:
     links: Sequence[tuple[str, str]] = ()
     remarks: Sequence[str] = ()
     facts: Sequence[tuple[str, str]] = ()
+    body: Callable[[], str] | None = None
     has_long_words: bool = False
     is_folded: bool = False
 
@@ -82,6 +85,7 @@ class Answer(Result):
             the terminal.
         short: Part in a box between the answer and the contents. Its facts are also printed.
         diverged: A line for each run that diverged.
+        script: Script of the page, beside that of the pictures.
     """
 
     title: str
@@ -94,6 +98,7 @@ class Answer(Result):
     warned: tuple[str, ...] = ()
     short: Part | None = None
     diverged: tuple[str, ...] = ()
+    script: Path | None = None
     float_format: ClassVar[str] = "%.9g"
 
     def labelled(self) -> dict[str, LabelledTable]:
@@ -137,6 +142,7 @@ class Answer(Result):
             [*facts.warnings, *self.warned],
             method=self.method,
             advice=_section(self.short) if self.short else None,
+            script=self.script,
         ).html()
 
     def write(self, folder: Path) -> None:
@@ -174,6 +180,7 @@ def _section(part: Part) -> Any:
         links=part.links,
         remarks=part.remarks,
         facts=part.facts,
+        body=part.body() if part.body else "",
         has_long_words=part.has_long_words,
         is_folded=part.is_folded,
     )
