@@ -74,6 +74,8 @@ class Answer(Result):
         details: How the result was computed, as pairs of word and text.
         method: Sentences on the method, below the details.
         files: Other files as text or bytes, by their names.
+        warned: Sentences on what a reader must know before the answer, in a box at the top and on
+            the terminal.
         diverged: A line for each run that diverged.
     """
 
@@ -84,6 +86,7 @@ class Answer(Result):
     details: tuple[tuple[str, str], ...] = ()
     method: str = ""
     files: Mapping[str, str | bytes] = field(default_factory=dict)
+    warned: tuple[str, ...] = ()
     diverged: tuple[str, ...] = ()
 
     def labelled(self) -> dict[str, LabelledTable]:
@@ -118,7 +121,7 @@ class Answer(Result):
             [_section(part) for part in self.parts],
             [*about, time, *self.details, *facts.rows()],
             self.machine,
-            facts.warnings,
+            [*facts.warnings, *self.warned],
             method=self.method,
         ).html()
 
@@ -128,6 +131,10 @@ class Answer(Result):
         for name, content in self.files.items():
             data = content.encode("utf-8") if isinstance(content, str) else content
             (folder / name).write_bytes(data)
+
+    def warnings(self) -> tuple[str, ...]:
+        """Return warnings of the result for the terminal."""
+        return self.warned
 
     def failures(self) -> tuple[str, ...]:
         """Return a line for each run that diverged."""
