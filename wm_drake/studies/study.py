@@ -315,18 +315,18 @@ class Study:
 
 SHIPPED = (
     "balancer.options:BALANCER",
-    "calibration.options:CALIBRATE",
-    "pareto.options:DESIGN",
+    "calibrate.options:CALIBRATE",
+    "design.options:DESIGN",
     "drive.options:DRIVE",
     "gasket.options:GASKET",
     "gasket_curves.options:GASKET_CURVES",
     "gasket_damping.options:GASKET_DAMPING",
     "gasket_geometry.options:GASKET_GEOMETRY",
     "modes.options:MODES",
-    "steady.options:RESPONSE",
+    "response.options:RESPONSE",
     "spin.options:SPIN",
     "spin_cycle.options:SPIN_CYCLE",
-    "spin_identification.options:SPIN_IDENTIFY",
+    "spin_identify.options:SPIN_IDENTIFY",
     "tolerance.options:TOLERANCE",
     "verdict.options:VERDICT",
 )
