@@ -31,8 +31,8 @@ from wm_drake.simulation.balance import in_planes, rings_of
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.steps import checked_step
 from wm_drake.studies.balancer.options import BalancerOptions
+from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import quantities_of
-from wm_drake.studies.run import Executor
 from wm_drake.studies.study import Result, Task
 
 MEASURES = ("amplitudes in regions",)

@@ -36,8 +36,8 @@ from wm_drake.studies.calibrate.prediction import Prediction, check_held_out, pr
 from wm_drake.studies.calibrate.response_targets import CONTRIBUTION, TRIALS, with_deviations
 from wm_drake.studies.calibrate.solutions import percents_of, solved_machine
 from wm_drake.studies.calibrate.targets import AMPLITUDE, MILLIMETRE, Targets, targets_of
+from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import existing_file, pairs_of, with_measured
-from wm_drake.studies.run import Executor
 from wm_drake.studies.study import Facts, Result, Task
 
 

@@ -18,9 +18,9 @@ from wm_drake.parameters.units import Unit
 from wm_drake.solid.curves import AXIAL, MOTIONS, RADIAL, TILT, TWIST, Curve, Gasket, Mesh
 from wm_drake.solid.deformed import Deformed, deformed, wrinkles
 from wm_drake.solid.touching import Faces
+from wm_drake.studies.executor import Executor
 from wm_drake.studies.gasket_curves.options import CurvesOptions
 from wm_drake.studies.inputs import quantities_of
-from wm_drake.studies.run import Executor
 from wm_drake.studies.study import Result, Task
 
 WRINKLED = 0.03

@@ -29,13 +29,13 @@ from wm_drake.simulation.cases import Case
 from wm_drake.simulation.displacements import smooth_envelope
 from wm_drake.simulation.records import Record, read_measured
 from wm_drake.simulation.runs import simulate
+from wm_drake.studies.executor import Executor
 from wm_drake.studies.fitting.grid import Round, grid_search, simplex_search
 from wm_drake.studies.fitting.jackknife import Interval, jackknife_interval
 from wm_drake.studies.fitting.problem import NormProblem, Unknown
 from wm_drake.studies.fitting.search import Optimum
 from wm_drake.studies.gasket_damping.options import GasketDampingOptions
 from wm_drake.studies.inputs import existing_file
-from wm_drake.studies.run import Executor
 from wm_drake.studies.study import Facts, Result, Task
 
 if TYPE_CHECKING:

@@ -20,6 +20,7 @@ from wm_drake.parameters.units import Unit, plain_number
 from wm_drake.simulation.cases import Case
 from wm_drake.solid.curves import MOTIONS, Gasket, Mesh
 from wm_drake.solid.deformed import deformed
+from wm_drake.studies.executor import Executor
 from wm_drake.studies.gasket_curves.study import (
     GasketStiffness,
     check_gasket,
@@ -32,7 +33,6 @@ from wm_drake.studies.gasket_curves.study import (
 from wm_drake.studies.gasket_geometry import drawings
 from wm_drake.studies.gasket_geometry.options import GeometryOptions
 from wm_drake.studies.inputs import pairs_of, selected_cases
-from wm_drake.studies.run import Executor
 from wm_drake.studies.study import Result, Task
 
 MEASURES = ("amplitudes", "gap", "extremes")

@@ -15,6 +15,7 @@ from wm_drake.errors import input_error
 from wm_drake.parameters.units import Unit
 from wm_drake.rigs.measured import MeasuredMotion
 from wm_drake.studies.components import axes_of, existing_files, mass_of, target_of
+from wm_drake.studies.executor import Executor
 from wm_drake.studies.fitting.fit import Fit
 from wm_drake.studies.fitting.page import estimates_frame, undetermined_sentences, values_table
 from wm_drake.studies.identify.comparison import (
@@ -53,7 +54,6 @@ from wm_drake.studies.identify.page import (
 from wm_drake.studies.identify.static_tests import StaticTask
 from wm_drake.studies.inputs import pairs_of, quantities_of
 from wm_drake.studies.rig.units import units_of
-from wm_drake.studies.run import Executor
 from wm_drake.studies.study import Result, Task
 
 

@@ -21,11 +21,11 @@ from wm_drake.parameters.units import Unit
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.displacements import envelopes
 from wm_drake.simulation.records import Record
+from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import quantities_of, selected_cases
 from wm_drake.studies.response.balance import HARMONICS, SAMPLES
 from wm_drake.studies.response.options import ResponseOptions
 from wm_drake.studies.response.response import response_of
-from wm_drake.studies.run import Executor
 from wm_drake.studies.study import Result, Task
 
 RATES_RPM_S = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0)

@@ -26,6 +26,7 @@ from wm_drake.rigs import (
     run_rig,
 )
 from wm_drake.studies.components import axes_of, mass_of, target_of
+from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import quantities_of
 from wm_drake.studies.rig.options import AxisRigOptions, DamperRigOptions, RigOptions
 from wm_drake.studies.rig.page import (
@@ -37,7 +38,6 @@ from wm_drake.studies.rig.page import (
     measures_table,
     rig_page,
 )
-from wm_drake.studies.run import Executor
 from wm_drake.studies.study import Result, Task
 
 MM = 1e-3

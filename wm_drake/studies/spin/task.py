@@ -9,8 +9,8 @@ from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.runs import DEFAULT_ENGINE, ENGINES
+from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import selected_cases
-from wm_drake.studies.run import Executor
 from wm_drake.studies.spin.comparison import (
     MOST_VARIANTS,
     ComparisonResult,

@@ -23,8 +23,8 @@ from wm_drake.simulation.measures import MEASURES as KNOWN_MEASURES
 from wm_drake.simulation.measures import measure
 from wm_drake.simulation.mounts import mount_names
 from wm_drake.simulation.vibration import relative_error
+from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import channels_of, existing_file, runnable_profile
-from wm_drake.studies.run import Executor
 from wm_drake.studies.spin.study import run_spin
 from wm_drake.studies.spin_cycle.measured import DIMS, read_accelerations, read_rms
 from wm_drake.studies.spin_cycle.options import CycleOptions, SpinCycleOptions

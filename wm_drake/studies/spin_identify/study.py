@@ -28,11 +28,11 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.unbalance_cases import UnbalanceCase
 from wm_drake.parameters.variation import number_at, range_of
 from wm_drake.simulation.cases import Case
+from wm_drake.studies.executor import Executor
 from wm_drake.studies.fitting.fit import Fit, Verdict, verdict_of
 from wm_drake.studies.fitting.methods import least_squares
 from wm_drake.studies.fitting.problem import FitProblem, Measurement, Progress, Unknown
 from wm_drake.studies.inputs import runnable_profile
-from wm_drake.studies.run import Executor
 from wm_drake.studies.spin_cycle.measured import DIMS, rms_table
 from wm_drake.studies.spin_cycle.study import (
     average_errors,

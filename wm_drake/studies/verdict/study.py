@@ -27,8 +27,8 @@ from wm_drake.simulation.cases import Case, load_of
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.measures.responses import GAP, has_gap, known_responses, measures_of
 from wm_drake.simulation.steps import checked_step
+from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import profile_of, selected_cases
-from wm_drake.studies.run import Executor
 from wm_drake.studies.study import Result, Task
 from wm_drake.studies.tolerance.options import ToleranceOptions
 from wm_drake.studies.tolerance.shares import bound_if_none, share_of
