@@ -1,33 +1,120 @@
 """Page of a calibration."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
 
 import numpy as np
 import pandas as pd
 
 from wm_drake.model.build import build_machine
+from wm_drake.parameters import machine_yaml
 from wm_drake.parameters.measured import EXPERIMENT
 from wm_drake.report.formatting import MM_PER_M, number, percent
 from wm_drake.report.page import Picture, Section, SectionedPage, picture, versions_of
 from wm_drake.report.table import Column, Group, Row, Table, line
+from wm_drake.report.terminal import Printed
 from wm_drake.simulation.cases import case_of
-from wm_drake.studies.calibrate.calibration import BEYOND_LIMIT, Calibration
 from wm_drake.studies.calibrate.figures import errors_figure, modes_figure, quantities_figure
 from wm_drake.studies.calibrate.prediction import Prediction
 from wm_drake.studies.calibrate.solutions import percents_of, solved_machine
-from wm_drake.studies.calibrate.study import (
-    CalibrateResult,
+from wm_drake.studies.calibrate.study import BEYOND_LIMIT, Calibration, Simpler
+from wm_drake.studies.calibrate.tables import (
+    FITS,
+    amplitude_rows,
     fewer_shown,
+    fewer_table,
     predictions_shown,
     quantities_shown,
+    quantity_table,
+    response_table,
     responses_shown,
 )
 from wm_drake.studies.machine_show.description import Modes, natural_modes
 from wm_drake.studies.spin import tables
 from wm_drake.studies.spin.figures import envelopes_figure
 from wm_drake.studies.spin.study import Comparison, SpinResult, band_text, run_spin
-from wm_drake.studies.study import Facts
+from wm_drake.studies.study import Facts, Result
+
+
+@dataclass(frozen=True)
+class CalibrateResult(Result):
+    """A calibration, predictions of held-out loads, and fits with fewer quantities."""
+
+    calibration: Calibration
+    predictions: Sequence[Prediction] = ()
+    fewer: Sequence[Simpler] = ()
+    float_formats: ClassVar[Mapping[str, str]] = {"amplitudes": "%.4f"}
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Return quantities, amplitudes, and, if there are any, other responses and fewer fits."""
+        shown = {
+            "quantities": quantity_table(self.calibration),
+            "amplitudes": amplitude_rows(self.calibration),
+        }
+        if self.calibration.targets.responses:
+            shown["responses"] = response_table(self.calibration)
+        return shown | ({"fewer": fewer_table(self.fewer)} if self.fewer else {})
+
+    def texts(self) -> dict[str, str]:
+        """Return the machine of each solution."""
+        return {
+            f"machine_{number}.yaml": machine_yaml(solved_machine(solution, number))
+            for number, solution in enumerate(self.calibration.solutions, start=1)
+        }
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the result for JSON."""
+        calibration, targets = self.calibration, self.calibration.targets
+        return {
+            "searches": len(calibration.ended),
+            "solutions": [
+                {
+                    "start": s.start,
+                    "cost": s.cost,
+                    "data_cost": s.data_cost,
+                    **percents_of(s.errors).named(),
+                    "other_responses": percents_of(s.response_errors).named()
+                    if targets.responses
+                    else None,
+                }
+                for s in calibration.solutions
+            ],
+            "quantities": json.loads(quantity_table(calibration).to_json(orient="records")),
+            "predictions": [
+                {"loads": list(p.loads)}
+                | {fit: percents_of(getattr(p.kinds()[0], fit)).named() for fit in FITS}
+                | {"covered_percent": 100 * p.covered}
+                for p in self.predictions
+            ],
+            "fewer": json.loads(fewer_table(self.fewer).to_json(orient="records")),
+        }
+
+    def terminal(self) -> Printed:
+        """Yield the quantities, the errors, predictions, and fits with fewer quantities."""
+        best = self.calibration.solutions[0]
+        yield quantities_shown(self.calibration, is_short=True).terminal(
+            "Best solution, machine_1.yaml"
+        )
+        yield (
+            f"Searches: {len(self.calibration.ended)}. Distinct good solutions: "
+            f"{len(self.calibration.solutions)}."
+        )
+        yield "Absolute differences of the amplitudes from the experiment:"
+        yield f"  best solution: {percents_of(best.errors)}"
+        if best.targets.responses:
+            yield "Absolute differences of the other responses:"
+            yield f"  best solution: {percents_of(best.response_errors)}"
+        yield from (f"  beyond its limit: {text}" for text in best.values_beyond())
+        if self.predictions:
+            yield predictions_shown(self.predictions).terminal("Held-out loads")
+        if self.fewer:
+            yield fewer_shown(self.fewer).terminal("Cost against number of free quantities")
+
+    def page(self, facts: Facts) -> str:
+        """Return the page."""
+        return calibration_page(self, facts)
 
 
 def calibration_page(result: CalibrateResult, facts: Facts) -> str:

@@ -33,7 +33,7 @@ GASKET_DAMPING = Study(
     "gasket-damping",
     "Find the gasket damping for which computed and measured envelopes agree best.",
     GasketDampingOptions,
-    imported("wm_drake.studies.gasket_damping.study:GasketDampingTask"),
+    imported("wm_drake.studies.gasket_damping.task:GasketDampingTask"),
     quick={"mesh": 20.0},
     has_runs=False,
 )

@@ -1,6 +1,7 @@
 """Page of the gasket-damping study: optimum, objective function, search path, envelopes."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
 
 import numpy as np
 import pandas as pd
@@ -12,20 +13,71 @@ from wm_drake.report import figure as fig
 from wm_drake.report.formatting import MM_PER_M, number, percent, significant
 from wm_drake.report.page import Picture, Section, SectionedPage, picture, versions_of
 from wm_drake.report.table import Column, Group, Row, Table, line
+from wm_drake.report.terminal import Printed
 from wm_drake.simulation.displacements import envelopes, percent_difference
+from wm_drake.studies.fitting.search import Optimum
 from wm_drake.studies.gasket_damping.study import (
     AGREEMENT,
     LOWER,
     NOISE,
+    UNKNOWNS,
     UPPER,
     WINDOW,
     Damping,
     in_units_of_paper,
+    named,
 )
-from wm_drake.studies.study import Facts
+from wm_drake.studies.study import Facts, Result
 
 SHOWN_CELLS = 60
 """Number of columns and of rows of the coloured map of distances."""
+
+
+@dataclass(frozen=True)
+class GasketDampingResult(Result):
+    """An identification of C_L and C_T, as it is shown."""
+
+    damping: Damping
+    float_format: ClassVar[str] = "%.9g"
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Return every point of the grid search with its distance."""
+        return {"objective": points_table(self.damping)}
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the result for JSON, in the units of [B]."""
+
+        def plain(search: Optimum) -> dict[str, Any]:
+            return {
+                **named(search.point),
+                "objective_mm": search.cost,
+                "evaluations": search.evaluations,
+            }
+
+        damping, interval = self.damping, self.damping.interval
+        ends = [] if interval is None else [named(interval.low), named(interval.high)]
+        return {
+            "units": {"C_L": "N s/mm", "C_T": "N mm s/deg"},
+            "virtual_experiment": damping.truth is not None,
+            "planted": None if damping.truth is None else named(damping.truth),
+            "best": plain(damping.better)
+            | {"search": "grid" if damping.better is damping.grid else "scipy"},
+            "searches_agree": damping.searches_agree,
+            "grid": plain(damping.grid)
+            | {"rounds": len(damping.rounds), "mesh_percent": 100.0 * damping.rounds[-1].spacing},
+            "scipy": plain(damping.scipy),
+            "interval_95": {name: [end[name] for end in ends] for name in UNKNOWNS}
+            if ends
+            else None,
+        }
+
+    def terminal(self) -> Printed:
+        """Return the summary."""
+        return [summary(self.damping)]
+
+    def page(self, facts: Facts) -> str:
+        """Return the page."""
+        return gasket_damping_page(self.damping, facts)
 
 
 def gasket_damping_page(result: Damping, facts: Facts) -> str:

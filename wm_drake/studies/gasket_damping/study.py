@@ -3,10 +3,9 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
-import pandas as pd
 import xarray as xr
 
 from wm_drake.batch import RunResult, simulate_many
@@ -24,22 +23,15 @@ from wm_drake.parameters.csv_files import finite_numbers, read_csv, with_distinc
 from wm_drake.parameters.machine import OUTPUT_PERIOD
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
-from wm_drake.report.terminal import say
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.displacements import smooth_envelope
 from wm_drake.simulation.records import Record, read_measured
 from wm_drake.simulation.runs import simulate
-from wm_drake.studies.executor import Executor
 from wm_drake.studies.fitting.grid import Round, grid_search, simplex_search
 from wm_drake.studies.fitting.jackknife import Interval, jackknife_interval
 from wm_drake.studies.fitting.problem import NormProblem, Unknown
 from wm_drake.studies.fitting.search import Optimum
-from wm_drake.studies.gasket_damping.options import GasketDampingOptions
 from wm_drake.studies.inputs import existing_file
-from wm_drake.studies.study import Facts, Result, Task
-
-if TYPE_CHECKING:
-    from rich.table import Table
 
 UNKNOWNS = ("C_L", "C_T")
 
@@ -77,7 +69,7 @@ Measured: TypeAlias = Mapping[str, xr.DataArray]
 
 
 @dataclass(frozen=True)
-class Damping(Result):
+class Damping:
     """Result of an identification of C_L and C_T.
 
     Attributes:
@@ -99,7 +91,6 @@ class Damping(Result):
     truth: FloatArray | None = None
     at_best: Mapping[str, Record] = field(default_factory=dict)
     interval: Interval | None = None
-    float_format: ClassVar[str] = "%.9g"
 
     @property
     def better(self) -> Optimum:
@@ -112,85 +103,15 @@ class Damping(Result):
         difference = np.abs(self.grid.point - self.scipy.point) / (UPPER - LOWER)
         return bool(np.all(difference <= AGREEMENT))
 
-    def tables(self) -> dict[str, pd.DataFrame]:
-        """Return every point of the grid search with its distance."""
-        from wm_drake.studies.gasket_damping.page import points_table
-
-        return {"objective": points_table(self)}
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the result for JSON, in the units of [B]."""
-
-        def plain(search: Optimum) -> dict[str, Any]:
-            return {
-                **_named(search.point),
-                "objective_mm": search.cost,
-                "evaluations": search.evaluations,
-            }
-
-        interval = self.interval
-        ends = [] if interval is None else [_named(interval.low), _named(interval.high)]
-        return {
-            "units": {"C_L": "N s/mm", "C_T": "N mm s/deg"},
-            "virtual_experiment": self.truth is not None,
-            "planted": None if self.truth is None else _named(self.truth),
-            "best": plain(self.better)
-            | {"search": "grid" if self.better is self.grid else "scipy"},
-            "searches_agree": self.searches_agree,
-            "grid": plain(self.grid)
-            | {"rounds": len(self.rounds), "mesh_percent": 100.0 * self.rounds[-1].spacing},
-            "scipy": plain(self.scipy),
-            "interval_95": {name: [end[name] for end in ends] for name in UNKNOWNS}
-            if ends
-            else None,
-        }
-
-    def terminal(self) -> "list[Table | str]":
-        """Return the summary."""
-        from wm_drake.studies.gasket_damping.page import summary
-
-        return [summary(self)]
-
-    def page(self, facts: Facts) -> str:
-        """Return the page."""
-        from wm_drake.studies.gasket_damping.page import gasket_damping_page
-
-        return gasket_damping_page(self, facts)
-
 
 def in_units_of_paper(damping: FloatArray) -> FloatArray:
     """Return C_L and C_T (..., 2) in the units of [B]. [N s/mm, N mm s/deg]"""
     return damping * np.array([unit.from_si(1.0) for unit in UNITS])
 
 
-def _named(damping: FloatArray) -> dict[str, float]:
+def named(damping: FloatArray) -> dict[str, float]:
+    """Return C_L and C_T in the units of [B] by their names."""
     return dict(zip(UNKNOWNS, in_units_of_paper(damping).tolist(), strict=True))
-
-
-class GasketDampingTask(Task):
-    """The study with checked options."""
-
-    def __init__(self, options: GasketDampingOptions, machine: Machine) -> None:
-        """Check the machine, and read the records or the true values of the virtual experiment."""
-        self.options, self.machine = options, machine
-        run_up_of(machine.parameters)
-        self.records, self.truth = read_records(machine.parameters, options.record), None
-        if not options.record:
-            self.truth = planted_damping(
-                machine.parameters, options.planted_linear, options.planted_torsional
-            )
-
-    def run(self, executor: Executor) -> Damping:  # noqa: ARG002
-        """Identify the damping, from the records or from a virtual experiment."""
-        records = self.records
-        if self.truth is not None:
-            say(
-                "No measured records were given. The Drake engine runs a virtual experiment with "
-                "other damping values and noise.",
-                err=True,
-            )
-            records = virtual_experiment(self.machine.parameters, self.truth, self.options.seed)
-        return identify_damping(self.machine, records, self.truth, self.options.mesh / 100.0)
 
 
 def read_records(parameters: MachineParameters, entries: Sequence[str]) -> dict[str, xr.DataArray]:
