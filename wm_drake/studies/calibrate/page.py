@@ -34,7 +34,7 @@ from wm_drake.studies.calibrate.tables import (
 from wm_drake.studies.machine_show.description import Modes, natural_modes
 from wm_drake.studies.spin import tables
 from wm_drake.studies.spin.figures import envelopes_figure
-from wm_drake.studies.spin.study import Comparison, SpinResult, band_text, run_spin
+from wm_drake.studies.spin.study import Comparison, SpinRuns, band_text, run_spin
 from wm_drake.studies.study import Facts, Result
 
 
@@ -132,7 +132,7 @@ def calibration_page(result: CalibrateResult, facts: Facts) -> str:
 
 
 def drawn_page(
-    result: CalibrateResult, best: SpinResult, modes: Sequence[tuple[str, Modes]], facts: Facts
+    result: CalibrateResult, best: SpinRuns, modes: Sequence[tuple[str, Modes]], facts: Facts
 ) -> str:
     """Return the page with computed runs.
 
@@ -157,7 +157,7 @@ def drawn_page(
 
 def _picture_sections(
     result: CalibrateResult,
-    best: SpinResult,
+    best: SpinRuns,
     modes: Sequence[tuple[str, Modes]],
     table: pd.DataFrame,
 ) -> list[Section]:
@@ -181,9 +181,7 @@ def _picture_sections(
     ]
 
 
-def _table_sections(
-    result: CalibrateResult, best: SpinResult, table: pd.DataFrame
-) -> list[Section]:
+def _table_sections(result: CalibrateResult, best: SpinRuns, table: pd.DataFrame) -> list[Section]:
     calibration, predictions, fewer = result.calibration, result.predictions, result.fewer
     effects, relations = effects_table(calibration), relations_table(calibration)
     responses = [responses_shown(calibration)] if calibration.targets.responses else []
@@ -277,7 +275,7 @@ def summary(calibration: Calibration, predictions: Sequence[Prediction]) -> str:
     return text
 
 
-def warnings_of(best: SpinResult) -> list[str]:
+def warnings_of(best: SpinRuns) -> list[str]:
     """Return a warning for each load with which tub and housing overlap."""
     gaps = [(case, case.measures.smallest_gap) for case in best.results]
     return [
@@ -426,7 +424,7 @@ def searches_table(calibration: Calibration) -> Table:
     return Table(caption, columns, groups)
 
 
-def _errors_picture(best: SpinResult, table: pd.DataFrame) -> Picture:
+def _errors_picture(best: SpinRuns, table: pd.DataFrame) -> Picture:
     others = list(dict.fromkeys(table["source"]))
     others = [source for source in others if source not in (EXPERIMENT, tables.OURS)]
 
@@ -469,7 +467,7 @@ def _modes_picture(modes: Sequence[tuple[str, Modes]]) -> Picture:
     return picture(modes_figure(modes), f"Natural frequencies {alternative}.", caption)
 
 
-def _envelopes_picture(best: SpinResult, table: pd.DataFrame, index: int) -> Picture:
+def _envelopes_picture(best: SpinRuns, table: pd.DataFrame, index: int) -> Picture:
     case = best.results[index]
     caption = (
         f"Load {case.title}: displacement in the band {band_text(case)}. The shaded area "
@@ -482,7 +480,7 @@ def _envelopes_picture(best: SpinResult, table: pd.DataFrame, index: int) -> Pic
     )
 
 
-def _facts(calibration: Calibration, best: SpinResult, facts: Facts) -> list[tuple[str, str]]:
+def _facts(calibration: Calibration, best: SpinRuns, facts: Facts) -> list[tuple[str, str]]:
     plan = calibration.plan
     counted = sum(end.evaluations for end in calibration.ended)
     return [

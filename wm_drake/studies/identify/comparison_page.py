@@ -29,7 +29,7 @@ METHOD = (
 )
 
 
-def comparison_page(result: "ComparisonResult", facts: Facts) -> str:
+def comparison_page(result: "IdentifyComparisonResult", facts: Facts) -> str:
     """Return the page as text of one self-contained HTML file."""
     comparison = result.comparison
     count, blind = len(comparison.motions), len(comparison.validation)
@@ -241,7 +241,7 @@ def bounds_sentences(comparison: Comparison) -> list[str]:
 
 
 @dataclass(frozen=True)
-class ComparisonResult(IdentifiedResult):
+class IdentifyComparisonResult(IdentifiedResult):
     """Several laws that were fitted to the same tests."""
 
     comparison: Comparison

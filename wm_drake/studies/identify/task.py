@@ -11,7 +11,7 @@ from wm_drake.rigs.measured import MeasuredMotion
 from wm_drake.studies.components import axes_of, existing_files, mass_of, target_of
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.identify.comparison import SplitTests, check_blind, compare_laws, fit_law
-from wm_drake.studies.identify.comparison_page import ComparisonResult
+from wm_drake.studies.identify.comparison_page import IdentifyComparisonResult
 from wm_drake.studies.identify.fragment import FittedComponent
 from wm_drake.studies.identify.inputs import given_by_law, kept_fields, motions_of
 from wm_drake.studies.identify.models import ComponentModel, TestedAxis, bushing_model, damper_model
@@ -65,7 +65,7 @@ class FitTask(Task):
                 seed=options.seed,
                 progress=lambda law, fraction: bars(names.index(law), fraction),
             )
-        return ComparisonResult(component, comparison)
+        return IdentifyComparisonResult(component, comparison)
 
 
 class DamperFitTask(FitTask):
