@@ -94,8 +94,8 @@ def summary(fit: Fit, comparison: Comparison) -> str:
     if comparison.truth is None:
         return text
     errors = [
-        PERCENT.text((found - true) / true)
-        for found, true in zip(fit.values, comparison.truth, strict=True)
+        PERCENT.text((value - true) / true)
+        for value, true in zip(fit.values, comparison.truth, strict=True)
         if true
     ]
     return (
@@ -107,9 +107,9 @@ def summary(fit: Fit, comparison: Comparison) -> str:
 def about_grids(grids: xr.Dataset) -> str:
     """Return a sentence on what the grids of [B] found."""
     best = grids.isel(point=int(np.argmin(grids.objective.values)))
-    found = damping_text(np.array([best[name].item() for name in UNKNOWNS]))
+    text = damping_text(np.array([best[name].item() for name in UNKNOWNS]))
     return (
-        f"The grid search of [B] found {found}, with a distance of {text_of(best.objective)}, "
+        f"The grid search of [B] found {text}, with a distance of {text_of(best.objective)}, "
         f"after {grids.sizes['point']} evaluations."
     )
 

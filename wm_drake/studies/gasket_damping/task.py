@@ -4,6 +4,7 @@ from wm_drake.model.machine import Machine
 from wm_drake.report.terminal import say
 from wm_drake.simulation.runs import simulate
 from wm_drake.studies.answer import Answer
+from wm_drake.studies.executor import Executor
 from wm_drake.studies.fitting.methods import least_squares
 from wm_drake.studies.gasket_damping.options import GasketDampingOptions
 from wm_drake.studies.gasket_damping.page import gasket_damping_answer
@@ -19,7 +20,6 @@ from wm_drake.studies.gasket_damping.study import (
     run_up_of,
     virtual_experiment,
 )
-from wm_drake.studies.run import Executor
 from wm_drake.studies.study import Task
 
 
