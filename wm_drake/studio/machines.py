@@ -138,7 +138,7 @@ class Slider:
     """A number of a machine with a range, in which a page moves it.
 
     Attributes:
-        number: The number; of a vector, one of its entries; of a curve, its stiffness at rest.
+        number: The number; of a vector, one of its entries; of a curve, its nominal stiffness.
         low, high: Ends of the slider, in the display unit.
         allowed, usual: Ranges; None if there is no usual one.
         source: Where the value comes from.
@@ -234,9 +234,9 @@ def _sliders(parameters: MachineParameters) -> Iterator[Slider]:
 
 
 def with_curves(parameters: MachineParameters) -> Iterator[tuple[str, Any, Unit]]:
-    """Yield key path, value [SI] and unit of each number; a curve is its stiffness at rest.
+    """Yield key path, value [SI] and unit of each number; a curve is its nominal stiffness.
 
-    A curve that is flat at rest and beyond has no stiffness and is left out.
+    That is the slope of its first 20 %. A curve that is flat everywhere is left out.
     """
     curves = set()
     for key, value, unit in quantities(parameters):

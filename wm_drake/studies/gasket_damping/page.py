@@ -17,6 +17,7 @@ from wm_drake.studies.gasket_damping.study import (
     AGREEMENT,
     LOWER,
     NOISE,
+    STOP,
     UPPER,
     WINDOW,
     Damping,
@@ -175,7 +176,8 @@ def _optima(result: Damping) -> Table:
         f"envelopes at all sensors, every 5 ms from {WINDOW[0]:g} to {WINDOW[1]:g} s, [B] Eq. (2), "
         "(3). These envelopes are smooth (magnitude of the analytic signal). The grid of the "
         "search moves to its best point and is halved when it has no better point than its centre, "
-        f"until its spacing is at most {mesh}. "
+        f"until its spacing is at most {mesh}; [B] halves it in each round and stops when the "
+        f"distance falls by less than {STOP:g}. "
         "The interval shows how much the optimum depends on single curves (one sensor with one "
         "load): each is left out once (jackknife). An error that all curves share, such as a "
         "wrong stiffness of a spring, is not in it."
