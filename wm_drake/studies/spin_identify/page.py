@@ -46,26 +46,26 @@ class SpinIdentifyResult(Result):
         }
 
     def texts(self) -> dict[str, str]:
-        """Return the identified machine."""
-        return {"identified.yaml": machine_yaml(identified_machine(self.identification))}
+        """Return the result machine."""
+        return {"result.yaml": machine_yaml(identified_machine(self.identification))}
 
     def as_json(self) -> dict[str, Any]:
         """Return the result for JSON."""
-        found = self.identification
-        shown = found.fit.as_dict()
-        entries = zip(found.sought, shown["unknowns"].values(), strict=True)
+        result = self.identification
+        shown = result.fit.as_dict()
+        entries = zip(result.sought, shown["unknowns"].values(), strict=True)
         for k, (sought, entry) in enumerate(entries):
-            value, identifiable = found.fit.estimates[k].value, found.identifiable[k]
+            value, identifiable = result.fit.estimates[k].value, result.identifiable[k]
             entry |= {"keys": list(sought.keys), "found": value, "identifiable": identifiable}
-            if found.planted is not None and found.recovered is not None:
-                entry |= {"planted": float(found.planted[k]), "error": float(found.recovered[k])}
+            if result.planted is not None and result.recovered is not None:
+                entry |= {"planted": float(result.planted[k]), "error": float(result.recovered[k])}
         return {
-            "machine": found.parameters.name,
-            "virtual_experiment": found.planted is not None,
-            "cases": [case.name for case in found.cases],
-            "average_error_before": float(average_errors(found.before, found.measured).mean()),
-            "average_error_after": found.error_after,
-            "verdict": found.verdict,
+            "machine": result.parameters.name,
+            "virtual_experiment": result.planted is not None,
+            "cases": [case.name for case in result.cases],
+            "average_error_before": float(average_errors(result.before, result.measured).mean()),
+            "average_error_after": result.error_after,
+            "verdict": result.verdict,
             **shown,
         }
 
@@ -158,7 +158,7 @@ def judged(result: SpinIdentification) -> str:
         f"by {number(100.0 * result.error_after)} % on average."
     )
     if result.verdict == "poor":
-        text += " The machine does not describe the measurement: do not use the values found."
+        text += " The machine does not describe the measurement: do not use the values identified."
     return text
 
 
