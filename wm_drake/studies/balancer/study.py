@@ -28,7 +28,7 @@ from wm_drake.report.formatting import number
 from wm_drake.report.quantity import HIDDEN, SPEED, Quantity
 from wm_drake.simulation.balance import in_planes, rings_of
 from wm_drake.simulation.cases import Case
-from wm_drake.studies.run import Executor
+from wm_drake.studies.executor import Executor
 
 MEASURES = ("amplitudes in regions",)
 """Measures of `simulate_many` that the study needs."""

@@ -22,8 +22,8 @@ from wm_drake.studies.balancer.study import (
     numbers_of,
     with_factors,
 )
+from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import quantities_of
-from wm_drake.studies.run import Executor
 from wm_drake.studies.study import Task
 
 PART = Unit("dimensionless", "percent")

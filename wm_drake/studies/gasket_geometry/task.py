@@ -19,6 +19,7 @@ from wm_drake.parameters.units import Unit
 from wm_drake.simulation.cases import Case
 from wm_drake.solid.curves import MOTIONS, Gasket, Mesh
 from wm_drake.studies.answer import Answer
+from wm_drake.studies.executor import Executor
 from wm_drake.studies.gasket_curves.study import (
     GasketStiffness,
     check_gasket,
@@ -47,7 +48,6 @@ from wm_drake.studies.gasket_geometry.study import (
     surfaces_data,
 )
 from wm_drake.studies.inputs import selected_cases
-from wm_drake.studies.run import Executor
 from wm_drake.studies.study import Task
 
 FREQUENCY = Unit("Hz", "Hz")

@@ -20,6 +20,7 @@ from wm_drake.rigs import (
 )
 from wm_drake.studies.answer import Answer
 from wm_drake.studies.components import axes_of, mass_of, target_of
+from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import quantities_of
 from wm_drake.studies.rig.options import AxisRigOptions, DamperRigOptions, RigOptions
 from wm_drake.studies.rig.page import rig_answer
@@ -32,7 +33,6 @@ from wm_drake.studies.rig.study import (
     printed_verdict,
 )
 from wm_drake.studies.rig.units import LINEAR, units_of
-from wm_drake.studies.run import Executor
 from wm_drake.studies.study import Task
 
 SPONGE_MASS = Quantity("mass of the sponge", Unit("kg", "g"), form="{:g}".format)
