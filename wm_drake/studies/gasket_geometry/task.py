@@ -127,8 +127,8 @@ class GeometryTask(Task):
             "loads": ", ".join(case.name for case in self.cases),
         }
         best = drawings.changed(self.drawing, self.factors, levels[int(conditions.best)])
-        found = surfaces_data(surfaces, self.candidates, data)
-        return geometry_answer(self.factors, data, found, conditions, best)
+        fitted = surfaces_data(surfaces, self.candidates, data)
+        return geometry_answer(self.factors, data, fitted, conditions, best)
 
     def _best(self, surfaces: dict[str, Surface]) -> FloatArray:
         """Return the levels of the best candidate on the surfaces that can be built."""
