@@ -229,9 +229,9 @@ def values_data(
         ),
         "change_at_negative_end": (
             CHANGE.named("secant at the negative end"),
-            ends[:, 0] / rest - 1.0,
+            ends[0],
         ),
-        "change_at_positive_end": (CHANGE.named("at the positive end"), ends[:, 1] / rest - 1.0),
+        "change_at_positive_end": (CHANGE.named("at the positive end"), ends[1]),
     }
     data = {name: q.variable("axis", values) for name, (q, values) in numbers.items()}
     return xr.Dataset(data, {"axis": list(axes)})
