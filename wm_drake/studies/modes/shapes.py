@@ -55,7 +55,7 @@ class Mode:
     eigenvalue: complex
     frequency_hz: float
     damping_ratio: float
-    shape: FloatArray
+    shape: ComplexArray
     participation: FloatArray
     strain_energy: FloatArray
     dissipation: FloatArray
@@ -93,7 +93,7 @@ def modes_of(spectrum: Spectrum, wrench_slopes: FloatArray) -> list[Mode]:
     return modes
 
 
-def shape_of(vector: FloatArray) -> FloatArray:
+def shape_of(vector: ComplexArray) -> ComplexArray:
     """Return the motion of the tub in an eigenvector; the largest component becomes 1. (6,)"""
     weight = np.repeat([ANGLE_ARM, 1.0], 3)
     tub = vector[_POSITIONS]
