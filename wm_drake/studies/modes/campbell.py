@@ -38,7 +38,7 @@ class Campbell:
     """
 
     speed: FloatArray
-    value: FloatArray
+    value: ComplexArray
     mac: FloatArray
 
     @property
