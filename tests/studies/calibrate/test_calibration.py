@@ -13,12 +13,12 @@ from wm_drake.model.build import build_machine
 from wm_drake.parameters import load_machine
 from wm_drake.parameters.files import yaml_text
 from wm_drake.parameters.free import Measured, load_free
-from wm_drake.studies.calibrate.calibration import Plan, calibrate, fit_with_fewer, identity_of
 from wm_drake.studies.calibrate.computed import Evaluation, Runner
 from wm_drake.studies.calibrate.parameter_map import parameter_map_of
 from wm_drake.studies.calibrate.prediction import predict
 from wm_drake.studies.calibrate.solutions import Solution, distinct, solved_machine
-from wm_drake.studies.calibrate.study import (
+from wm_drake.studies.calibrate.study import Plan, calibrate, fit_with_fewer, identity_of
+from wm_drake.studies.calibrate.tables import (
     amplitude_rows,
     fewer_table,
     prediction_table,

@@ -23,7 +23,7 @@ from wm_drake.studies.calibrate.response_targets import (
     with_deviations,
 )
 from wm_drake.studies.calibrate.solutions import Solution
-from wm_drake.studies.calibrate.study import prediction_table
+from wm_drake.studies.calibrate.tables import prediction_table
 from wm_drake.studies.calibrate.targets import targets_of
 from wm_drake.studies.doe.orthogonal import orthogonal_levels
 from wm_drake.studies.fitting.posterior import Posterior

@@ -15,7 +15,7 @@ from wm_drake.studies.spin.comparison import (
     steady_window,
 )
 from wm_drake.studies.spin.comparison_page import effect_amplitudes, effect_summary
-from wm_drake.studies.spin.study import CaseResult, Comparison, SpinResult
+from wm_drake.studies.spin.study import CaseResult, Comparison, SpinRuns
 
 SENSORS = ["Xr", "Yr", "Zr", "Xf", "Yf", "Zf"]
 
@@ -60,7 +60,7 @@ def result(parameters, gasket, transient, steady, comparison):
     table = xr.Dataset({"amplitude": sizes, "critical_speed": sizes})
     measures = Measures(table, None, None, None, has_cabinet=False)
     results = (CaseResult(case, record, measures, 0.0),)
-    return SpinResult(parameters, "compiled", 0.0025, results, comparison)
+    return SpinRuns(parameters, "compiled", 0.0025, results, comparison)
 
 
 @pytest.mark.parametrize("comparison", [Comparison.AS_MEASURED, Comparison.NONE])

@@ -64,7 +64,7 @@ CALIBRATE = Study(
     "calibrate",
     "Fit unknown numbers of a machine to measured amplitudes, within bounds and with priors.",
     CalibrateOptions,
-    imported("wm_drake.studies.calibrate.study:CalibrateTask"),
+    imported("wm_drake.studies.calibrate.task:CalibrateTask"),
     quick={"starts": 1, "iterations": 3},
     has_cluster=False,
     group="",
