@@ -115,4 +115,4 @@ def case_result(
 
 
 def spin_result(parameters: MachineParameters, results: Sequence[CaseResult]) -> SpinResult:
-    return SpinResult(parameters, "drake", 2.5e-3, tuple(results))
+    return SpinResult(parameters, "drake", tuple(results))

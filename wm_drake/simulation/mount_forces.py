@@ -92,7 +92,7 @@ def speed_ranges(record: Record, profile: SpinProfile) -> list[SpeedRange]:
         ]
     in_rpm = Unit("rad/s", "rpm").from_si(1.0)
     speed = in_rpm * np.abs(record.drum_speed.values)
-    highest = in_rpm * float(np.max(np.abs(profile.speed)))
+    highest = in_rpm * profile.highest_speed
     width = SPEED_STEP_RPM * max(1.0, np.ceil(highest / SPEED_STEP_RPM / MOST_RANGES))
     count = max(1, int(np.ceil(highest / width * (1.0 - 1e-9))))
     place = np.minimum((speed / width * (1.0 + 1e-9)).astype(int), count - 1)

@@ -179,7 +179,7 @@ def modes(
     amplitudes = np.union1d(AMPLITUDES, amplitude)
     over = amplitude_modes(setup, spectra[STUCK], natural[STUCK], amplitudes)
     progress(0.3)
-    diagrams = _diagrams(linear, spectra, max(parameters.profile.speed))
+    diagrams = _diagrams(linear, spectra, parameters.profile.highest_speed)
     progress(0.4)
     bars = _sensitivities(machine, load, gasket, spectra, lambda part: progress(0.4 + 0.5 * part))
     peaks = None

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from wm_drake.parameters.unbalance_cases import UnbalanceCase
-from wm_drake.report.formatting import MM_PER_M, number, plain, slack_warning
+from wm_drake.report.formatting import MM_PER_M, gap_size, number, plain, slack_warning
 from wm_drake.report.page import Picture, Section, SectionedPage, picture
 from wm_drake.report.terminal import Printed
 from wm_drake.simulation.measures.as_json import as_json
@@ -157,7 +157,7 @@ def summary(result: SpinCycleResult, engine: str) -> str:
         nearest = str(gaps.case.values[int(np.argmin(gaps.values))])
         sentences.append(
             "The smallest gap between tub and housing is "
-            f"{number(MM_PER_M * float(gaps.min()))} mm, in case {nearest} "
+            f"{gap_size(float(gaps.min()))}, in case {nearest} "
             f"({case_description(_case(result, nearest))})."
         )
     apart = float(disagreement(result).max(skipna=True))
