@@ -24,7 +24,7 @@ from wm_drake.studies.modes.campbell import Campbell, CriticalSpeed, campbell, c
 from wm_drake.studies.modes.linearisation import MODES, Linearisation, Spectrum, check_fixed_cabinet
 from wm_drake.studies.modes.options import ModesOptions
 from wm_drake.studies.modes.sensitivity import Sensitivity, numbers_of, sensitivities
-from wm_drake.studies.modes.shapes import ANGLE_ARM, Mode, modes_of
+from wm_drake.studies.modes.shapes import ANGLE_ARM, Mode, modes_of, names_at_speed
 from wm_drake.studies.run import Executor
 from wm_drake.studies.study import Result, Task
 from wm_drake.studies.threads import on_one_thread
@@ -87,6 +87,7 @@ class MachineModes(NaturalModes):
         elements: Names of the elements on the tub, in the order of the shares of a mode.
         over_amplitude: Each mode over its amplitude.
         diagrams: Campbell diagram of `STUCK` and `SLIDING`.
+        names: Name of each mode of these at each speed, from its shape there.
         critical: Critical speeds of each.
         sensitivities: Of each, for a drum that stands still.
         run_up: Peaks of the machine's own run-up, one run a load: `critical_speed` and `amplitude`
@@ -98,9 +99,15 @@ class MachineModes(NaturalModes):
     elements: list[str]
     over_amplitude: list[AmplitudeMode]
     diagrams: dict[str, Campbell]
+    names: dict[str, list[list[str]]]
     critical: dict[str, list[CriticalSpeed]]
     sensitivities: dict[str, list[Sensitivity]]
     run_up: xr.Dataset | None
+
+    def name_at(self, linearisation: str, mode: int, speed: float) -> str:
+        """Return the name of a mode at the nearest speed of its diagram. [rad/s]"""
+        nearest = int(np.argmin(np.abs(self.diagrams[linearisation].speed - speed)))
+        return self.names[linearisation][nearest][mode]
 
     @property
     def critical_speeds(self) -> FloatArray:
@@ -198,6 +205,10 @@ def modes(
         linear[STUCK].names,
         over,
         diagrams,
+        {
+            name: [[mode.name for mode in natural[name]], *map(names_at_speed, diagram.spectra[1:])]
+            for name, diagram in diagrams.items()
+        },
         {name: critical_speeds(diagram, ORDERS) for name, diagram in diagrams.items()},
         bars,
         peaks,
