@@ -363,7 +363,9 @@ class EnvelopeModel:
 def _envelopes(displacement: xr.DataArray) -> FloatArray:
     """Return the upper and lower smooth envelopes (2, time, sensor) in the window. [m]"""
     whole = smooth_envelope(xr.Dataset({"displacement": displacement}))
-    upper = whole.sel(time=slice(WINDOW[0] - 1e-9, WINDOW[1] + 1e-9)).values
+    first, last = np.rint(np.array(WINDOW) / OUTPUT_PERIOD)
+    compared = OUTPUT_PERIOD * np.arange(first, last + 1)  # runs may have closer samples
+    upper = whole.sel(time=compared, method="nearest").values
     return np.stack([upper, -upper])
 
 
