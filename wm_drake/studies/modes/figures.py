@@ -3,6 +3,7 @@
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 
@@ -141,7 +142,11 @@ def _mode_names(result: MachineModes, name: str, last_rpm: float, top: float) ->
     """Return the names of the modes at standstill and at the right end, apart from each other."""
     hertz, names = result.diagrams[name].frequency_hz, result.names[name]
     marks: list[fig.Mark] = []
-    for end, x, side in ((0, -0.015, "right"), (-1, 1.015, "left")):
+    ends: tuple[tuple[int, float, Literal["left", "right"]], ...] = (
+        (0, -0.015, "right"),
+        (-1, 1.015, "left"),
+    )
+    for end, x, side in ends:
         known = np.flatnonzero(np.isfinite(hertz[end]))
         order = known[np.argsort(hertz[end][known])]
         places = hertz[end][order]

@@ -116,14 +116,14 @@ class ComparisonResult(Result):
     def terminal(self) -> Printed:
         """Return the amplitudes, the effect of the gasket, and the smallest gaps."""
         from wm_drake.studies.spin.comparison_page import effect_summary, terminal_table
-        from wm_drake.studies.spin.tables import amplitude_lines, gap_text
+        from wm_drake.studies.spin.tables import amplitude_lines
 
         amplitudes = self.tables()["amplitudes"]
         gaps = [
-            f"{variant.name}, {case.case.name}: {text}"
+            f"{variant.name}, {case.case.name}: smallest gap {text}"
             for variant in self.variants
             for case in variant.result.results
-            if (text := gap_text(case))
+            if (text := case.gap_text)
         ]
         shown: list[Any] = [amplitude_lines("Displacement amplitudes, in mm", amplitudes), *gaps]
         if self.effect is None:

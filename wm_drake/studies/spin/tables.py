@@ -389,7 +389,8 @@ def amplitude_lines(title: str, amplitudes: pd.DataFrame) -> "TerminalTable":
 
 def case_lines(parameters: MachineParameters, case: CaseResult) -> list[str]:
     """Return a line for each measure of a case beside its amplitudes."""
-    measures, lines = case.measures, [f"smallest gap {case.gap_text}" * bool(case.gap_text)]
+    measures, gap = case.measures, case.gap_text
+    lines = [f"smallest gap {gap}"] if gap else []
     tensions = measures.smallest_tension
     shown = zip(tensions.spring.values, tensions.values, strict=True)
     words = ", ".join(f"{name} {tension:.1f} N" for name, tension in shown)
@@ -407,7 +408,7 @@ def case_lines(parameters: MachineParameters, case: CaseResult) -> list[str]:
     if (walk := measures.walk) is not None:
         turn = math.degrees(walk.turn)
         lines.append(f"the cabinet walks {1e3 * walk.distance:.1f} mm and turns by {turn:.1f} deg")
-    return [f"{case.case.name}: {line}" for line in lines if line]
+    return [f"{case.case.name}: {line}" for line in lines]
 
 
 def _drive_text(measures: Measures) -> str:

@@ -200,8 +200,8 @@ def missing_regions(computed: xr.DataArray, measured: xr.DataArray) -> dict[str,
 
     They have no value there that is both computed and measured.
     """
-    is_measured = np.isfinite(measured)
-    compared = (is_measured & np.isfinite(computed)).any(DIMS[2:])
+    is_measured = measured.notnull()
+    compared = (is_measured & computed.notnull()).any(DIMS[2:])
     left_out = ~compared & is_measured.any(DIMS[1:])
     cases = {
         str(region): [str(case) for case in left_out.case.values[of_region]]
