@@ -39,19 +39,19 @@ from wm_drake.parameters.measured import (
 from wm_drake.parameters.published import CONSTANT, published_results
 from wm_drake.report.progress import progress_bar
 from wm_drake.simulation.measures.responses import known_responses
-from wm_drake.studies.calibration.calibration import (
+from wm_drake.studies.calibrate.calibration import (
     Calibration,
     Plan,
     calibrate,
     fit_with_fewer,
     identity_of,
 )
-from wm_drake.studies.calibration.computed import Runner
-from wm_drake.studies.calibration.prediction import Prediction, predict
-from wm_drake.studies.calibration.response_targets import with_deviations
-from wm_drake.studies.calibration.solutions import Solution, percents_of, solved_machine
-from wm_drake.studies.calibration.study import FITS, fewer_table, prediction_table
-from wm_drake.studies.calibration.targets import Targets, targets_of
+from wm_drake.studies.calibrate.computed import Runner
+from wm_drake.studies.calibrate.prediction import Prediction, predict
+from wm_drake.studies.calibrate.response_targets import with_deviations
+from wm_drake.studies.calibrate.solutions import Solution, percents_of, solved_machine
+from wm_drake.studies.calibrate.study import FITS, fewer_table, prediction_table
+from wm_drake.studies.calibrate.targets import Targets, targets_of
 from wm_drake.studies.gasket.screening import published_for
 
 REFERENCE, EARLIER = "reference", "reference_2026_11"

@@ -34,7 +34,7 @@ from wm_drake.parameters import MachineParameters, published_results
 from wm_drake.parameters.files import read_yaml
 from wm_drake.parameters.unbalance_cases import load_unbalance_cases
 from wm_drake.rigs import Harmonic
-from wm_drake.studies.identification.table2 import (
+from wm_drake.studies.identify.table2 import (
     coulomb_fits,
     mstv_motions,
     mstv_of_c,

@@ -144,7 +144,7 @@ def test_no_room_imports_by_a_name_made_at_run_time():
         ("wm_drake.laws.friction", "from wm_drake.errors import InputError"),
         ("wm_drake.model.scene", "from wm_drake.engines.drake import run_drake"),
         ("wm_drake.simulation.runs", "from wm_drake import batch"),
-        ("wm_drake.studies.description.description", "import matplotlib.pyplot as plt"),
+        ("wm_drake.studies.machine_show.description", "import matplotlib.pyplot as plt"),
         ("wm_drake.cli", "def f():\n    import matplotlib"),
         ("wm_drake.cli", "from tests.conftest import wm_drake"),
         ("wm_drake.studies.spin.study", "import analyses.run"),

@@ -29,7 +29,7 @@ COMMANDS = {
         "Simulate the run-up of the drum through the resonances, and report the motion of the tub.",
     ),
     "calibrate": (
-        "wm_drake.studies.calibration.options:CALIBRATE",
+        "wm_drake.studies.calibrate.options:CALIBRATE",
         "Fit unknown numbers of a machine to measured amplitudes, within bounds and with priors.",
     ),
     "studio": (
@@ -42,7 +42,7 @@ COMMANDS = {
         "Compute a gasket from its drawing.",
     ),
     "identify": (
-        "wm_drake.studies.identification.options:IDENTIFY",
+        "wm_drake.studies.identify.options:IDENTIFY",
         "Find the numbers of a component from measured loops.",
     ),
     "machine": ("wm_drake.cli.machine:app", "List, start, check and show machine files."),

@@ -306,7 +306,7 @@ def run_study(name: str, machine: Any = None, *, quiet: bool = False, **options:
         >>> import wm_drake as wm
         >>> result = wm.run_study("drive", load=["middle"], quick=True, quiet=True)
         >>> list(result.tables())
-        ['thresholds', 'map', 'estimation']
+        ['map', 'estimation', 'thresholds', 'errors']
     """
     study = STUDIES.find(name)
     several = machine if isinstance(machine, (list, tuple)) else [machine]
@@ -396,7 +396,7 @@ def execute(order: Order) -> tuple[Result, Facts, tuple[str, ...]]:
         wall_s = time.perf_counter() - begin
         warned = (*about_machines, *_warnings(machines, friction_warnings), *not_converged)
         verified = "" if error is None else error.text
-        facts = Facts(order.command, wall_s, warned, step, integrator, verified)
+        facts = Facts(order.command, wall_s, warned, step, integrator, verified, executor.runs)
         files = _written(result, facts, order.run.out, run)
     return result, facts, files
 

@@ -22,8 +22,8 @@ from wm_drake.model.machine import Setup
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.modes.linearisation import Spectrum
 from wm_drake.studies.modes.shapes import Mode
-from wm_drake.studies.steady.balance import HarmonicBalance
-from wm_drake.studies.steady.series import Series
+from wm_drake.studies.response.balance import HarmonicBalance
+from wm_drake.studies.response.series import Series
 from wm_drake.studies.threads import on_one_thread
 
 SMALLEST_AMPLITUDE = 1e-5
