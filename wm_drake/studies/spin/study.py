@@ -242,7 +242,7 @@ def run_spin(
             for index, item in enumerate(work_items)
         ]
     natural = _modes_of(built, cases[0]) if modes else None
-    return SpinRuns(parameters, engine, step, tuple(results), comparison, natural)
+    return SpinRuns(parameters, engine, tuple(results), comparison, natural)
 
 
 def _modes_of(machine: Machine, case: Case) -> "NaturalModes | None":
