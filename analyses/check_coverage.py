@@ -24,10 +24,10 @@ from wm_drake.model.machine import Machine
 from wm_drake.parameters import load_machine
 from wm_drake.parameters.free import FreeFile, load_free
 from wm_drake.parameters.types import FloatArray
-from wm_drake.studies.calibrate.calibration import Calibration, Plan, calibrate, identity_of
 from wm_drake.studies.calibrate.computed import Evaluation, Runner
 from wm_drake.studies.calibrate.options import CalibrateOptions
 from wm_drake.studies.calibrate.parameter_map import ParameterMap, parameter_map_of
+from wm_drake.studies.calibrate.study import Calibration, Plan, calibrate, identity_of
 from wm_drake.studies.calibrate.targets import Targets
 
 LOADS = tuple((name, True) for name in ("middle", "counter", "back", "front"))

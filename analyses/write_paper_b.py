@@ -28,8 +28,8 @@ from wm_drake.parameters import (
 )
 from wm_drake.parameters.free import FreeFile
 from wm_drake.parameters.measured import EXPERIMENT
-from wm_drake.studies.calibrate.calibration import Plan, calibrate, identity_of
 from wm_drake.studies.calibrate.computed import Runner
+from wm_drake.studies.calibrate.study import Plan, calibrate, identity_of
 from wm_drake.studies.calibrate.targets import targets_of
 from wm_drake.studies.gasket.screening import Published, Screening, published_for
 

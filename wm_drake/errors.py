@@ -70,7 +70,7 @@ class InputError(WmDrakeError):
         self.problems = tuple(problems)
         lines = [str(problem) for problem in self.problems[:MOST_PROBLEMS]]
         if left_out := len(self.problems) - len(lines):
-            lines.append(f"and {left_out} more problem{'s' * (left_out > 1)}")
+            lines.append(f"and {left_out} more problem{'s' if left_out > 1 else ''}")
         super().__init__("\n".join(lines))
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -44,7 +44,7 @@ if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
 
     from wm_drake.parameters import MachineParameters
     from wm_drake.report.figure import Figure
-    from wm_drake.studies.run import Executor
+    from wm_drake.studies.executor import Executor
 
 
 def option(default: Any, help_text: str, metavar: str = "", flag: str = "", **limits: Any) -> Any:

@@ -8,12 +8,11 @@ import pytest
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.free import load_free
 from wm_drake.simulation.cases import Case
-from wm_drake.studies.calibrate.calibration import Calibration, Plan
-from wm_drake.studies.calibrate.page import certainty, drawn_page, summary
+from wm_drake.studies.calibrate.page import CalibrateResult, certainty, drawn_page, summary
 from wm_drake.studies.calibrate.parameter_map import parameter_map_of
 from wm_drake.studies.calibrate.prediction import Prediction
 from wm_drake.studies.calibrate.solutions import Solution
-from wm_drake.studies.calibrate.study import CalibrateResult
+from wm_drake.studies.calibrate.study import Calibration, Plan
 from wm_drake.studies.calibrate.targets import Targets
 from wm_drake.studies.fitting.posterior import Posterior
 from wm_drake.studies.machine_show.description import natural_modes

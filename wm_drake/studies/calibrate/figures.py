@@ -9,7 +9,7 @@ from wm_drake.engines.trajectory import COORDINATES
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report import figure as fig
 from wm_drake.report.formatting import number
-from wm_drake.studies.calibrate.calibration import Calibration
+from wm_drake.studies.calibrate.study import Calibration
 from wm_drake.studies.machine_show.description import Modes
 
 OTHER = "#8a8f98"

@@ -1,33 +1,114 @@
 """Page of a calibration."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
 
 import numpy as np
 import pandas as pd
 
 from wm_drake.model.build import build_machine
+from wm_drake.parameters import machine_yaml
 from wm_drake.parameters.measured import EXPERIMENT
 from wm_drake.report.formatting import MM_PER_M, number, percent
 from wm_drake.report.page import Picture, Section, SectionedPage, picture, versions_of
 from wm_drake.report.table import Column, Group, Row, Table, line
+from wm_drake.report.terminal import Printed
 from wm_drake.simulation.cases import case_of
-from wm_drake.studies.calibrate.calibration import BEYOND_LIMIT, Calibration
 from wm_drake.studies.calibrate.figures import errors_figure, modes_figure, quantities_figure
 from wm_drake.studies.calibrate.prediction import Prediction
 from wm_drake.studies.calibrate.solutions import percents_of, solved_machine
-from wm_drake.studies.calibrate.study import (
-    CalibrateResult,
-    fewer_shown,
+from wm_drake.studies.calibrate.study import BEYOND_LIMIT, Calibration
+from wm_drake.studies.calibrate.tables import (
+    FITS,
+    amplitude_rows,
     predictions_shown,
     quantities_shown,
+    quantity_table,
+    response_table,
     responses_shown,
 )
 from wm_drake.studies.machine_show.description import Modes, natural_modes
 from wm_drake.studies.spin import tables
 from wm_drake.studies.spin.figures import envelopes_figure
-from wm_drake.studies.spin.study import Comparison, SpinResult, band_text, run_spin
-from wm_drake.studies.study import Facts
+from wm_drake.studies.spin.study import Comparison, SpinRuns, band_text, run_spin
+from wm_drake.studies.study import Facts, Result
+
+
+@dataclass(frozen=True)
+class CalibrateResult(Result):
+    """A calibration, and predictions of held-out loads."""
+
+    calibration: Calibration
+    predictions: Sequence[Prediction] = ()
+    float_formats: ClassVar[Mapping[str, str]] = {"amplitudes": "%.4f"}
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Return quantities, amplitudes, and, if there are any, other responses."""
+        shown = {
+            "quantities": quantity_table(self.calibration),
+            "amplitudes": amplitude_rows(self.calibration),
+        }
+        if self.calibration.targets.responses:
+            shown["responses"] = response_table(self.calibration)
+        return shown
+
+    def texts(self) -> dict[str, str]:
+        """Return the machine of each solution."""
+        return {
+            f"machine_{number}.yaml": machine_yaml(solved_machine(solution, number))
+            for number, solution in enumerate(self.calibration.solutions, start=1)
+        }
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the result for JSON."""
+        calibration, targets = self.calibration, self.calibration.targets
+        return {
+            "searches": len(calibration.ended),
+            "solutions": [
+                {
+                    "start": s.start,
+                    "cost": s.cost,
+                    "data_cost": s.data_cost,
+                    **percents_of(s.errors).named(),
+                    "other_responses": percents_of(s.response_errors).named()
+                    if targets.responses
+                    else None,
+                }
+                for s in calibration.solutions
+            ],
+            "quantities": json.loads(quantity_table(calibration).to_json(orient="records")),
+            "predictions": [
+                {"loads": list(p.loads)}
+                | {fit: percents_of(getattr(p.kinds()[0], fit)).named() for fit in FITS}
+                | {"covered_percent": 100 * p.covered}
+                for p in self.predictions
+            ],
+        }
+
+    def terminal(self) -> Printed:
+        """Yield the quantities, the errors and predictions."""
+        best = self.calibration.solutions[0]
+        yield quantities_shown(self.calibration, is_short=True).terminal(
+            "Best solution, machine_1.yaml"
+        )
+        yield (
+            f"Searches: {len(self.calibration.ended)}. Distinct good solutions: "
+            f"{len(self.calibration.solutions)}."
+        )
+        yield "Absolute differences of the amplitudes from the experiment:"
+        yield f"  best solution: {percents_of(best.errors)}"
+        if best.targets.responses:
+            yield "Absolute differences of the other responses:"
+            yield f"  best solution: {percents_of(best.response_errors)}"
+        yield from (f"  beyond its limit: {text}" for text in best.values_beyond())
+        if self.predictions:
+            yield predictions_shown(self.predictions).terminal("Held-out loads")
+
+    def page(self, facts: Facts) -> str:
+        """Return the page."""
+        return calibration_page(self, facts)
 
 
 def calibration_page(result: CalibrateResult, facts: Facts) -> str:
@@ -45,7 +126,7 @@ def calibration_page(result: CalibrateResult, facts: Facts) -> str:
 
 
 def drawn_page(
-    result: CalibrateResult, best: SpinResult, modes: Sequence[tuple[str, Modes]], facts: Facts
+    result: CalibrateResult, best: SpinRuns, modes: Sequence[tuple[str, Modes]], facts: Facts
 ) -> str:
     """Return the page with computed runs.
 
@@ -70,7 +151,7 @@ def drawn_page(
 
 def _picture_sections(
     result: CalibrateResult,
-    best: SpinResult,
+    best: SpinRuns,
     modes: Sequence[tuple[str, Modes]],
     table: pd.DataFrame,
 ) -> list[Section]:
@@ -94,10 +175,8 @@ def _picture_sections(
     ]
 
 
-def _table_sections(
-    result: CalibrateResult, best: SpinResult, table: pd.DataFrame
-) -> list[Section]:
-    calibration, predictions, fewer = result.calibration, result.predictions, result.fewer
+def _table_sections(result: CalibrateResult, best: SpinRuns, table: pd.DataFrame) -> list[Section]:
+    calibration, predictions = result.calibration, result.predictions
     effects, relations = effects_table(calibration), relations_table(calibration)
     responses = [responses_shown(calibration)] if calibration.targets.responses else []
     predicted = [predictions_shown(predictions)] if predictions else []
@@ -112,7 +191,6 @@ def _table_sections(
             "prediction", "Prediction", tables=predicted, text=PREDICTION if predictions else ""
         ),
         Section("quantities", "Quantities", tables=quantities),
-        Section("fewer", "Fewer free quantities", tables=[fewer_shown(fewer)] if fewer else []),
         Section("speeds", "Critical speeds and smallest gaps", tables=speeds),
         Section("searches", "Searches", tables=[searches_table(calibration)]),
     ]
@@ -190,7 +268,7 @@ def summary(calibration: Calibration, predictions: Sequence[Prediction]) -> str:
     return text
 
 
-def warnings_of(best: SpinResult) -> list[str]:
+def warnings_of(best: SpinRuns) -> list[str]:
     """Return a warning for each load with which tub and housing overlap."""
     gaps = [(case, case.measures.smallest_gap) for case in best.results]
     return [
@@ -255,7 +333,7 @@ def effects_table(calibration: Calibration) -> Table | None:
     ]
     caption = (
         "Change of each amplitude due to the gasket, in percent of the amplitude without gasket "
-        "([B] Table 1)."
+        "([B] Eq. (1))."
     )
     return Table(caption, ("load", "source", *targets.sensors), tuple(groups), text_columns=2)
 
@@ -339,7 +417,7 @@ def searches_table(calibration: Calibration) -> Table:
     return Table(caption, columns, groups)
 
 
-def _errors_picture(best: SpinResult, table: pd.DataFrame) -> Picture:
+def _errors_picture(best: SpinRuns, table: pd.DataFrame) -> Picture:
     others = list(dict.fromkeys(table["source"]))
     others = [source for source in others if source not in (EXPERIMENT, tables.OURS)]
 
@@ -382,7 +460,7 @@ def _modes_picture(modes: Sequence[tuple[str, Modes]]) -> Picture:
     return picture(modes_figure(modes), f"Natural frequencies {alternative}.", caption)
 
 
-def _envelopes_picture(best: SpinResult, table: pd.DataFrame, index: int) -> Picture:
+def _envelopes_picture(best: SpinRuns, table: pd.DataFrame, index: int) -> Picture:
     case = best.results[index]
     caption = (
         f"Load {case.title}: displacement in the band {band_text(case)}. The shaded area "
@@ -395,11 +473,11 @@ def _envelopes_picture(best: SpinResult, table: pd.DataFrame, index: int) -> Pic
     )
 
 
-def _facts(calibration: Calibration, best: SpinResult, facts: Facts) -> list[tuple[str, str]]:
+def _facts(calibration: Calibration, best: SpinRuns, facts: Facts) -> list[tuple[str, str]]:
     plan = calibration.plan
     counted = sum(end.evaluations for end in calibration.ended)
     return [
-        ("Method", f"{plan.method}, {len(calibration.ended)} starts, seed {plan.seed}"),
+        ("Method", f"least squares, {len(calibration.ended)} starts, seed {plan.seed}"),
         ("Machines tried", f"{counted}, each with {len(calibration.targets.loads)} runs"),
         ("Versions", versions_of(best.results[0].record.attrs)),
         *facts.rows(),

@@ -13,10 +13,10 @@ import numpy as np
 from wm_drake.errors import check_known, input_error
 from wm_drake.parameters.free import FreeFile
 from wm_drake.parameters.types import FloatArray
-from wm_drake.studies.calibrate.calibration import Calibration, Plan, calibrate
 from wm_drake.studies.calibrate.computed import Evaluation, Runner
 from wm_drake.studies.calibrate.response_targets import ResponseTarget
 from wm_drake.studies.calibrate.solutions import Solution
+from wm_drake.studies.calibrate.study import Calibration, Plan, calibrate
 from wm_drake.studies.calibrate.targets import AMPLITUDE, Targets
 
 

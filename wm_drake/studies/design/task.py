@@ -16,8 +16,9 @@ from wm_drake.studies.design.page import DesignResult
 from wm_drake.studies.design.problem import MachineDesigns, machine_designs
 from wm_drake.studies.design.search import SearchSettings
 from wm_drake.studies.design.study import SEARCHES, front_envelopes, promises, run_designs
+from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import problems_of_file, selected_cases
-from wm_drake.studies.run import Executor, machine_text
+from wm_drake.studies.run import machine_text
 from wm_drake.studies.study import Task
 from wm_drake.studies.tolerance.distributions import base_samples
 from wm_drake.studies.tolerance.variables import UncertainMachine, uncertain_machine

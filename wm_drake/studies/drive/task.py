@@ -19,8 +19,8 @@ from wm_drake.studies.drive.study import (
     random_loads,
     torque_map,
 )
+from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import selected_cases
-from wm_drake.studies.run import Executor
 from wm_drake.studies.study import Task
 
 

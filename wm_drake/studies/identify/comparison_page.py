@@ -1,7 +1,8 @@
 """Page and tables of several laws that were fitted to the same tests."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -9,16 +10,14 @@ import pandas as pd
 from wm_drake.report.formatting import MISSING
 from wm_drake.report.page import Picture, Section, SectionedPage, picture
 from wm_drake.report.table import Column, Group, Row, Table, line, table_of
+from wm_drake.report.terminal import Printed
 from wm_drake.studies.fitting.page import estimates_frame, values_table
-from wm_drake.studies.identify.comparison import Comparison
+from wm_drake.studies.identify.comparison import Comparison, FittedLaw
 from wm_drake.studies.identify.figures import evenly_chosen, motion_text, rival_loops_figure
 from wm_drake.studies.identify.judgement import per_cent
-from wm_drake.studies.identify.page import frequency_of, motion_sentences
+from wm_drake.studies.identify.page import IdentifiedResult, frequency_of, motion_sentences
 from wm_drake.studies.rig.units import units_of
 from wm_drake.studies.study import Facts
-
-if TYPE_CHECKING:
-    from wm_drake.studies.identify.study import ComparisonResult
 
 METHOD = (
     "All laws are fitted to the same samples by the least root mean square error. From three tests "
@@ -30,7 +29,7 @@ METHOD = (
 )
 
 
-def comparison_page(result: "ComparisonResult", facts: Facts) -> str:
+def comparison_page(result: "IdentifyComparisonResult", facts: Facts) -> str:
     """Return the page as text of one self-contained HTML file."""
     comparison = result.comparison
     count, blind = len(comparison.motions), len(comparison.validation)
@@ -239,3 +238,37 @@ def bounds_sentences(comparison: Comparison) -> list[str]:
         for e in r.fit.estimates
         if e.at_bound and ".rise_" not in e.name
     ]
+
+
+@dataclass(frozen=True)
+class IdentifyComparisonResult(IdentifiedResult):
+    """Several laws that were fitted to the same tests."""
+
+    comparison: Comparison
+    page = comparison_page
+
+    @property
+    def laws(self) -> dict[str, FittedLaw]:
+        """All laws."""
+        return {f"identified_{law.law}.yaml": law for law in self.comparison.results}
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Return measures, values and errors of the laws, and all samples."""
+        return {
+            "laws": laws_table(self.comparison),
+            "parameters": parameters_by_law(self.comparison),
+            "errors": errors_by_law(self.comparison),
+            "loops": loops_by_law(self.comparison),
+        }
+
+    def fit_as_dict(self) -> dict[str, Any]:
+        """Return the comparison for JSON, in SI."""
+        return self.comparison.as_dict()
+
+    def terminal(self) -> Printed:
+        """Return what the data say about the laws, their measures, and remarks."""
+        comparison = self.comparison
+        table = laws_shown(comparison).terminal(self.component.title)
+        motions = (*comparison.motions, *comparison.validation)
+        sentences = (*comparison.sentences, *motion_sentences(motions))
+        return [*sentences, table, *bounds_sentences(comparison), *self.missing]

@@ -20,6 +20,7 @@ from wm_drake.parameters import (
 )
 from wm_drake.studies.components import Target
 from wm_drake.studies.fitting.fit import Fit
+from wm_drake.studies.identify.comparison import FittedLaw
 from wm_drake.studies.identify.models import ANGLE, FORCE, LENGTH, TORQUE, ComponentModel
 
 FIXED = "fixed by the user in an identification"
@@ -217,3 +218,27 @@ def _named_from(machine: str, out: Path) -> str:
     if machine in shipped_machines():
         return machine
     return os.path.relpath(Path(machine).resolve(), out.resolve())
+
+
+@dataclass(frozen=True)
+class FittedComponent(Destination):
+    """A component whose numbers are identified, and where they go.
+
+    Attributes:
+        title: Component, for headings.
+        copies: Fields of each law that get the value of another field.
+    """
+
+    title: str = ""
+    copies: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+
+    def missing(self, name: str, law: FittedLaw) -> list[str]:
+        """Return a sentence that names the numbers that a file lacks, so that it is not written."""
+        missing = missing_numbers(law.fit, law.model, self.target.component)
+        if not missing:
+            return []
+        return [
+            f"{name} is not written: the data do not determine {', '.join(missing)}, which the law "
+            f"{law.model.law} needs and {self.target.component.name} did not have; give a value "
+            "with --fix."
+        ]

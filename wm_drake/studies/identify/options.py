@@ -98,7 +98,7 @@ IDENTIFY = (
             kind,
             about,
             options,
-            partial(imported("wm_drake.studies.identify.study:task_of"), kind),
+            partial(imported("wm_drake.studies.identify.task:task_of"), kind),
             has_runs=False,
             group="identify",
             has_machine=False,

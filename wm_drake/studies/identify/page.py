@@ -1,29 +1,35 @@
 """Page and tables of a fit to the loops of a component."""
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+import json
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar
 
 import numpy as np
 import pandas as pd
 
 from wm_drake.report.page import Section, SectionedPage, picture
 from wm_drake.report.table import Column, Table, table_of
+from wm_drake.report.terminal import Printed
 from wm_drake.rigs.measured import HarmonicMotion, MeasuredMotion, RecordedMotion
 from wm_drake.studies.fitting.fit import Fit
 from wm_drake.studies.fitting.page import (
     correlations_table,
+    estimates_frame,
     history_picture,
     search_facts,
     undetermined_sentences,
     values_table,
 )
+from wm_drake.studies.identify.comparison import FittedLaw
 from wm_drake.studies.identify.figures import loops_figure, motion_text
-from wm_drake.studies.identify.judgement import Judgement, per_cent
+from wm_drake.studies.identify.fragment import FittedComponent, fragment
+from wm_drake.studies.identify.judgement import Judgement, judge, per_cent
+from wm_drake.studies.identify.models import ComponentModel
 from wm_drake.studies.rig.units import units_of
-from wm_drake.studies.study import Facts
-
-if TYPE_CHECKING:
-    from wm_drake.studies.identify.study import FitResult
+from wm_drake.studies.study import Facts, Result
 
 METHOD = (
     "The RMSE is that of [A] Eq. (1) and [C] Eq. (5), over all samples of all files. The offset "
@@ -201,3 +207,99 @@ def _summary(fit: Fit, motions: Sequence[MeasuredMotion], judgement: Judgement) 
         f"{fit.rmse:.3g} {unit} over all samples. For single tests it is {least} to {most} of "
         f"the largest {name}. {ending}"
     )
+
+
+@dataclass(frozen=True)
+class IdentifiedResult(Result):
+    """Result with identified numbers. CSV files have all digits, but for the samples of loops."""
+
+    component: FittedComponent
+    float_format: ClassVar[str | None] = None
+    float_formats: ClassVar[Mapping[str, str]] = {"loops": "%.7g"}
+
+    @property
+    @abstractmethod
+    def laws(self) -> Mapping[str, FittedLaw]:
+        """Fitted laws by the names of the machine or component files with their numbers."""
+
+    @abstractmethod
+    def fit_as_dict(self) -> dict[str, Any]:
+        """Return the fit or the comparison for JSON, in SI."""
+
+    @property
+    def title(self) -> str:
+        """Component, for headings."""
+        return self.component.title
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the fit or the comparison for JSON, in SI."""
+        return {"component": self.title, **self.fit_as_dict()}
+
+    @property
+    def missing(self) -> list[str]:
+        """Sentences on files that are not written, because their numbers are not complete."""
+        return [
+            text for name in self.laws for text in self.component.missing(name, self.laws[name])
+        ]
+
+    def texts(self) -> dict[str, str]:
+        """Return the identified numbers of each law, and the fit as JSON."""
+        files = {}
+        for name, law in self.laws.items():
+            if not self.component.missing(name, law):
+                copies = self.component.copies.get(law.model.law)
+                remarks = law.judgement.sentences
+                files[name] = fragment(law.fit, law.model, self.component, copies, remarks)
+        return files | {"fit.json": json.dumps(self.fit_as_dict(), indent=1)}
+
+
+@dataclass(frozen=True)
+class FitResult(IdentifiedResult):
+    """Fit of one law."""
+
+    model: ComponentModel
+    fit: Fit
+    motions: Sequence[MeasuredMotion]
+    page = identify_page
+
+    @property
+    def title(self) -> str:
+        """Component and law, for headings."""
+        return f"{self.component.title}, law {self.model.law}"
+
+    @cached_property
+    def judgement(self) -> Judgement:
+        """Judgement of the fit."""
+        return judge(self.fit, self.motions)
+
+    @property
+    def laws(self) -> dict[str, FittedLaw]:
+        """The fitted law."""
+        return {"identified.yaml": FittedLaw(self.model, self.fit, self.judgement)}
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Return the values, the error of each test, and all samples."""
+        return {
+            "parameters": estimates_frame(self.fit, self.model.fixed_numbers),
+            "errors": errors_table(self.fit, self.motions, self.judgement),
+            "loops": fitted_loops(self.fit, self.motions),
+        }
+
+    def fit_as_dict(self) -> dict[str, Any]:
+        """Return the fit for JSON, in SI."""
+        return {
+            **self.fit.as_dict(),
+            "fixed": {
+                name: {"value": value, "unit": unit.si}
+                for name, value, unit in self.model.fixed_numbers
+            },
+            "judgement": self.judgement.as_dict(),
+        }
+
+    def terminal(self) -> Printed:
+        """Return the judgement, the values, and remarks."""
+        fit, unit = self.fit, units_of(self.motions[0].loop.rotates).force_unit
+        title = f"{self.title}: RMSE {fit.rmse:.4g} {unit} by {fit.log.method}"
+        table = values_table(fit, self.model.fixed_numbers).terminal(title)
+        remarks = [*undetermined_sentences(fit), *fit.log.notes, *self.missing]
+        return [*self.judgement.sentences, *motion_sentences(self.motions), table, *remarks]

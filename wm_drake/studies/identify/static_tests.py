@@ -18,6 +18,7 @@ from wm_drake.report.page import Section, SectionedPage, picture
 from wm_drake.report.table import Table, line
 from wm_drake.rigs import AXES
 from wm_drake.studies.components import axes_of, target_of
+from wm_drake.studies.executor import Executor
 from wm_drake.studies.identify.fragment import Destination, table_entry, written_fragment
 from wm_drake.studies.identify.inputs import loops_of
 from wm_drake.studies.identify.options import AxisFitOptions, DamperFitOptions
@@ -31,7 +32,6 @@ from wm_drake.studies.identify.static import (
 from wm_drake.studies.inputs import pairs_of
 from wm_drake.studies.rig.figures import loop_panel
 from wm_drake.studies.rig.units import units_of
-from wm_drake.studies.run import Executor
 from wm_drake.studies.study import Facts, Result, Task
 
 

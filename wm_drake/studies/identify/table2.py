@@ -28,6 +28,7 @@ from wm_drake.report.table import Column, Columns, Table, line, table_of
 from wm_drake.rigs import Harmonic, damper_bench, force_loops
 from wm_drake.rigs.measured import HarmonicMotion, measured_motion
 from wm_drake.studies.components import existing_files
+from wm_drake.studies.executor import Executor
 from wm_drake.studies.fitting.methods import least_squares
 from wm_drake.studies.identify.figures import LAW_COLOURS
 from wm_drake.studies.identify.inputs import units_of
@@ -36,7 +37,6 @@ from wm_drake.studies.identify.options import Table2Options
 from wm_drake.studies.identify.problem import fit_problem
 from wm_drake.studies.inputs import quantities_of
 from wm_drake.studies.rig.figures import loop_panel
-from wm_drake.studies.run import Executor
 from wm_drake.studies.study import Facts, Result, Task
 
 BOUNDS = {"sponge_stiffness": (50e3, 300e3), "sponge_damping": (0.0, 10e3)}

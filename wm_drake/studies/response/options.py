@@ -25,7 +25,7 @@ RESPONSE = Study(
     "response",
     "Compute the steady response to unbalance over the drum speed, by harmonic balance.",
     ResponseOptions,
-    imported("wm_drake.studies.response.study:ResponseTask"),
+    imported("wm_drake.studies.response.task:ResponseTask"),
     quick={"load": ("middle",), "points": 15, "harmonics": 3, "rate": ("50 rpm/s",)},
     has_runs=False,
 )

@@ -35,6 +35,6 @@ SPIN_IDENTIFY = Study(
     "Fit numbers of a machine to RMS displacements in a spin cycle; without measurements, to a "
     "virtual experiment.",
     SpinIdentifyOptions,
-    imported("wm_drake.studies.spin_identify.study:SpinIdentifyTask"),
+    imported("wm_drake.studies.spin_identify.task:SpinIdentifyTask"),
     quick={"unknown": ("gasket.stiffness_y",), "case": ("2",)},
 )

@@ -1,28 +1,81 @@
 """Page of an identification from a spin cycle."""
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any, ClassVar
 
 import numpy as np
 import pandas as pd
 
+from wm_drake.parameters import machine_yaml
 from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import MISSING, number
 from wm_drake.report.page import Picture, Section, SectionedPage, picture
 from wm_drake.report.table import Column, Table, line, table_of
+from wm_drake.report.terminal import Printed
 from wm_drake.simulation.records import versions
 from wm_drake.studies.fitting.page import estimate_rows, search_facts, undetermined_sentences
 from wm_drake.studies.spin_cycle.figures import bars_figure, profile_figure
+from wm_drake.studies.spin_cycle.measured import rms_table
 from wm_drake.studies.spin_cycle.page import case_description
 from wm_drake.studies.spin_cycle.study import average_errors, region_errors
-from wm_drake.studies.spin_identify.study import KNOWN, SpinIdentification
-from wm_drake.studies.study import Facts
+from wm_drake.studies.spin_identify.study import KNOWN, SpinIdentification, identified_machine
+from wm_drake.studies.study import Facts, Result
 
 VIRTUAL = (
     "This is a virtual experiment: nothing was measured. A machine with randomly planted values "
     "was simulated in place of a real one, and the search did not use these values. "
 )
 """First sentences of the summary of a virtual experiment."""
+
+
+@dataclass(frozen=True)
+class SpinIdentifyResult(Result):
+    """An identification, as it is shown."""
+
+    identification: SpinIdentification
+    float_formats: ClassVar[Mapping[str, str]] = {"parameters": "%.7g"}
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Return the unknowns, and measured and computed RMS displacements."""
+        return {
+            "parameters": values_table(self.identification),
+            "measured": rms_table(self.identification.measured),
+            "rms": rms_table(self.identification.after),
+        }
+
+    def texts(self) -> dict[str, str]:
+        """Return the result machine."""
+        return {"result.yaml": machine_yaml(identified_machine(self.identification))}
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the result for JSON."""
+        result = self.identification
+        shown = result.fit.as_dict()
+        entries = zip(result.sought, shown["unknowns"].values(), strict=True)
+        for k, (sought, entry) in enumerate(entries):
+            value, identifiable = result.fit.estimates[k].value, result.identifiable[k]
+            entry |= {"keys": list(sought.keys), "found": value, "identifiable": identifiable}
+            if result.planted is not None and result.recovered is not None:
+                entry |= {"planted": float(result.planted[k]), "error": float(result.recovered[k])}
+        return {
+            "machine": result.parameters.name,
+            "virtual_experiment": result.planted is not None,
+            "cases": [case.name for case in result.cases],
+            "average_error_before": float(average_errors(result.before, result.measured).mean()),
+            "average_error_after": result.error_after,
+            "verdict": result.verdict,
+            **shown,
+        }
+
+    def terminal(self) -> Printed:
+        """Return summary, values, and what the data do not determine."""
+        return terminal_lines(self.identification)
+
+    def page(self, facts: Facts) -> str:
+        """Return the page."""
+        return spin_identify_page(self.identification, facts)
 
 
 def spin_identify_page(result: SpinIdentification, facts: Facts) -> str:
@@ -105,7 +158,7 @@ def judged(result: SpinIdentification) -> str:
         f"by {number(100.0 * result.error_after)} % on average."
     )
     if result.verdict == "poor":
-        text += " The machine does not describe the measurement: do not use the values found."
+        text += " The machine does not describe the measurement: do not use the values identified."
     return text
 
 

@@ -3,24 +3,20 @@
 [A] section 4.2 identifies the parameters of its Table 8 in this way.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
-import pandas as pd
 import xarray as xr
 
 from wm_drake.errors import input_error, problems_at
-from wm_drake.model.machine import Machine
 from wm_drake.parameters import (
     Change,
     MachineParameters,
     SpinProfile,
     Variation,
     apply,
-    machine_yaml,
     with_values,
 )
 from wm_drake.parameters.keys import allowed_range
@@ -31,21 +27,8 @@ from wm_drake.simulation.cases import Case
 from wm_drake.studies.fitting.fit import Fit, Verdict, verdict_of
 from wm_drake.studies.fitting.methods import least_squares
 from wm_drake.studies.fitting.problem import FitProblem, Measurement, Progress, Unknown
-from wm_drake.studies.inputs import runnable_profile
-from wm_drake.studies.run import Executor
-from wm_drake.studies.spin_cycle.measured import DIMS, rms_table
-from wm_drake.studies.spin_cycle.study import (
-    average_errors,
-    cases_of_table,
-    labels_of,
-    measured_displacements,
-    runs_of,
-)
-from wm_drake.studies.spin_identify.options import SpinIdentifyOptions
-from wm_drake.studies.study import Facts, Result, Task
-
-if TYPE_CHECKING:
-    from rich.table import Table
+from wm_drake.studies.spin_cycle.measured import DIMS
+from wm_drake.studies.spin_cycle.study import average_errors, labels_of, runs_of
 
 SPAN = 1.5
 """Default bounds of an unknown: the number of the machine divided and multiplied by this."""
@@ -71,9 +54,6 @@ TABLE_8 = (
 
 They are the friction about the axis of its bushings and all rotational numbers of the gasket.
 """
-
-DEFAULT_CASES = ("2", "5", "29")
-"""Cases of [A] Table 9: 400 g in front, at the rear, and both opposite, as in Figs. 24 to 26."""
 
 Regions: TypeAlias = Callable[[Iterable[Case]], xr.Dataset]
 """Function that runs cases and returns their table with "regions", as `simulate_many` does."""
@@ -102,7 +82,7 @@ class Sought:
 
 
 @dataclass(frozen=True)
-class SpinIdentification(Result):
+class SpinIdentification:
     """Result of an identification.
 
     Attributes:
@@ -123,7 +103,6 @@ class SpinIdentification(Result):
     before: xr.DataArray
     after: xr.DataArray
     planted: FloatArray | None = None
-    float_formats: ClassVar[Mapping[str, str]] = {"parameters": "%.7g"}
 
     @property
     def uncertainty(self) -> FloatArray:
@@ -156,97 +135,6 @@ class SpinIdentification(Result):
     def recovered(self) -> FloatArray | None:
         """Relative error of each unknown in a virtual experiment; None for a real experiment."""
         return None if self.planted is None else self.fit.values / self.planted - 1.0
-
-    def tables(self) -> dict[str, pd.DataFrame]:
-        """Return the unknowns, and measured and computed RMS displacements."""
-        from wm_drake.studies.spin_identify.page import values_table
-
-        return {
-            "parameters": values_table(self),
-            "measured": rms_table(self.measured),
-            "rms": rms_table(self.after),
-        }
-
-    def texts(self) -> dict[str, str]:
-        """Return the identified machine."""
-        return {"identified.yaml": machine_yaml(identified_machine(self))}
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the result for JSON."""
-        shown = self.fit.as_dict()
-        entries = zip(self.sought, shown["unknowns"].values(), strict=True)
-        for k, (sought, entry) in enumerate(entries):
-            value, identifiable = self.fit.estimates[k].value, self.identifiable[k]
-            entry |= {"keys": list(sought.keys), "found": value, "identifiable": identifiable}
-            if self.planted is not None and self.recovered is not None:
-                entry |= {"planted": float(self.planted[k]), "error": float(self.recovered[k])}
-        return {
-            "machine": self.parameters.name,
-            "virtual_experiment": self.planted is not None,
-            "cases": [case.name for case in self.cases],
-            "average_error_before": float(average_errors(self.before, self.measured).mean()),
-            "average_error_after": self.error_after,
-            "verdict": self.verdict,
-            **shown,
-        }
-
-    def terminal(self) -> "list[Table | str]":
-        """Return summary, values, and what the data do not determine."""
-        from wm_drake.studies.spin_identify.page import terminal_lines
-
-        return [*terminal_lines(self)]
-
-    def page(self, facts: Facts) -> str:
-        """Return the page."""
-        from wm_drake.studies.spin_identify.page import spin_identify_page
-
-        return spin_identify_page(self, facts)
-
-
-class SpinIdentifyTask(Task):
-    """The study with checked options."""
-
-    def __init__(self, options: SpinIdentifyOptions, machine: Machine) -> None:
-        """Check the unknowns, the cases and the profile, and read the measurements."""
-        self.options, self.machine = options, machine
-        self.profile = runnable_profile(options.profile, machine.parameters)
-        names = options.case or (() if options.cases else DEFAULT_CASES)
-        self.cases = cases_of_table(options.cases, names)
-        self.measured = measured_displacements(
-            options, machine.parameters, self.cases, self.profile
-        )
-        self.sought = unknowns_of(machine.parameters, options.unknown)
-
-    @property
-    def identity(self) -> dict[str, Any]:
-        """Return what determines the runs beside the machine."""
-        measured = "none" if self.measured is None else self.measured.values
-        return {
-            "cases": self.cases,
-            "profile": self.profile,
-            "measurements": measured,
-            "unknowns": [{"keys": s.keys, "unknown": s.unknown} for s in self.sought],
-            "noise": f"{self.options.noise:g}, seed {self.options.seed}",
-        }
-
-    def run(self, executor: Executor) -> SpinIdentification:
-        """Identify the unknowns, from measurements or from a virtual experiment."""
-        seed, measured, planted = self.options.seed, self.measured, None
-        with executor.fraction("search") as report:
-            regions = partial(executor.simulate, self.machine, ("regions",))
-            model = SpinModel(
-                self.machine.parameters, self.profile, tuple(self.cases), self.sought, regions
-            )
-            if measured is None:
-                planted = planted_values(self.sought, seed)
-                measured = virtual_experiment(model, planted, self.options.noise, seed)
-            return identify_from_spin(
-                model,
-                measured,
-                planted=planted,
-                seed=seed,
-                progress=lambda fraction, least: report(fraction),
-            )
 
 
 def unknowns_of(parameters: MachineParameters, texts: Sequence[str]) -> tuple[Sought, ...]:
