@@ -117,7 +117,7 @@ wm-drake identify bushing bushing/loop_*.csv --machine free_stroke --axis axial 
 wm-drake rig gasket --axis axial -f '1,5 Hz' -a '1 mm' --out ring
 wm-drake identify gasket ring/loop_*.csv --axis axial --law voigt --out ring_fit
 wm-drake identify table2 --quick --out table2
-wm-drake gasket curves folded --quick --axial '8 mm' --out curves
+wm-drake gasket curves folded --points 2 --elements 6 --around 3 --axial '1 mm' --radial '1 mm' --tilt '1 deg' --twist '1 deg' --out curves
 wm-drake spin --load middle --profile short_cycle.yaml --out spin
 wm-drake record orders spin/record_middle.nc --out orders
 wm-drake calibrate --machine short.yaml --free free.yaml --targets measured.csv --quick --out calibrate
