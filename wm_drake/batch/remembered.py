@@ -8,7 +8,7 @@ from pathlib import Path
 
 import xarray as xr
 
-from wm_drake.batch.ledger import Ledger, Result, key_of
+from wm_drake.batch.ledger import Ledger, LedgerEntry, key_of
 from wm_drake.batch.many import as_table, simulate_many
 from wm_drake.batch.runs import RunResult
 from wm_drake.model.bodies import sdf_path
@@ -130,10 +130,10 @@ def simulate_remembered(
                 to_run.append(len(keys) - 1)
                 yield case
 
-    ended: dict[str, Result] = {}  # finished since the last call of `store`
+    ended: dict[str, LedgerEntry] = {}  # finished since the last call of `store`
 
     def keep(run: RunResult) -> None:
-        ended[keys[to_run[run.number]]] = Result(run.values, run.diverged)
+        ended[keys[to_run[run.number]]] = LedgerEntry(run.values, run.diverged)
 
     def store(_finished: int) -> None:
         nonlocal done
@@ -145,7 +145,7 @@ def simulate_remembered(
             done += 1
             progress(done)
 
-    computed: dict[str, Result] = {}
+    computed: dict[str, LedgerEntry] = {}
     table = simulate_many(
         machine,
         missing(),

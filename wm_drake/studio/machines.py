@@ -34,7 +34,7 @@ from wm_drake.simulation.cases import Case, case_of
 from wm_drake.simulation.mounts import mount_names
 from wm_drake.simulation.steps import checked_integrator, checked_step
 from wm_drake.studio.parts import CALCULATION, PART_ORDER, part_and_group, places_of
-from wm_drake.studio.state import DESCRIBED, State
+from wm_drake.studio.state import DESCRIBED, PageState
 from wm_drake.studio.turns import SharedValues
 
 GIVEN = "given"
@@ -363,7 +363,7 @@ class OpenMachine:
             raise input_error(f"{text} is out of range; allowed is >= 0", key=key)
         return slider.number.at(value)
 
-    def case(self, state: State) -> Case:
+    def case(self, state: PageState) -> Case:
         """Return the case that a page has chosen.
 
         Raises:
@@ -379,7 +379,7 @@ class OpenMachine:
         check_length(case)
         return case
 
-    def shown_values(self, case: Case, state: State) -> dict[str, float]:
+    def shown_values(self, case: Case, state: PageState) -> dict[str, float]:
         """Return the moved numbers of a case in their display units, by key path."""
         assert case.parameters is not None  # a page's case has parameters of its own
         return {
@@ -388,7 +388,7 @@ class OpenMachine:
             if key in self.sliders
         }
 
-    def measured(self, state: State) -> list[dict[str, object]]:
+    def measured(self, state: PageState) -> list[dict[str, object]]:
         """Return what was measured of the machine with a load: source and amplitudes [mm]."""
         if state.masses:
             return []

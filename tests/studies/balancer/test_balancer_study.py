@@ -12,7 +12,7 @@ from wm_drake.simulation.cases import Case
 from wm_drake.studies.balancer.page import BalancerResult, answer, facts_of, lock_below
 from wm_drake.studies.balancer.study import (
     HOLD,
-    Curve,
+    AmplitudeCurve,
     Pair,
     Release,
     capacities_of,
@@ -34,7 +34,8 @@ SPEEDS = RPM * np.array([100.0, 200.0, 300.0])
 def pair_of(free, held, mass=0.5, **factors):
     """Return a pair with amplitudes in mm; the last one is that at the highest speed."""
     curves = [
-        Curve(SPEEDS, 1e-3 * np.array(sizes[:-1]), 1e-3 * sizes[-1]) for sizes in (free, held)
+        AmplitudeCurve(SPEEDS, 1e-3 * np.array(sizes[:-1]), 1e-3 * sizes[-1])
+        for sizes in (free, held)
     ]
     return Pair(mass, 0.0, *curves, **factors)
 
@@ -139,7 +140,7 @@ def test_a_run_that_diverged_is_worse_than_any_other():
         }
     )
     assert np.isinf(curve_of(table, 0, SPEEDS[:1]).level)
-    assert curve_of(table, 1, SPEEDS[:1]) == Curve(SPEEDS[:1], np.array([2.0]), 4.0)
+    assert curve_of(table, 1, SPEEDS[:1]) == AmplitudeCurve(SPEEDS[:1], np.array([2.0]), 4.0)
 
 
 @pytest.mark.parametrize(

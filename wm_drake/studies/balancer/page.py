@@ -13,7 +13,14 @@ from wm_drake.report.formatting import GM_PER_KGM, MM_PER_M, RPM_PER_RAD_S, numb
 from wm_drake.report.page import Picture, Section, SectionedPage, picture
 from wm_drake.report.table import Column, Table, table_of
 from wm_drake.report.terminal import Printed
-from wm_drake.studies.balancer.study import SWING, Curve, Pair, Release, is_within, picked_up_from
+from wm_drake.studies.balancer.study import (
+    SWING,
+    AmplitudeCurve,
+    Pair,
+    Release,
+    is_within,
+    picked_up_from,
+)
 from wm_drake.studies.study import Facts, Result
 
 COLUMNS = {
@@ -67,7 +74,7 @@ class BalancerResult(Result):
     base: Pair
     rings: tuple[Pair, ...]
     releases: tuple[Release, ...]
-    plain: Curve
+    plain: AmplitudeCurve
     capacities: dict[float, float]
     radius: float
     runs: int
@@ -429,11 +436,11 @@ def curve_picture(f: BalancerResult) -> Picture:
     return picture(fig.Figure(panels=(panel,), height=340.0), words, caption)
 
 
-def _line(curve: Curve, **style: Any) -> fig.Line:
+def _line(curve: AmplitudeCurve, **style: Any) -> fig.Line:
     return fig.Line(RPM_PER_RAD_S * curve.speeds, MM_PER_M * curve.amplitudes, **style)
 
 
-QUANTITIES: tuple[tuple[str, Callable[[Curve], float]], ...] = (
+QUANTITIES: tuple[tuple[str, Callable[[AmplitudeCurve], float]], ...] = (
     ("largest amplitude of the run-up, mm", lambda curve: curve.peak),
     ("amplitude at the highest speed, mm", lambda curve: curve.level),
 )

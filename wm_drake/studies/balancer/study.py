@@ -45,7 +45,7 @@ RPM, PART = Unit("rad/s", "rpm"), Unit("dimensionless", "percent")
 
 
 @dataclass(frozen=True)
-class Curve:
+class AmplitudeCurve:
     """Amplitude over drum speed in a run-up.
 
     Attributes:
@@ -82,8 +82,8 @@ class Pair:
 
     mass: float
     y: float
-    free: Curve
-    locked: Curve
+    free: AmplitudeCurve
+    locked: AmplitudeCurve
     ball_mass: float = 1.0
     damping: float = 1.0
 
@@ -232,7 +232,7 @@ def with_factors(
     return with_values(parameters, values)
 
 
-def curve_of(table: xr.Dataset, run: int, speeds: FloatArray) -> Curve:
+def curve_of(table: xr.Dataset, run: int, speeds: FloatArray) -> AmplitudeCurve:
     """Return the curve of a run.
 
     Args:
@@ -242,11 +242,11 @@ def curve_of(table: xr.Dataset, run: int, speeds: FloatArray) -> Curve:
     sizes = table.region_amplitude.values[run].max(axis=-1)
     failed = table.diverged.values[run] != ""
     sizes = np.where(failed | np.isnan(sizes), np.inf, sizes)
-    return Curve(speeds, sizes[:-1], float(sizes[-1]))
+    return AmplitudeCurve(speeds, sizes[:-1], float(sizes[-1]))
 
 
 @dataclass(frozen=True)
-class Trials:
+class BalancerTrials:
     """Runs of loads with free and with locked balls.
 
     Attributes:
@@ -294,7 +294,7 @@ class Trials:
             for run, (mass, y, ball_mass, damping) in enumerate(points)
         ]
 
-    def plain(self, mass: float, y: float) -> Curve:
+    def plain(self, mass: float, y: float) -> AmplitudeCurve:
         """Return the curve of a load in the machine without rings. [kg, m]"""
         profile = run_up(self.high, self.rate)
         machine = build_machine(without_rings(self.machine.parameters))

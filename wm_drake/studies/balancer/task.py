@@ -14,7 +14,7 @@ from wm_drake.studies.balancer.study import (
     PART,
     RPM,
     WINDOW,
-    Trials,
+    BalancerTrials,
     capacities_of,
     is_within,
     with_factors,
@@ -75,7 +75,7 @@ class BalancerTask(Task):
     def run(self, executor: Executor) -> Result:
         """Run loads, rings and releases."""
         parameters = self.machine.parameters
-        trials = Trials(self.machine, executor, self.high, self.rate, self.radius)
+        trials = BalancerTrials(self.machine, executor, self.high, self.rate, self.radius)
         points = [(mass, y, 1.0, 1.0) for mass in self.masses for y in self.places]
         loads = trials.pairs(points, "loads")
         capacities = capacities_of(parameters)

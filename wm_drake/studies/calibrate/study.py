@@ -11,7 +11,7 @@ from wm_drake.errors import check_known, input_error
 from wm_drake.model.machine import Machine
 from wm_drake.parameters.free import FreeFile
 from wm_drake.parameters.types import FloatArray
-from wm_drake.studies.calibrate.computed import Evaluation, Runner
+from wm_drake.studies.calibrate.computed import Evaluation, PointRunner
 from wm_drake.studies.calibrate.parameter_map import ParameterMap, parameter_map_of
 from wm_drake.studies.calibrate.solutions import Percents, Solution, distinct, percents_of
 from wm_drake.studies.calibrate.targets import Targets
@@ -48,7 +48,7 @@ ITERATIONS = {"least-squares": 60, "basin-hopping": 12, "evolution": 300}
 
 
 @dataclass(frozen=True)
-class Plan:
+class SearchPlan:
     """Settings of the search.
 
     Attributes:
@@ -102,12 +102,14 @@ class Calibration:
 
     parameter_map: ParameterMap
     targets: Targets
-    plan: Plan
+    plan: SearchPlan
     solutions: tuple[Solution, ...]
     ended: tuple[Solution, ...]
 
 
-def identity_of(machine: Machine, free: FreeFile, targets: Targets, plan: Plan) -> dict[str, str]:
+def identity_of(
+    machine: Machine, free: FreeFile, targets: Targets, plan: SearchPlan
+) -> dict[str, str]:
     """Return the texts that identify a calibration in its ledger."""
     return {
         "study": "calibration",
@@ -122,7 +124,9 @@ def identity_of(machine: Machine, free: FreeFile, targets: Targets, plan: Plan) 
     }
 
 
-def calibrate(runner: Runner, free: FreeFile, targets: Targets, plan: Plan) -> Calibration:
+def calibrate(
+    runner: PointRunner, free: FreeFile, targets: Targets, plan: SearchPlan
+) -> Calibration:
     """Search for machines with the measured amplitudes.
 
     Each evaluation is stored in the ledger before it is used. A search that is started again takes
@@ -156,7 +160,7 @@ def calibrate(runner: Runner, free: FreeFile, targets: Targets, plan: Plan) -> C
     return Calibration(parameter_map, targets, plan, tuple(distinct(ended)), tuple(ended))
 
 
-def calibration_problem(values: Evaluation, plan: Plan) -> PriorProblem:
+def calibration_problem(values: Evaluation, plan: SearchPlan) -> PriorProblem:
     """Return the problem of the free quantities of an evaluation.
 
     The first `targets.count` residuals are those of the data. Those of values that have a limit
@@ -265,7 +269,7 @@ def check_counts(counts: Sequence[int], quantities: int) -> None:
 
 
 def fit_with_fewer(
-    runner: Runner, calibration: Calibration, counts: Sequence[int]
+    runner: PointRunner, calibration: Calibration, counts: Sequence[int]
 ) -> list[Simpler]:
     """Fit the machine again with fewer and fewer free quantities.
 

@@ -9,7 +9,7 @@ import xarray as xr
 
 from wm_drake.errors import InputError, Problem, input_error
 from wm_drake.parameters import MachineParameters, Variation, quantities, variation_of, with_values
-from wm_drake.parameters.designs import Constraint, DesignTask, Objective
+from wm_drake.parameters.designs import Constraint, DesignFile, Objective
 from wm_drake.parameters.tolerances import fraction
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
@@ -61,7 +61,7 @@ class Range:
 
 
 @dataclass(frozen=True)
-class Options:
+class OptionVariable:
     """A choice among options.
 
     Attributes:
@@ -90,7 +90,7 @@ class Options:
 
 
 @dataclass(frozen=True)
-class Goal:
+class DesignGoal:
     """An objective or a constraint with what it is computed from.
 
     Attributes:
@@ -144,15 +144,15 @@ class MachineDesigns:
     """
 
     parameters: MachineParameters
-    dimensions: tuple[Range | Options, ...]
-    objectives: tuple[Goal, ...]
-    constraints: tuple[Goal, ...]
+    dimensions: tuple[Range | OptionVariable, ...]
+    objectives: tuple[DesignGoal, ...]
+    constraints: tuple[DesignGoal, ...]
     cases: tuple[Case, ...]
     scattered: Callable[[MachineParameters], UncertainMachine] | None = None
     scores: FloatArray | None = None
 
     @property
-    def goals(self) -> tuple[Goal, ...]:
+    def goals(self) -> tuple[DesignGoal, ...]:
         """Objectives, then constraints."""
         return (*self.objectives, *self.constraints)
 
@@ -256,7 +256,7 @@ class MachineDesigns:
 
 def machine_designs(
     parameters: MachineParameters,
-    task: DesignTask,
+    task: DesignFile,
     cases: Sequence[Case],
     scattered: Callable[[MachineParameters], UncertainMachine] | None = None,
     scores: FloatArray | None = None,
@@ -274,7 +274,7 @@ def machine_designs(
         InputError: the machine does not have a key or a response, or a bound is wrong.
     """
     dimensions, problems = _dimensions(parameters, task)
-    goals: dict[str, list[Goal]] = {"objectives": [], "constraints": []}
+    goals: dict[str, list[DesignGoal]] = {"objectives": [], "constraints": []}
     known = {key: (value, unit) for key, value, unit in quantities(parameters)}
     for kind, listed in goals.items():
         for place, given in enumerate(getattr(task, kind)):
@@ -296,10 +296,10 @@ def machine_designs(
 
 
 def _dimensions(
-    parameters: MachineParameters, task: DesignTask
-) -> tuple[list[Range | Options], list[Problem]]:
+    parameters: MachineParameters, task: DesignFile
+) -> tuple[list[Range | OptionVariable], list[Problem]]:
     """Return the variables and choices of a file, and what is wrong with them."""
-    dimensions, problems = list[Range | Options](), list[Problem]()
+    dimensions, problems = list[Range | OptionVariable](), list[Problem]()
     for name, given in task.variables.items():
         texts = {"low": given.low, "high": given.high}
         try:
@@ -310,7 +310,7 @@ def _dimensions(
         except InputError as error:
             problems += [Problem(f"variable {name}", p.key, p.message) for p in error.problems]
     for name, choice in task.choices.items():
-        dimensions.append(Options(name, choice.options))
+        dimensions.append(OptionVariable(name, choice.options))
         for option, values in choice.options.items():
             try:
                 with_values(parameters, values)
@@ -325,7 +325,7 @@ def _goal(
     case: Case,
     given: Objective | Constraint,
     known: dict[str, tuple[Any, Unit]],
-) -> Goal:
+) -> DesignGoal:
     limit_text = None if isinstance(given, Objective) else given.text
     response, unit = None, Unit("", "")
     if given.quantity in known:
@@ -343,4 +343,4 @@ def _goal(
         limit = float("nan") if limit_text is None else unit.from_si(unit.number(limit_text))
     except ValueError as error:
         raise input_error(str(error)) from None
-    return Goal(given, response, unit, limit)
+    return DesignGoal(given, response, unit, limit)

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from wm_drake.parameters.types import FloatArray
-from wm_drake.studies.fitting.problem import Problem
+from wm_drake.studies.fitting.problem import CostProblem
 from wm_drake.studies.fitting.search import Optimum, Search
 
 POINTS_PER_AXIS = 5
@@ -36,7 +36,7 @@ class Round:
     spacing: float
 
 
-def grid_search(problem: Problem, mesh: float) -> tuple[Optimum, tuple[Round, ...]]:
+def grid_search(problem: CostProblem, mesh: float) -> tuple[Optimum, tuple[Round, ...]]:
     """Minimize the cost by grids that move to the best point and are refined there.
 
     Points of a grid that are outside the region are omitted. Points that are known already are not
@@ -82,7 +82,7 @@ def _offsets(size: int) -> FloatArray:
     return np.stack(np.meshgrid(*along, indexing="ij"), axis=-1).reshape(-1, size).astype(float)
 
 
-def simplex_search(problem: Problem, stop: float) -> Optimum:
+def simplex_search(problem: CostProblem, stop: float) -> Optimum:
     """Minimize the cost by scipy's Nelder-Mead method, from near the middle of the region.
 
     This method needs no derivatives; envelopes have kinks.

@@ -158,7 +158,7 @@ def _with_few_changes(aim: Aim, places: FloatArray, least_gain: float) -> FloatA
 
 
 @dataclass(frozen=True)
-class Change:
+class ProposedChange:
     """Change of one factor.
 
     Attributes:
@@ -181,7 +181,7 @@ class Change:
         return dict.fromkeys(keys, self.text)
 
 
-def change_of(machine: MachineParameters, factor: FactorLevels, place: float) -> Change:
+def change_of(machine: MachineParameters, factor: FactorLevels, place: float) -> ProposedChange:
     """Return the change of a factor to a place, rounded to what a person would write.
 
     Args:
@@ -197,7 +197,7 @@ def change_of(machine: MachineParameters, factor: FactorLevels, place: float) ->
     else:
         text = f"{significant(value, 3)} {number.unit.shown}".replace("−", "-")
         value = float(f"{value:.3g}")
-    return Change(factor, text, float(np.interp(value, numbers, (-1.0, 0.0, 1.0))))
+    return ProposedChange(factor, text, float(np.interp(value, numbers, (-1.0, 0.0, 1.0))))
 
 
 @dataclass(frozen=True)
@@ -212,7 +212,7 @@ class Proposal:
         command: Command that runs the setting; "" if there is none.
     """
 
-    changes: tuple[Change, ...]
+    changes: tuple[ProposedChange, ...]
     check: Check
     studied: tuple[str, ...]
     is_machine: bool
@@ -278,7 +278,9 @@ ZERO = "level 0"
 """Name of the setting without any change."""
 
 
-def settings_of(changes: tuple[Change, ...], factors: tuple[FactorLevels, ...]) -> list[Setting]:
+def settings_of(
+    changes: tuple[ProposedChange, ...], factors: tuple[FactorLevels, ...]
+) -> list[Setting]:
     """Return level 0 and the setting of the changes, if there are any."""
     zero = Setting(ZERO, (0.0,) * len(factors))
     if not changes:

@@ -31,9 +31,9 @@ from wm_drake.studies.gasket.options import GasketOptions
 from wm_drake.studies.gasket.page import GasketResult
 from wm_drake.studies.gasket.proposal import (
     Aim,
-    Change,
     Compared,
     Proposal,
+    ProposedChange,
     best_places,
     change_of,
     is_level_zero,
@@ -144,7 +144,7 @@ class GasketTask(Task):
             self._command(changes),
         )
 
-    def _command(self, changes: Sequence[Change]) -> str:
+    def _command(self, changes: Sequence[ProposedChange]) -> str:
         """Return the command that runs changes; "" if there is none."""
         options = self.options
         sets = [f"{name}={text}" for c in changes for name, text in c.sets.items()]

@@ -19,7 +19,7 @@ from wm_drake.report.formatting import MM_PER_M, MPA_PER_PA, number, percent, pl
 from wm_drake.report.page import Picture, Section, SectionedPage, picture
 from wm_drake.report.table import Column, Table, line
 from wm_drake.report.terminal import Printed
-from wm_drake.solid.curves import AXIAL, RADIAL, TILT, TWIST, Curve, Mesh, Motion, Point
+from wm_drake.solid.curves import AXIAL, RADIAL, TILT, TWIST, Curve, CurvePoint, Mesh, RimMotion
 from wm_drake.solid.mesh import Ring, axes_at
 from wm_drake.solid.touching import Faces
 from wm_drake.studies.gasket_curves.study import Checked, coupling
@@ -37,7 +37,7 @@ METHOD = (
     "2 π f, at the frequency below."
 )
 
-AXES: dict[str, tuple[Motion, str]] = {
+AXES: dict[str, tuple[RimMotion, str]] = {
     "x": (RADIAL, ""),
     "y": (AXIAL, ""),
     "z": (RADIAL, ""),
@@ -492,7 +492,7 @@ def rings_figure(curves: dict[str, Curve]) -> fig.Figure:
     return fig.Figure(panels=fig.in_grid(panels, 2), height=210.0)
 
 
-def _outline(ring: Ring, point: Point, column: int) -> FloatArray:
+def _outline(ring: Ring, point: CurvePoint, column: int) -> FloatArray:
     """Return the closed outline of the wall in a cut: x and y of its nodes. (n, 2) [m]"""
     places = (ring.positions + point.u)[ring.grid[:, column]][..., :2]
     return np.concatenate([places[:, 0], places[-1], places[::-1, 2], places[0][::-1]])

@@ -64,7 +64,7 @@ MM_PER_M = 1e3
 UNITS = (Unit("N*s/m", "N*s/mm"), Unit("N*m*s/rad", "N*mm*s/deg"))
 """SI units and printed units of C_L and C_T."""
 
-Measured: TypeAlias = Mapping[str, xr.DataArray]
+MeasuredDisplacements: TypeAlias = Mapping[str, xr.DataArray]
 """Displacements (time, sensor), sampled every 5 ms, by load. [m]"""
 
 
@@ -86,7 +86,7 @@ class Damping:
     parameters: MachineParameters
     grid: Optimum
     scipy: Optimum
-    measured: Measured
+    measured: MeasuredDisplacements
     rounds: tuple[Round, ...] = ()
     truth: FloatArray | None = None
     at_best: Mapping[str, Record] = field(default_factory=dict)
@@ -165,7 +165,10 @@ def planted_damping(parameters: MachineParameters, linear: str, torsional: str) 
 
 
 def identify_damping(
-    machine: Machine, measured: Measured, truth: FloatArray | None = None, mesh: float = MESH
+    machine: Machine,
+    measured: MeasuredDisplacements,
+    truth: FloatArray | None = None,
+    mesh: float = MESH,
 ) -> Damping:
     """Identify C_L and C_T from measured displacements.
 
@@ -241,7 +244,7 @@ class EnvelopeModel:
         curves: Load and columns of each curve: upper and lower envelope of a sensor with a load.
     """
 
-    def __init__(self, machine: Machine, measured: Measured) -> None:
+    def __init__(self, machine: Machine, measured: MeasuredDisplacements) -> None:
         """Compute the measured envelopes.
 
         Raises:

@@ -17,7 +17,7 @@ from wm_drake.report.formatting import number, plain, significant
 from wm_drake.report.page import Picture, Section, SectionedPage, picture
 from wm_drake.report.table import Column, Table, line
 from wm_drake.report.terminal import Printed
-from wm_drake.studies.gasket_geometry.drawings import Factor
+from wm_drake.studies.gasket_geometry.drawings import DrawingFactor
 from wm_drake.studies.gasket_geometry.study import GAP, RESPONSES, Surface, excess, ranked
 from wm_drake.studies.study import Facts, Result
 
@@ -48,7 +48,7 @@ class GeometryResult(Result):
     """
 
     name: str
-    factors: tuple[Factor, ...]
+    factors: tuple[DrawingFactor, ...]
     levels: FloatArray
     responses: dict[str, FloatArray]
     design: int

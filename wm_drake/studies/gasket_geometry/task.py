@@ -34,7 +34,7 @@ from wm_drake.studies.gasket_geometry.study import (
     GAP,
     MEASURES,
     POINTS,
-    Computed,
+    ComputedDrawing,
     Surface,
     _table,
     computed_curves,
@@ -140,7 +140,7 @@ class GeometryTask(Task):
 
     def _all_computed(
         self, executor: Executor, levels: FloatArray, progress: Callable[[int], None]
-    ) -> list[Computed]:
+    ) -> list[ComputedDrawing]:
         """Return what the curves of drawings give, from the ledger where it has them.
 
         Raises:
@@ -173,14 +173,14 @@ class GeometryTask(Task):
         return [self._kept(ledger.get(key).values) for key in keys]
 
     @staticmethod
-    def _kept(values: Mapping[str, Any]) -> Computed:
+    def _kept(values: Mapping[str, Any]) -> ComputedDrawing:
         """Return what the ledger has of a drawing."""
         tables = {motion.name: _table(motion.rotates, values[motion.name]) for motion in MOTIONS}
         stiffness = GasketStiffness(tables, float(values["coupling"]))
-        return Computed(stiffness, float(values["stretch"]))
+        return ComputedDrawing(stiffness, float(values["stretch"]))
 
     def _responses(
-        self, executor: Executor, levels: FloatArray, computed: Sequence[Computed]
+        self, executor: Executor, levels: FloatArray, computed: Sequence[ComputedDrawing]
     ) -> dict[str, FloatArray]:
         """Return the responses of drawings: stiffness, then worst of all loads. (n,) each"""
         machines = [

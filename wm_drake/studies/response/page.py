@@ -39,7 +39,7 @@ METHOD = (
 )
 
 
-class Quantity(NamedTuple):
+class ResponseVariable(NamedTuple):
     """Variable of a response in files.
 
     Attributes:
@@ -58,15 +58,15 @@ class Quantity(NamedTuple):
 
 
 QUANTITIES = (
-    Quantity("amplitude", "sensor", "amplitudes_mm", "mm", MM_PER_M),
-    Quantity("detergent_displacement", "axis", "detergent_box_mm", "mm", MM_PER_M),
-    Quantity("gasket_force", "axis", "gasket_force_N"),
-    Quantity("gasket_moment", "axis", "gasket_moment_Nm", "Nm"),
-    Quantity("spring_tension", "spring", "spring_tension_N"),
-    Quantity("damper_tension", "damper", "damper_tension_N"),
-    Quantity("damper_spin", "spinning", "damper_spin_deg_s", "deg_s", DEG_PER_RAD),
+    ResponseVariable("amplitude", "sensor", "amplitudes_mm", "mm", MM_PER_M),
+    ResponseVariable("detergent_displacement", "axis", "detergent_box_mm", "mm", MM_PER_M),
+    ResponseVariable("gasket_force", "axis", "gasket_force_N"),
+    ResponseVariable("gasket_moment", "axis", "gasket_moment_Nm", "Nm"),
+    ResponseVariable("spring_tension", "spring", "spring_tension_N"),
+    ResponseVariable("damper_tension", "damper", "damper_tension_N"),
+    ResponseVariable("damper_spin", "spinning", "damper_spin_deg_s", "deg_s", DEG_PER_RAD),
 )
-MOUNT_FORCES = tuple(Quantity(f"mount_force_{kind}", "mount", kind) for kind in KINDS)
+MOUNT_FORCES = tuple(ResponseVariable(f"mount_force_{kind}", "mount", kind) for kind in KINDS)
 """Force of each mount on the cabinet: peak and RMS; in JSON below `mount_force_N`."""
 
 
@@ -150,7 +150,9 @@ def _case_as_json(case: SteadyCase) -> dict[str, Any]:
     }
 
 
-def _by_label(case: SteadyCase, quantities: Sequence[Quantity]) -> dict[str, dict[str, FloatArray]]:
+def _by_label(
+    case: SteadyCase, quantities: Sequence[ResponseVariable]
+) -> dict[str, dict[str, FloatArray]]:
     """Return quantities along the branch, by name in JSON and label."""
     return {
         q.in_json: {

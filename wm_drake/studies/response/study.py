@@ -71,7 +71,7 @@ class SteadyStudy:
 
 
 @dataclass(frozen=True)
-class Settings:
+class ResponseSettings:
     """What the study computes.
 
     Attributes:
@@ -103,7 +103,7 @@ class Settings:
 def run_steady_study(
     machine: Machine,
     loads: Mapping[str, Load],
-    settings: Settings,
+    settings: ResponseSettings,
     progress: Callable[[float], None] = lambda fraction: None,
 ) -> SteadyStudy:
     """Compute the steady response to loads, runs over the spin profile, and sweeps.
@@ -201,7 +201,7 @@ def sweep_profile(first: float, last: float, rate: float) -> SpinProfile:
 def _sweeps(
     machine: Machine,
     loads: Mapping[str, Load],
-    settings: Settings,
+    settings: ResponseSettings,
     progress: Callable[[float], None],
 ) -> xr.Dataset:
     """Return the largest amplitudes of sweeps and their speeds."""

@@ -42,7 +42,7 @@ from wm_drake.studies.spin.balance import (
 )
 from wm_drake.studies.spin.figures import revolution_starts
 from wm_drake.studies.spin.floor import floor_section, floor_warnings
-from wm_drake.studies.spin.study import CaseResult, Comparison, SpinRuns, band_text
+from wm_drake.studies.spin.study import CaseResult, ComparedCases, SpinRuns, band_text
 from wm_drake.studies.spin.tables import amplitude_table
 from wm_drake.studies.spin.vibration import vibration_pictures
 from wm_drake.studies.study import Facts, Result
@@ -294,7 +294,7 @@ def _agreement_sentence(result: SpinRuns, cases: list[CaseResult], table: pd.Dat
 def _why_not_compared(result: SpinRuns) -> str:
     if not result.parameters.measured:
         return "The machine file has no measured amplitudes."
-    if result.comparison is Comparison.NONE:
+    if result.comparison is ComparedCases.NONE:
         return (
             "There is no comparison with the measured amplitudes of the machine file, because its "
             "numbers were changed."

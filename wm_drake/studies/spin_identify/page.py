@@ -51,21 +51,21 @@ class SpinIdentifyResult(Result):
 
     def as_json(self) -> dict[str, Any]:
         """Return the result for JSON."""
-        found = self.identification
-        shown = found.fit.as_dict()
-        entries = zip(found.sought, shown["unknowns"].values(), strict=True)
+        result = self.identification
+        shown = result.fit.as_dict()
+        entries = zip(result.sought, shown["unknowns"].values(), strict=True)
         for k, (sought, entry) in enumerate(entries):
-            value, identifiable = found.fit.estimates[k].value, found.identifiable[k]
+            value, identifiable = result.fit.estimates[k].value, result.identifiable[k]
             entry |= {"keys": list(sought.keys), "found": value, "identifiable": identifiable}
-            if found.planted is not None and found.recovered is not None:
-                entry |= {"planted": float(found.planted[k]), "error": float(found.recovered[k])}
+            if result.planted is not None and result.recovered is not None:
+                entry |= {"planted": float(result.planted[k]), "error": float(result.recovered[k])}
         return {
-            "machine": found.parameters.name,
-            "virtual_experiment": found.planted is not None,
-            "cases": [case.name for case in found.cases],
-            "average_error_before": float(average_errors(found.before, found.measured).mean()),
-            "average_error_after": found.error_after,
-            "verdict": found.verdict,
+            "machine": result.parameters.name,
+            "virtual_experiment": result.planted is not None,
+            "cases": [case.name for case in result.cases],
+            "average_error_before": float(average_errors(result.before, result.measured).mean()),
+            "average_error_after": result.error_after,
+            "verdict": result.verdict,
             **shown,
         }
 

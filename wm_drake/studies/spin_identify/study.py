@@ -24,7 +24,7 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.unbalance_cases import UnbalanceCase
 from wm_drake.parameters.variation import number_at, range_of
 from wm_drake.simulation.cases import Case
-from wm_drake.studies.fitting.fit import Fit, Verdict, verdict_of
+from wm_drake.studies.fitting.fit import Fit, FitVerdict, verdict_of
 from wm_drake.studies.fitting.methods import least_squares
 from wm_drake.studies.fitting.problem import FitProblem, Measurement, Progress, Unknown
 from wm_drake.studies.spin_cycle.measured import DIMS
@@ -127,7 +127,7 @@ class SpinIdentification:
         return float(average_errors(self.after, self.measured).mean())
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> FitVerdict:
         """Whether the machine with the identified numbers fits the measured displacements."""
         return verdict_of(self.error_after)
 

@@ -29,8 +29,8 @@ from wm_drake.studies.tolerance.page import ToleranceReport
 from wm_drake.studies.tolerance.study import (
     CONTACTS,
     DEFAULT,
-    Settings,
     ToleranceResult,
+    ToleranceSettings,
     limits_of,
     run_tolerances,
 )
@@ -45,7 +45,9 @@ class ToleranceTask(Task):
         sensitivity = options.sensitivity
         if sensitivity is None:
             sensitivity = min(512, options.samples)
-        self.settings = Settings(options.samples, sensitivity, options.subset, options.seed)
+        self.settings = ToleranceSettings(
+            options.samples, sensitivity, options.subset, options.seed
+        )
         self.tolerances = load_tolerances(options.file)
         limits: tuple[Limit, ...] = ()
         if options.limits is not None:

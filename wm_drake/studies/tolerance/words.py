@@ -12,11 +12,11 @@ from wm_drake.studies.tolerance.study import (
     CRUDE,
     SUBSET,
     Contact,
+    LimitVerdict,
     ToleranceResult,
-    Verdict,
     measure_key,
 )
-from wm_drake.studies.tolerance.variables import Variable
+from wm_drake.studies.tolerance.variables import UncertainVariable
 
 MOST_NAMED = 3
 """Number of quantities that the summary names."""
@@ -134,7 +134,7 @@ def measure_titles(result: ToleranceResult) -> dict[str, tuple[str, str]]:
     return {measure_key(r): (r.title.replace("_", " "), r.unit_text) for r in result.chosen}
 
 
-def _limit_sentences(verdicts: tuple[Verdict, ...]) -> list[str]:
+def _limit_sentences(verdicts: tuple[LimitVerdict, ...]) -> list[str]:
     if not verdicts:
         return []
     words = [v.word for v in verdicts]
@@ -142,7 +142,7 @@ def _limit_sentences(verdicts: tuple[Verdict, ...]) -> list[str]:
     return [f"Limits: {', '.join(parts)}."]
 
 
-def leading(result: ToleranceResult) -> tuple[str, list[tuple[Variable, Index]]]:
+def leading(result: ToleranceResult) -> tuple[str, list[tuple[UncertainVariable, Index]]]:
     """Return the measure that the summary explains, and its quantities, largest total index first.
 
     The measure is the smallest gap if there is one, else the first measure.

@@ -102,7 +102,7 @@ class Influence:
 
 
 @dataclass(frozen=True)
-class Laundry:
+class LaundryGaps:
     """Smallest gaps of samples of the laundry.
 
     Attributes:
@@ -122,7 +122,7 @@ class Laundry:
 
 
 @dataclass(frozen=True)
-class Trials:
+class VerdictTrials:
     """Runs of all loads with changed machines."""
 
     machine: Machine
