@@ -8,5 +8,11 @@ from pydantic import StringConstraints
 FloatArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
 """An array of floats; the docstring of each use gives shape and unit."""
 
+BoolArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+"""An array of truth values."""
+
+IndexArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
+"""An array of places in another one."""
+
 Name: TypeAlias = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_-]{0,63}$")]
 """Name of an entry. It becomes part of key paths and of file names."""

@@ -20,8 +20,8 @@ from wm_drake.studies.gasket_damping.study import (
     LOWER,
     NOISE,
     UPPER,
-    Damping,
     EnvelopeModel,
+    GasketDamping,
     as_measured,
     damping_problem,
     identify_damping,
@@ -111,15 +111,15 @@ def test_both_searches_find_the_true_damping(fast, records, monkeypatch):
 
 def test_better_search_is_reported_and_disagreement_is_stated(reference):
     near, far = Optimum(si((0.019, 60.0)), 0.02, 60), Optimum(si((0.025, 50.0)), 95.7, 33)
-    result = Damping(reference, far, near, {"middle": None}, (), near.point)
+    result = GasketDamping(reference, far, near, {"middle": None}, (), near.point)
     assert result.better is near
     assert not result.searches_agree
     text = summary(result)
     assert text.index("C_L = 0.0190 N s/mm and C_T = 60.0 N mm s/deg") < text.index("0.0250")
     assert "disagree" in text
-    assert Damping(reference, near, far, {"middle": None}).better is near
+    assert GasketDamping(reference, near, far, {"middle": None}).better is near
     close = Optimum(near.point + 0.009 * (UPPER - LOWER), 0.5, 10)
-    assert Damping(reference, near, close, {"middle": None}).searches_agree
+    assert GasketDamping(reference, near, close, {"middle": None}).searches_agree
 
 
 def test_measured_records_are_interpolated_to_samples_every_5_ms():

@@ -1,11 +1,10 @@
 """Designs of a machine as points of the unit cube, and their objectives and constraints."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
-import xarray as xr
 
 from wm_drake.errors import InputError, Problem, input_error
 from wm_drake.parameters import MachineParameters, Variation, quantities, variation_of, with_values
@@ -16,10 +15,8 @@ from wm_drake.parameters.units import Unit
 from wm_drake.parameters.variation import value_at
 from wm_drake.simulation.cases import Case, load_of
 from wm_drake.simulation.measures.responses import Response, chosen_responses
+from wm_drake.studies.executor import RunCases
 from wm_drake.studies.tolerance.variables import UncertainMachine
-
-Run: TypeAlias = Callable[[Iterable[Case]], xr.Dataset]
-"""Function that runs cases and returns their table."""
 
 
 @dataclass(frozen=True)
@@ -203,7 +200,7 @@ class MachineDesigns:
             return self.runs_of(parameters, name)
         return self.scattered(parameters).cases(np.zeros((1, self.scores.shape[1])))
 
-    def evaluate(self, designs: FloatArray, run: Run) -> tuple[FloatArray, FloatArray]:
+    def evaluate(self, designs: FloatArray, run: RunCases) -> tuple[FloatArray, FloatArray]:
         """Return values of all objectives, then of all constraints, in units for reading.
 
         Args:
@@ -218,7 +215,7 @@ class MachineDesigns:
         )
         return columns[:, : len(self.objectives)], columns[:, len(self.objectives) :]
 
-    def scenario_values(self, designs: FloatArray, run: Run) -> list[FloatArray]:
+    def scenario_values(self, designs: FloatArray, run: RunCases) -> list[FloatArray]:
         """Return the values of each goal by design and scenario, in units for reading.
 
         Args:
@@ -246,7 +243,7 @@ class MachineDesigns:
             by_goal.append(np.where(failed, np.nan, values).reshape(len(designs), -1))
         return by_goal
 
-    def costs(self, designs: FloatArray, run: Run) -> tuple[FloatArray, FloatArray]:
+    def costs(self, designs: FloatArray, run: RunCases) -> tuple[FloatArray, FloatArray]:
         """Return what the search makes small, and constraints that are met at 0 and below."""
         objectives, constraints = self.evaluate(designs, run)
         f = [g.cost(column) for g, column in zip(self.objectives, objectives.T, strict=True)]

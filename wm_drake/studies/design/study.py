@@ -14,9 +14,10 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.displacements import envelopes
 from wm_drake.simulation.records import Record, sample_period
-from wm_drake.studies.design.problem import DesignGoal, MachineDesigns, Run
+from wm_drake.studies.design.problem import DesignGoal, MachineDesigns
 from wm_drake.studies.design.search import DesignProblem, SearchResult, SearchSettings, search_front
 from wm_drake.studies.design.surrogate import search_with_surfaces
+from wm_drake.studies.executor import RunCases
 from wm_drake.studies.tolerance.distributions import base_samples
 from wm_drake.studies.tolerance.shares import CONFIDENCE, Percentile, percentile_of
 
@@ -63,7 +64,7 @@ class ParetoFront:
 
 
 def run_designs(
-    designs: MachineDesigns, run: Run, settings: SearchSettings, search: str = "genetic"
+    designs: MachineDesigns, run: RunCases, settings: SearchSettings, search: str = "genetic"
 ) -> ParetoFront:
     """Search the Pareto front of the designs of a machine.
 
@@ -141,7 +142,7 @@ class Promise:
     is_kept: bool | None
 
 
-def promises(front: ParetoFront, run: Run, seed: int) -> list[Promise]:
+def promises(front: ParetoFront, run: RunCases, seed: int) -> list[Promise]:
     """Return the promises of the chosen designs of a robust front; none of a nominal one."""
     designs, scores = front.designs, front.designs.scores
     if scores is None or not front.chosen:

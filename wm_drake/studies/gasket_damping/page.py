@@ -23,7 +23,7 @@ from wm_drake.studies.gasket_damping.study import (
     UNKNOWNS,
     UPPER,
     WINDOW,
-    Damping,
+    GasketDamping,
     in_units_of_paper,
     named,
 )
@@ -37,7 +37,7 @@ SHOWN_CELLS = 60
 class GasketDampingResult(Result):
     """An identification of C_L and C_T, as it is shown."""
 
-    damping: Damping
+    damping: GasketDamping
     float_format: ClassVar[str] = "%.9g"
 
     def tables(self) -> dict[str, pd.DataFrame]:
@@ -80,7 +80,7 @@ class GasketDampingResult(Result):
         return gasket_damping_page(self.damping, facts)
 
 
-def gasket_damping_page(result: Damping, facts: Facts) -> str:
+def gasket_damping_page(result: GasketDamping, facts: Facts) -> str:
     """Return the page as text of one self-contained HTML file."""
     envelopes = tuple(_envelopes_picture(result, load) for load in result.measured)
     sections = [
@@ -110,7 +110,7 @@ NAMES = {"grid": "grid search", "scipy": "bounded Nelder-Mead method of SciPy"}
 """Names of the searches for reading."""
 
 
-def summary(result: Damping) -> str:
+def summary(result: GasketDamping) -> str:
     """Return one paragraph: the better optimum, whether both searches agree, the planted values."""
     source = "a virtual experiment" if result.truth is not None else "measured records"
     loads = f"load{'s' if len(result.measured) > 1 else ''} {' and '.join(result.measured)}"
@@ -132,7 +132,7 @@ def summary(result: Damping) -> str:
     )
 
 
-def _agreement(result: Damping) -> str:
+def _agreement(result: GasketDamping) -> str:
     """Return sentences on what each search found and whether both agree."""
     first, other = sorted(
         (("grid", result.grid), ("scipy", result.scipy)),
@@ -150,7 +150,7 @@ def _agreement(result: Damping) -> str:
     )
 
 
-def _interval_text(result: Damping) -> str:
+def _interval_text(result: GasketDamping) -> str:
     """Return a sentence about the confidence interval."""
     if result.interval is None:
         return "There is no confidence interval: fewer than three curves, or a run diverged."
@@ -161,7 +161,7 @@ def _interval_text(result: Damping) -> str:
     )
 
 
-def _warnings(result: Damping) -> list[str]:
+def _warnings(result: GasketDamping) -> list[str]:
     warnings = []
     if not result.searches_agree:
         warnings.append(
@@ -185,7 +185,7 @@ def _damping_text(damping: FloatArray) -> str:
     return f"C_L = {number(linear, 4)} N s/mm and C_T = {number(torsional, 1)} N mm s/deg"
 
 
-def points_table(result: Damping) -> pd.DataFrame:
+def points_table(result: GasketDamping) -> pd.DataFrame:
     """Return every point of the grid search: round, damping and value of the objective."""
     rows = [
         (index, 100.0 * grid.spacing, *in_units_of_paper(point), value)
@@ -196,7 +196,7 @@ def points_table(result: Damping) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["round", *units])
 
 
-def _optima(result: Damping) -> Table:
+def _optima(result: GasketDamping) -> Table:
     groups = [
         line(
             f"{name} (better)" if search is result.better else name,
@@ -235,7 +235,7 @@ def _optima(result: Damping) -> Table:
     return Table(caption, columns, tuple(groups))
 
 
-def _surface_picture(result: Damping) -> Picture:
+def _surface_picture(result: GasketDamping) -> Picture:
     caption = (
         "Left: distance over both dampings, points of the grid search, darker in each later round, "
         "and the path of the best point from the first grid on. Right: distance at "
@@ -248,7 +248,7 @@ def _surface_picture(result: Damping) -> Picture:
     )
 
 
-def surface_figure(result: Damping) -> fig.Figure:
+def surface_figure(result: GasketDamping) -> fig.Figure:
     """Return the distance at the points of the grid search, with the path of the search."""
     points = in_units_of_paper(np.concatenate([grid.points for grid in result.rounds]))
     values = np.concatenate([grid.values for grid in result.rounds])
@@ -293,7 +293,7 @@ def surface_figure(result: Damping) -> fig.Figure:
     return fig.Figure(panels=fig.in_grid(panels, 2), height=380.0)
 
 
-def _envelopes_picture(result: Damping, load: str) -> Picture:
+def _envelopes_picture(result: GasketDamping, load: str) -> Picture:
     caption = (
         f"Load {load}: envelopes of the filtered displacement at each sensor. Shaded "
         f"area: computed at the optimum. Dashed lines: {_source(result)}. The envelopes are "
@@ -306,11 +306,11 @@ def _envelopes_picture(result: Damping, load: str) -> Picture:
     )
 
 
-def _source(result: Damping) -> str:
+def _source(result: GasketDamping) -> str:
     return "measured" if result.truth is None else "virtual experiment"
 
 
-def envelopes_figure(result: Damping, load: str) -> fig.Figure:
+def envelopes_figure(result: GasketDamping, load: str) -> fig.Figure:
     """Return the envelopes computed at the optimum and the measured ones, one panel per sensor."""
     every = {"time": slice(None, None, 10)}
     computed = (MM_PER_M * envelopes(result.at_best[load])).isel(every)
@@ -335,7 +335,7 @@ def envelopes_figure(result: Damping, load: str) -> fig.Figure:
     return fig.Figure(panels=fig.in_grid(panels, 3, share="both"), height=150.0)
 
 
-def _amplitudes(result: Damping) -> Table:
+def _amplitudes(result: GasketDamping) -> Table:
     """Return the largest envelope values in the time window with their differences, [B] Table 2."""
     groups = []
     for load, record in result.at_best.items():

@@ -69,7 +69,7 @@ MeasuredDisplacements: TypeAlias = Mapping[str, xr.DataArray]
 
 
 @dataclass(frozen=True)
-class Damping:
+class GasketDamping:
     """Result of an identification of C_L and C_T.
 
     Attributes:
@@ -169,7 +169,7 @@ def identify_damping(
     measured: MeasuredDisplacements,
     truth: FloatArray | None = None,
     mesh: float = MESH,
-) -> Damping:
+) -> GasketDamping:
     """Identify C_L and C_T from measured displacements.
 
     Args:
@@ -185,7 +185,7 @@ def identify_damping(
     grid, rounds = grid_search(problem, mesh)
     scipy = simplex_search(problem, STOP)
     grid, scipy = (replace(end, point=problem.points_at(end.point)) for end in (grid, scipy))
-    result = Damping(machine.parameters, grid, scipy, measured, rounds, truth)
+    result = GasketDamping(machine.parameters, grid, scipy, measured, rounds, truth)
     best = result.better.point
     at_best = {case.name: simulate(machine, case) for case in model.cases(best)}
     return replace(result, at_best=at_best, interval=jackknife_interval(problem, best))

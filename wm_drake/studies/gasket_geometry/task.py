@@ -27,8 +27,8 @@ from wm_drake.studies.gasket_curves.study import (
     with_gasket,
 )
 from wm_drake.studies.gasket_geometry import drawings
-from wm_drake.studies.gasket_geometry.options import GeometryOptions
-from wm_drake.studies.gasket_geometry.page import GeometryResult
+from wm_drake.studies.gasket_geometry.options import GasketGeometryOptions
+from wm_drake.studies.gasket_geometry.page import GasketGeometryResult
 from wm_drake.studies.gasket_geometry.study import (
     CANDIDATES,
     GAP,
@@ -46,10 +46,10 @@ from wm_drake.studies.inputs import selected_cases
 from wm_drake.studies.study import Result, Task
 
 
-class GeometryTask(Task):
+class GasketGeometryTask(Task):
     """The study with checked options."""
 
-    def __init__(self, options: GeometryOptions, machine: Machine) -> None:
+    def __init__(self, options: GasketGeometryOptions, machine: Machine) -> None:
         """Read the drawing, make the design, and check that each of its drawings can be built."""
         from scipy.stats.qmc import LatinHypercube
 
@@ -114,7 +114,7 @@ class GeometryTask(Task):
         verified = self._responses(executor, proposed[None], [made])
         levels = np.vstack([levels, proposed])
         every = {name: np.concatenate([responses[name], verified[name]]) for name in responses}
-        return GeometryResult(
+        return GasketGeometryResult(
             self.options.file,
             self.factors,
             levels,

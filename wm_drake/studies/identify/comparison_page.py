@@ -15,7 +15,7 @@ from wm_drake.studies.fitting.page import estimates_frame, values_table
 from wm_drake.studies.identify.comparison import FittedLaw, LawComparison
 from wm_drake.studies.identify.figures import evenly_chosen, motion_text, rival_loops_figure
 from wm_drake.studies.identify.judgement import per_cent
-from wm_drake.studies.identify.page import IdentifiedResult, frequency_of, motion_sentences
+from wm_drake.studies.identify.page import IdentifyResult, frequency_of, motion_sentences
 from wm_drake.studies.rig.units import units_of
 from wm_drake.studies.study import Facts
 
@@ -241,7 +241,7 @@ def bounds_sentences(comparison: LawComparison) -> list[str]:
 
 
 @dataclass(frozen=True)
-class IdentifyComparisonResult(IdentifiedResult):
+class IdentifyComparisonResult(IdentifyResult):
     """Several laws that were fitted to the same tests."""
 
     comparison: LawComparison

@@ -23,7 +23,7 @@ from wm_drake.studies.response.figures import (
     response_figure,
     sweep_figure,
 )
-from wm_drake.studies.response.study import SteadyCase, SteadyStudy
+from wm_drake.studies.response.study import ResponseCase, ResponseStudy
 from wm_drake.studies.study import Facts, Result
 
 DEG_PER_RAD = Unit("rad/s", "deg/s").from_si(1.0)
@@ -74,7 +74,7 @@ MOUNT_FORCES = tuple(ResponseVariable(f"mount_force_{kind}", "mount", kind) for 
 class ResponseResult(Result):
     """Result of the study."""
 
-    study: SteadyStudy
+    study: ResponseStudy
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """Return the responses and, if computed, the sweeps."""
@@ -135,7 +135,7 @@ class ResponseResult(Result):
         ).html()
 
 
-def _case_as_json(case: SteadyCase) -> dict[str, Any]:
+def _case_as_json(case: ResponseCase) -> dict[str, Any]:
     mounts = _by_label(case, MOUNT_FORCES)
     return {
         "load": case.load,
@@ -151,7 +151,7 @@ def _case_as_json(case: SteadyCase) -> dict[str, Any]:
 
 
 def _by_label(
-    case: SteadyCase, quantities: Sequence[ResponseVariable]
+    case: ResponseCase, quantities: Sequence[ResponseVariable]
 ) -> dict[str, dict[str, FloatArray]]:
     """Return quantities along the branch, by name in JSON and label."""
     return {
@@ -163,7 +163,7 @@ def _by_label(
     }
 
 
-def _load_sections(study: SteadyStudy) -> list[Section]:
+def _load_sections(study: ResponseStudy) -> list[Section]:
     """Return a section for each load: responses, and deflection shapes at the peaks."""
     outlines = Scene(study.parameters).tub_outlines()
     sections = []
@@ -182,11 +182,11 @@ def _load_sections(study: SteadyStudy) -> list[Section]:
     return sections
 
 
-def _gasket(case: SteadyCase) -> str:
+def _gasket(case: ResponseCase) -> str:
     return "with gasket" if case.gasket else "without gasket"
 
 
-def summary(study: SteadyStudy) -> str:
+def summary(study: ResponseStudy) -> str:
     """Return one paragraph about the largest amplitude and about stability."""
     case = max(study.cases, key=lambda case: float(case.response.amplitude.max()))
     values = case.response.amplitude.values
@@ -212,7 +212,7 @@ def summary(study: SteadyStudy) -> str:
     )
 
 
-def largest_table(study: SteadyStudy) -> Table:
+def largest_table(study: ResponseStudy) -> Table:
     """Return the largest amplitude of each sensor, and the speed of the largest of all."""
     rows = []
     for case in study.cases:
@@ -225,7 +225,7 @@ def largest_table(study: SteadyStudy) -> Table:
     return table_of(pd.DataFrame(rows, columns=["load", "gasket", *columns]), columns=columns)
 
 
-def _warnings(study: SteadyStudy) -> list[str]:
+def _warnings(study: ResponseStudy) -> list[str]:
     texts = [_spin_warning(case) for case in study.cases]
     return [text for text in texts if text] + [
         f"Load {case.load}, {_gasket(case)}: the branch could be followed only up to "
@@ -236,7 +236,7 @@ def _warnings(study: SteadyStudy) -> list[str]:
     ]
 
 
-def _spin_warning(case: SteadyCase) -> str:
+def _spin_warning(case: ResponseCase) -> str:
     """Return a text about telescopic dampers that spin; "" if none does."""
     turns = spin_per_revolution(case)
     if not turns.size or np.max(np.abs(turns)) < LEAST_SPIN:
@@ -252,13 +252,13 @@ def _spin_warning(case: SteadyCase) -> str:
     )
 
 
-def spin_per_revolution(case: SteadyCase) -> FloatArray:
+def spin_per_revolution(case: ResponseCase) -> FloatArray:
     """Return by how much telescopic dampers spin in a drum revolution. (points, dampers) [deg]"""
     rates = case.response.damper_spin.values / case.response.speed.values[:, None]
     return np.asarray(360.0 * rates)
 
 
-def _peaks_table(study: SteadyStudy) -> Table:
+def _peaks_table(study: ResponseStudy) -> Table:
     groups = []
     for case in study.cases:
         steady = case.response.amplitude.max("point")
@@ -289,7 +289,7 @@ def _row(words: str, values: xr.DataArray, decimals: int, kind: str = "") -> Row
     return Row((words, *(number(float(value), decimals) for value in values)), kind)
 
 
-def _response_picture(load: str, cases: list[SteadyCase]) -> Picture:
+def _response_picture(load: str, cases: list[ResponseCase]) -> Picture:
     caption = (
         f"Load {load}: largest deviation from the mean at each sensor over the drum speed. Dashed: "
         "envelope of the run over the spin profile of the machine, while its speed rises."
@@ -297,7 +297,7 @@ def _response_picture(load: str, cases: list[SteadyCase]) -> Picture:
     return picture(response_figure(cases), f"Amplitudes of load {load} over the speed.", caption)
 
 
-def _sweep_picture(study: SteadyStudy) -> Picture | None:
+def _sweep_picture(study: ResponseStudy) -> Picture | None:
     if study.sweeps is None:
         return None
     caption = (
@@ -310,7 +310,7 @@ def _sweep_picture(study: SteadyStudy) -> Picture | None:
     return picture(sweep_figure(study), "Shift and height of peaks over the sweep rate.", caption)
 
 
-def response_frame(study: SteadyStudy) -> pd.DataFrame:
+def response_frame(study: ResponseStudy) -> pd.DataFrame:
     """Return all responses, a row for each point of a branch."""
     parts = []
     for case in study.cases:
@@ -330,7 +330,7 @@ def response_frame(study: SteadyStudy) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)
 
 
-def sweeps_frame(study: SteadyStudy) -> pd.DataFrame:
+def sweeps_frame(study: ResponseStudy) -> pd.DataFrame:
     """Return the peaks of the sweeps."""
     assert study.sweeps is not None
     table = study.sweeps.to_dataframe().reset_index()

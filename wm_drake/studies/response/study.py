@@ -36,7 +36,7 @@ RAD_S_PER_RPM = np.pi / 30.0
 
 
 @dataclass(frozen=True)
-class SteadyCase:
+class ResponseCase:
     """Steady response to a load.
 
     Attributes:
@@ -56,7 +56,7 @@ class SteadyCase:
 
 
 @dataclass(frozen=True)
-class SteadyStudy:
+class ResponseStudy:
     """Results of the study.
 
     Attributes:
@@ -65,7 +65,7 @@ class SteadyStudy:
     """
 
     parameters: MachineParameters
-    cases: list[SteadyCase]
+    cases: list[ResponseCase]
     sweeps: xr.Dataset | None
     wall_s: float
 
@@ -100,12 +100,12 @@ class ResponseSettings:
         return max(1, self.threads // 2)
 
 
-def run_steady_study(
+def run_response_study(
     machine: Machine,
     loads: Mapping[str, Load],
     settings: ResponseSettings,
     progress: Callable[[float], None] = lambda fraction: None,
-) -> SteadyStudy:
+) -> ResponseStudy:
     """Compute the steady response to loads, runs over the spin profile, and sweeps.
 
     Raises:
@@ -141,10 +141,10 @@ def run_steady_study(
             pool.shutdown(wait=True, cancel_futures=True)
             raise
     cases = [
-        SteadyCase(name, gasket, response, _envelopes(run), wall)
+        ResponseCase(name, gasket, response, _envelopes(run), wall)
         for (name, _, gasket), (response, wall), run in zip(pairs, responses, runs, strict=True)
     ]
-    return SteadyStudy(machine.parameters, cases, sweeps, time.perf_counter() - begin)
+    return ResponseStudy(machine.parameters, cases, sweeps, time.perf_counter() - begin)
 
 
 class _Progress:

@@ -17,7 +17,7 @@ from wm_drake.studies.spin_cycle import tables
 from wm_drake.studies.spin_cycle.figures import bars_figure, heat_map_figure, profile_figure
 from wm_drake.studies.spin_cycle.measured import rms_table
 from wm_drake.studies.spin_cycle.study import (
-    SpinCycleResult,
+    SpinCycleRuns,
     average_errors,
     disagreement,
     largest,
@@ -31,10 +31,10 @@ SHOWN_MASSES = ((0.4, 0.0, 0.0), (0.0, 0.4, 0.0), (0.4, 0.4, 180.0))
 
 
 @dataclass(frozen=True)
-class SpinCycleReport(Result):
+class SpinCycleResult(Result):
     """Result of the study, and the engine of its runs."""
 
-    result: SpinCycleResult
+    result: SpinCycleRuns
     engine: str
 
     def tables(self) -> dict[str, pd.DataFrame]:
@@ -119,7 +119,7 @@ class SpinCycleReport(Result):
         ).html()
 
 
-def _case_as_json(result: SpinCycleResult, case: UnbalanceCase, diverged: str) -> dict[str, Any]:
+def _case_as_json(result: SpinCycleRuns, case: UnbalanceCase, diverged: str) -> dict[str, Any]:
     here = {"case": case.name}
     tension, forces = result.smallest_tension.sel(here), as_json(result.forces.sel(here))
     return {
@@ -138,7 +138,7 @@ def _case_as_json(result: SpinCycleResult, case: UnbalanceCase, diverged: str) -
     }
 
 
-def summary(result: SpinCycleResult, engine: str) -> str:
+def summary(result: SpinCycleRuns, engine: str) -> str:
     """Return one paragraph about displacements, gaps, and errors against a measurement."""
     count = len(result.cases)
     sentences = [
@@ -193,7 +193,7 @@ def case_description(case: UnbalanceCase) -> str:
     return (" and ".join(masses) or "empty drum") + phase
 
 
-def shown_cases(result: SpinCycleResult) -> list[UnbalanceCase]:
+def shown_cases(result: SpinCycleRuns) -> list[UnbalanceCase]:
     """Return the cases that the page shows in detail.
 
     These are the cases of the figures of [A], or the first three if none of them was run, and the
@@ -210,7 +210,7 @@ def shown_cases(result: SpinCycleResult) -> list[UnbalanceCase]:
     return list({case.name: case for case in chosen}.values())
 
 
-def warnings_of(result: SpinCycleResult) -> list[str]:
+def warnings_of(result: SpinCycleRuns) -> list[str]:
     """Return warnings about divergence, overlap, slack springs, integration, imperfections."""
     texts = [
         f"Case {case.name}: {text}. Regions that this run did not complete have no values."
@@ -255,11 +255,11 @@ def warnings_of(result: SpinCycleResult) -> list[str]:
     return texts
 
 
-def _case(result: SpinCycleResult, name: str) -> UnbalanceCase:
+def _case(result: SpinCycleRuns, name: str) -> UnbalanceCase:
     return next(case for case in result.cases if case.name == name)
 
 
-def _profile_picture(result: SpinCycleResult) -> Picture:
+def _profile_picture(result: SpinCycleRuns) -> Picture:
     names = ", ".join(region.name for region in result.profile.regions)
     return picture(
         profile_figure(result.profile),
@@ -268,7 +268,7 @@ def _profile_picture(result: SpinCycleResult) -> Picture:
     )
 
 
-def _worst_picture(result: SpinCycleResult) -> tuple[Picture, ...]:
+def _worst_picture(result: SpinCycleRuns) -> tuple[Picture, ...]:
     """Return the largest displacements of all cases; nothing if no run completed a region."""
     if largest(result.displacement) is None:
         return ()
@@ -290,7 +290,7 @@ def _worst_picture(result: SpinCycleResult) -> tuple[Picture, ...]:
     return (picture(figure, words, caption),)
 
 
-def _bars(result: SpinCycleResult, case: str, title: str) -> Picture:
+def _bars(result: SpinCycleRuns, case: str, title: str) -> Picture:
     computed, integrated = (v.sel(case=case) for v in (result.displacement, result.integrated))
     measured = result.measured.sel(case=case) if result.measured is not None else None
     if measured is not None and not np.isfinite(measured).any():
@@ -303,7 +303,7 @@ def _bars(result: SpinCycleResult, case: str, title: str) -> Picture:
     return picture(bars_figure(computed, integrated, measured), words, caption)
 
 
-def _facts(result: SpinCycleResult, engine: str, facts: Facts) -> list[tuple[str, str]]:
+def _facts(result: SpinCycleRuns, engine: str, facts: Facts) -> list[tuple[str, str]]:
     sensors = [
         f"{name} (frame {frame})"
         for name, frame in result.parameters.accelerometer_frames().items()

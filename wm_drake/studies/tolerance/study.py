@@ -19,7 +19,7 @@ from wm_drake.studies.tolerance.sensitivity import Index, exchanged, sobol_indic
 from wm_drake.studies.tolerance.shares import SampleShare, bound_if_none, share_of
 from wm_drake.studies.tolerance.variables import UncertainMachine
 
-Run: TypeAlias = Callable[[Iterable[Case], str], xr.Dataset]
+RunSamples: TypeAlias = Callable[[Iterable[Case], str], xr.Dataset]
 """Function that runs cases and returns their table, given a word for what they are."""
 
 RARE = 1e-3
@@ -131,7 +131,7 @@ class LimitVerdict:
 
 
 @dataclass(frozen=True)
-class ToleranceResult:
+class ToleranceStudy:
     """Result of a tolerance study.
 
     Attributes:
@@ -200,10 +200,10 @@ def limits_of(
 def run_tolerances(
     machine: UncertainMachine,
     chosen: tuple[Response, ...],
-    run: Run,
+    run: RunSamples,
     settings: ToleranceSettings,
     limits: Sequence[tuple[Limit, Response, float]] = (),
-) -> ToleranceResult:
+) -> ToleranceStudy:
     """Run a tolerance study.
 
     Args:
@@ -216,7 +216,7 @@ def run_tolerances(
     indices, refused, more = trials.indices(a, b, values)
     contact = trials.contact(table)
     rare = contact.rare.evaluations if contact and contact.rare else 0
-    return ToleranceResult(
+    return ToleranceStudy(
         machine,
         settings,
         chosen,
@@ -266,7 +266,7 @@ class _Trials:
 
     machine: UncertainMachine
     chosen: tuple[Response, ...]
-    run: Run
+    run: RunSamples
     settings: ToleranceSettings
 
     def indices(
