@@ -199,9 +199,9 @@ def test_planted_step_backwards_is_found():
 
 def test_package_itself_imports_no_room_until_asked():
     (source,) = (source for name, source, _ in modules() if name == "wm_drake")
-    assert {
-        target.split(".")[0] for target in imported("wm_drake", source, is_package=True)
-    } <= sys.stdlib_module_names
+    targets = imported("wm_drake", source, is_package=True)
+    rooms = {target for target in targets if not target.startswith("wm_drake.errors.")}
+    assert {target.split(".")[0] for target in rooms} <= sys.stdlib_module_names
 
 
 def test_no_room_imports_by_a_name_made_at_run_time():

@@ -10,6 +10,8 @@ from wm_drake.parameters.units import PureNumber, Share, Unit
 from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.quantity import SPEED, Quantity, quantity_of, shown, text_of
 from wm_drake.simulation.measures import MEASURES
+from wm_drake.studies.answer import Answer, Part
+from wm_drake.studies.study import Facts
 
 LENGTH = Quantity("gap", Unit("m", "mm"), 1)
 STIFFNESS = Quantity("stiffness", Unit("N/m", "N/mm"))
@@ -96,3 +98,14 @@ def test_several_varying_variables_keep_their_names():
 def test_single_numbers_are_one_row():
     table = LabelledTable("one", xr.Dataset({"gap": LENGTH.variable((), 2e-3)}))
     assert table.records() == [{"gap_mm": 2.0}]
+
+
+def test_the_part_in_short_is_a_box_of_the_page_and_lines_of_the_terminal():
+    table = LabelledTable("gaps", dataset()[["gap"]])
+    short = Part("In short", (table,), facts=[("Capacity", "all of it")])
+    answer = Answer("Title", "The answer.", None, (), short=short)
+    assert answer.terminal() == ["The answer.", "Capacity: all of it"]
+    box = answer.page(Facts()).partition('<div class="answer">')[2].partition("</div>")[0]
+    assert "In short" in box
+    assert "all of it" in box
+    assert list(answer.tables()) == ["gaps"]

@@ -17,7 +17,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from wm_drake.cli.common import HELP_OPTIONS
-from wm_drake.errors import Problem, WmDrakeError, reason_of
+from wm_drake.errors import Problem, WmDrakeError, libraries_named, reason_of
 
 COMMANDS = {
     "verdict": (
@@ -146,7 +146,8 @@ def main() -> None:
     gc.set_threshold(1_000_000, 20, 20)
     atexit.register(gc.freeze)  # the end of Python would look through them once more
     try:
-        app()
+        with libraries_named():
+            app()
     except WmDrakeError as error:
         typer.echo(str(error), err=True)
     except OSError as error:  # a disk that is full, a folder that cannot be read

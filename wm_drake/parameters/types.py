@@ -14,5 +14,8 @@ BoolArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 IndexArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
 """An array of places in another one."""
 
+ComplexArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.complex128]]
+"""An array of complex numbers; the docstring of each use gives shape and unit."""
+
 Name: TypeAlias = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_-]{0,63}$")]
 """Name of an entry. It becomes part of key paths and of file names."""

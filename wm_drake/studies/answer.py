@@ -46,6 +46,8 @@ class Part:
         text: Sentences above them.
         links: Names of files beside the page, and the words that link to them.
         remarks: Sentences of a list.
+        facts: Pairs of word and text.
+        has_long_words: Whether the words of the tables are broken into lines.
         is_folded: Whether a reader must open the section to see more than its heading.
     """
 
@@ -54,6 +56,8 @@ class Part:
     text: str = ""
     links: Sequence[tuple[str, str]] = ()
     remarks: Sequence[str] = ()
+    facts: Sequence[tuple[str, str]] = ()
+    has_long_words: bool = False
     is_folded: bool = False
 
     @property
@@ -74,6 +78,9 @@ class Answer(Result):
         details: How the result was computed, as pairs of word and text.
         method: Sentences on the method, below the details.
         files: Other files as text or bytes, by their names.
+        warned: Sentences on what a reader must know before the answer, in a box at the top and on
+            the terminal.
+        short: Part in a box between the answer and the contents. Its facts are also printed.
         diverged: A line for each run that diverged.
     """
 
@@ -84,11 +91,14 @@ class Answer(Result):
     details: tuple[tuple[str, str], ...] = ()
     method: str = ""
     files: Mapping[str, str | bytes] = field(default_factory=dict)
+    warned: tuple[str, ...] = ()
+    short: Part | None = None
     diverged: tuple[str, ...] = ()
 
     def labelled(self) -> dict[str, LabelledTable]:
         """Return the tables by name."""
-        return {table.name: table for part in self.parts for table in part.tables}
+        parts = (*self.parts, self.short) if self.short else self.parts
+        return {table.name: table for part in parts for table in part.tables}
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """Return the tables as frames, in units for reading, by name."""
@@ -101,9 +111,14 @@ class Answer(Result):
         return {**about, "answer": self.answer, **tables}
 
     def terminal(self) -> "list[TerminalTable | str]":
-        """Return some tables, and the answer."""
+        """Return some tables, the answer, and the facts of the part in short."""
         chosen = [table for table in self.labelled().values() if table.is_in_terminal]
-        return [*(table.table().terminal(table.heading) for table in chosen), self.answer]
+        facts = self.short.facts if self.short else ()
+        return [
+            *(table.table().terminal(table.heading) for table in chosen),
+            self.answer,
+            *(f"{word}: {text}" for word, text in facts),
+        ]
 
     def page(self, facts: Facts) -> str:
         """Return the page: answer, parts, how it was made, and the numbers of the machine."""
@@ -118,8 +133,9 @@ class Answer(Result):
             [_section(part) for part in self.parts],
             [*about, time, *self.details, *facts.rows()],
             self.machine,
-            facts.warnings,
+            [*facts.warnings, *self.warned],
             method=self.method,
+            advice=_section(self.short) if self.short else None,
         ).html()
 
     def write(self, folder: Path) -> None:
@@ -128,6 +144,10 @@ class Answer(Result):
         for name, content in self.files.items():
             data = content.encode("utf-8") if isinstance(content, str) else content
             (folder / name).write_bytes(data)
+
+    def warnings(self) -> tuple[str, ...]:
+        """Return warnings of the result for the terminal."""
+        return self.warned
 
     def failures(self) -> tuple[str, ...]:
         """Return a line for each run that diverged."""
@@ -152,5 +172,7 @@ def _section(part: Part) -> Any:
         part.text,
         links=part.links,
         remarks=part.remarks,
+        facts=part.facts,
+        has_long_words=part.has_long_words,
         is_folded=part.is_folded,
     )

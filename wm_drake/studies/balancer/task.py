@@ -1,4 +1,4 @@
-"""Check the options of the balancer study, and run it."""
+"""Check the options of the study of rings of balls, and run it."""
 
 from typing import Any
 
@@ -6,23 +6,27 @@ from wm_drake.engines.compiled.step_check import check_step
 from wm_drake.errors import input_error
 from wm_drake.model.machine import Machine
 from wm_drake.parameters.units import Unit
+from wm_drake.report.quantity import SPEED
 from wm_drake.simulation.balance import rings_of
 from wm_drake.simulation.steps import checked_step
+from wm_drake.studies.answer import Answer
 from wm_drake.studies.balancer.options import BalancerOptions
-from wm_drake.studies.balancer.page import BalancerResult
+from wm_drake.studies.balancer.page import balancer_answer
 from wm_drake.studies.balancer.study import (
-    PART,
-    RPM,
+    MASS,
+    PLACE,
+    RATE,
     WINDOW,
     BalancerTrials,
-    capacities_of,
-    is_within,
+    base_of,
+    numbers_of,
     with_factors,
 )
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import quantities_of
-from wm_drake.studies.study import Result, Task
+from wm_drake.studies.study import Task
 
+PART = Unit("dimensionless", "percent")
 MOST_VALUES = 24
 """Largest number of values of an option."""
 
@@ -45,20 +49,21 @@ class BalancerTask(Task):
         if not radii:
             raise input_error("has no load with a point mass, whose radius is used", key="loads")
         self.radius = radii[0]
-        self.masses = _values(options.mass, Unit("kg", "kg"), "--mass")
-        self.places = _values(options.place, Unit("m", "mm"), "--place", True)
+        self.masses = _values(options.mass, MASS.unit, "--mass")
+        self.places = _values(options.place, PLACE.unit, "--place", True)
         self.ball_masses = _values(options.ball_mass, PART, "--ball-mass")
         self.dampings = _values(options.damping, PART, "--damping")
-        self.rate = _values(options.rate, Unit("rad/s^2", "rpm/s"), "--rate")[0]
+        self.rate = _values(options.rate, RATE.unit, "--rate")[0]
         self.high = max(parameters.profile.speed)
         if options.high is not None:
-            self.high = _values(options.high, RPM, "--to")[0]
+            self.high = _values(options.high, SPEED.unit, "--to")[0]
         if self.high < 4.0 * WINDOW * (1.0 - 1e-9):  # 100 rpm, in rad/s, is rounded
-            raise input_error(f"is below {RPM.from_si(4.0 * WINDOW):g} rpm", where="--to")
-        self.release = _values(options.release, RPM, "--release")
+            raise input_error(f"is below {SPEED.text(4.0 * WINDOW)}", where="--to")
+        self.release = _values(options.release, SPEED.unit, "--release")
         if max(self.release) >= self.high:
             raise input_error(
-                f"is not below the highest speed, {RPM.from_si(self.high):g} rpm", where="--release"
+                f"is not below the highest speed, {SPEED.unit.reading(self.high)}",
+                where="--release",
             )
         step = checked_step(parameters, None)
         for ball_mass in self.ball_masses:
@@ -69,37 +74,20 @@ class BalancerTask(Task):
     @property
     def identity(self) -> dict[str, Any]:
         """Return what determines the runs beside the machine."""
-        high, rate = RPM.from_si(self.high), RPM.from_si(self.rate)
-        return {"run-up": f"to {high:g} rpm at {rate:g} rpm/s"}
+        high, rate = SPEED.unit.reading(self.high), RATE.unit.reading(self.rate)
+        return {"run-up": f"to {high} at {rate}"}
 
-    def run(self, executor: Executor) -> Result:
+    def run(self, executor: Executor) -> Answer:
         """Run loads, rings and releases."""
-        parameters = self.machine.parameters
         trials = BalancerTrials(self.machine, executor, self.high, self.rate, self.radius)
-        points = [(mass, y, 1.0, 1.0) for mass in self.masses for y in self.places]
-        loads = trials.pairs(points, "loads")
-        capacities = capacities_of(parameters)
-        y = self.places[len(self.places) // 2]
-        possible = [m for m in self.masses if is_within(capacities, m * self.radius, y)]
-        mass = max(possible, default=min(self.masses))  # of the load with which rings are varied
-        base = next(pair for pair in loads if (pair.mass, pair.y) == (mass, y))
-        grid = [(mass, y, b, d) for b in self.ball_masses for d in self.dampings]
-        rings = trials.pairs(grid, "rings")
-        releases = trials.releases(mass, y, self.release)
-        plain = trials.plain(mass, y)
-        return BalancerResult(
-            parameters,
-            self.rate,
-            self.high,
-            tuple(loads),
-            base,
-            tuple(rings),
-            tuple(releases),
-            plain,
-            capacities,
-            self.radius,
-            executor.runs,
-        )
+        loads = trials.loads(self.masses, self.places)
+        base = base_of(loads)
+        rings = trials.rings(base, self.ball_masses, self.dampings)
+        releases = trials.releases(base, self.release)
+        plain = trials.plain(base)
+        numbers = numbers_of(trials, loads, plain)
+        loads = loads.assign(without_rings=plain.amplitude)
+        return balancer_answer(self.machine.parameters, numbers, loads, rings, releases)
 
 
 def _values(text: str, unit: Unit, option: str, is_place: bool = False) -> tuple[float, ...]:

@@ -340,7 +340,7 @@ def effects_table(calibration: Calibration) -> Table | None:
     ]
     caption = (
         "Change of each amplitude due to the gasket, in percent of the amplitude without gasket "
-        "([B] Table 1)."
+        "([B] Eq. (1))."
     )
     return Table(caption, ("load", "source", *targets.sensors), tuple(groups), text_columns=2)
 

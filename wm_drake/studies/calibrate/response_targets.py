@@ -284,7 +284,7 @@ class ComputedResponses:
 class _Design:
     """Evaluation of a response over the trials of the gasket study of [B], or at a machine itself.
 
-    Stiffness tables are replaced by their slopes at rest, as in [B] section 4.
+    Stiffness tables are replaced by the slopes of their first 20 %, as in [B] section 4.
 
     Attributes:
         levels: Levels of the factors in each trial; None for the machine itself.

@@ -1,12 +1,20 @@
-"""Check the options of the study of the gasket damping, and identify it."""
+"""Check the options of the gasket-damping study, and run it."""
 
 from wm_drake.model.machine import Machine
 from wm_drake.report.terminal import say
+from wm_drake.simulation.runs import simulate
+from wm_drake.studies.answer import Answer
 from wm_drake.studies.executor import Executor
+from wm_drake.studies.fitting.methods import least_squares
 from wm_drake.studies.gasket_damping.options import GasketDampingOptions
-from wm_drake.studies.gasket_damping.page import GasketDampingResult
+from wm_drake.studies.gasket_damping.page import gasket_damping_answer
 from wm_drake.studies.gasket_damping.study import (
-    identify_damping,
+    SCREENED,
+    STARTS,
+    Comparison,
+    cases_at,
+    damping_problem,
+    grid_of_paper,
     planted_damping,
     read_records,
     run_up_of,
@@ -28,15 +36,29 @@ class GasketDampingTask(Task):
                 machine.parameters, options.planted_linear, options.planted_torsional
             )
 
-    def run(self, executor: Executor) -> GasketDampingResult:  # noqa: ARG002
+    def run(self, executor: Executor) -> Answer:
         """Identify the damping, from the records or from a virtual experiment."""
-        records = self.records
+        machine, records, mesh = self.machine, self.records, self.options.mesh
         if self.truth is not None:
             say(
                 "No measured records were given. The Drake engine runs a virtual experiment with "
                 "other damping values and noise.",
                 err=True,
             )
-            records = virtual_experiment(self.machine.parameters, self.truth, self.options.seed)
-        mesh = self.options.mesh / 100.0
-        return GasketDampingResult(identify_damping(self.machine, records, self.truth, mesh))
+            records = virtual_experiment(machine.parameters, self.truth, self.options.seed)
+        problem = damping_problem(machine, records)
+        with executor.fraction("fit") as progress:
+            fit = least_squares(
+                problem,
+                seed=self.options.seed,
+                starts=STARTS,
+                screened=SCREENED,
+                progress=lambda fraction, _: progress(fraction),
+            )
+        grids = None if mesh is None else grid_of_paper(problem, mesh / 100.0)
+        computed = {
+            case.name: simulate(machine, case).displacement
+            for case in cases_at(machine.parameters, fit.values, tuple(records))
+        }
+        comparison = Comparison(records, computed, self.truth)
+        return gasket_damping_answer(machine.parameters, fit, comparison, grids)

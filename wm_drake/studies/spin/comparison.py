@@ -2,13 +2,19 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 
 from wm_drake.errors import input_error
-from wm_drake.parameters import MachineParameters, SpinProfile, measured_amplitudes
+from wm_drake.parameters import (
+    MachineParameters,
+    SpinProfile,
+    measured_amplitudes,
+    measured_changes,
+)
 from wm_drake.parameters.measured import EXPERIMENT
 from wm_drake.parameters.units import Unit
 from wm_drake.simulation.displacements import percent_difference, smooth_envelope
@@ -218,10 +224,12 @@ def effect_table(without: SpinRuns, with_gasket: SpinRuns) -> pd.DataFrame:
     Returns:
         Columns load, sensor, without_mm, with_mm, percent ([B] Eq. (1)); experiment_without_mm,
         experiment_with_mm, experiment_percent, which are NaN where nothing was measured or compared
-        ([B] Table 1); steady_without_mm, steady_with_mm, steady_percent, which are NaN if the
-        profile has no stretch of constant speed.
+        ([B] Table 1, percentages as printed); steady_without_mm, steady_with_mm, steady_percent,
+        which are NaN if the profile has no stretch of constant speed.
     """
     rows = []
+    changes = measured_changes(with_gasket.parameters)
+    changes = changes[changes["source"] == EXPERIMENT].set_index("load")
     for both in zip(without.results, with_gasket.results, strict=True):
         first = both[0]
         window = steady_window(first.case.profile)
@@ -233,12 +241,14 @@ def effect_table(without: SpinRuns, with_gasket: SpinRuns) -> pd.DataFrame:
             "steady_": [steady_amplitudes(c.record, window) if window else missing for c in both],
         }
         for sensor in map(str, first.record.sensor.values):
-            row: dict[str, object] = {"load": first.case.name, "sensor": sensor}
+            row: dict[str, Any] = {"load": first.case.name, "sensor": sensor}
             for prefix, values in columns.items():
                 one, other = (value.sel(sensor=sensor) for value in values)
                 row[f"{prefix}without_mm"] = MM.from_si(float(one))
                 row[f"{prefix}with_mm"] = MM.from_si(float(other))
                 row[f"{prefix}percent"] = float(percent_difference(other, one))
+            if np.isfinite(row["experiment_percent"]):
+                row["experiment_percent"] = changes.loc[first.case.name, sensor]
             rows.append(row)
     return pd.DataFrame(rows)
 

@@ -46,8 +46,8 @@ class SpinIdentifyResult(Result):
         }
 
     def texts(self) -> dict[str, str]:
-        """Return the identified machine."""
-        return {"identified.yaml": machine_yaml(identified_machine(self.identification))}
+        """Return the result machine."""
+        return {"result.yaml": machine_yaml(identified_machine(self.identification))}
 
     def as_json(self) -> dict[str, Any]:
         """Return the result for JSON."""
@@ -158,7 +158,7 @@ def judged(result: SpinIdentification) -> str:
         f"by {number(100.0 * result.error_after)} % on average."
     )
     if result.verdict == "poor":
-        text += " The machine does not describe the measurement: do not use the values found."
+        text += " The machine does not describe the measurement: do not use the values identified."
     return text
 
 

@@ -59,11 +59,11 @@ class SpinIdentifyTask(Task):
             if measured is None:
                 planted = planted_values(self.sought, seed)
                 measured = virtual_experiment(model, planted, self.options.noise, seed)
-            result = identify_from_spin(
+            identified = identify_from_spin(
                 model,
                 measured,
                 planted=planted,
                 seed=seed,
                 progress=lambda fraction, least: report(fraction),
             )
-        return SpinIdentifyResult(result)
+        return SpinIdentifyResult(identified)
