@@ -25,7 +25,7 @@ from wm_drake.parameters import (
     source_of,
     with_values,
 )
-from wm_drake.parameters.elements import Table
+from wm_drake.parameters.elements import CurveTable
 from wm_drake.parameters.keys import AllowedRange, allowed_range, is_index
 from wm_drake.parameters.plausibility import UsualRange, usual_range
 from wm_drake.parameters.units import Unit
@@ -241,7 +241,7 @@ def with_curves(parameters: MachineParameters) -> Iterator[tuple[str, Any, Unit]
     curves = set()
     for key, value, unit in quantities(parameters):
         curve = key.rpartition(".")[0]
-        if not isinstance(value, tuple) or not isinstance(value_at(parameters, curve), Table):
+        if not isinstance(value, tuple) or not isinstance(value_at(parameters, curve), CurveTable):
             yield key, value, unit
         elif curve not in curves:
             curves.add(curve)
@@ -383,7 +383,7 @@ class OpenMachine:
         given = {key: self._value(key, text) for key, text in values.items()}
         return with_values(with_sdf_values(self.machine.plant, parameters, given), given)
 
-    def _value(self, key: str, text: str) -> str | float | Table:
+    def _value(self, key: str, text: str) -> str | float | CurveTable:
         """Return what a text sets: itself, the number of an entry, or a scaled curve."""
         slider = self.sliders.get(key)
         if slider is None or not (slider.is_entry or slider.number.is_table):

@@ -138,11 +138,11 @@ def spin_page(result: SpinRuns, facts: Facts | None = None) -> str:
     more = tuple(tables.variable_table(result, variable) for variable in tabulated())
     sections = [
         *_case_sections(result, table),
-        Section("gap", "Smallest gaps", gaps, text=VERDICT * bool(gaps)),
+        Section("gap", "Smallest gaps", gaps, text=VERDICT if gaps else ""),
         replace(balance, tables=()),
         Section("floor", "Feet over time", floor.pictures),
         Section(
-            "drive", "Speed and torque", drive.pictures, text=drive.text * bool(drive.pictures)
+            "drive", "Speed and torque", drive.pictures, text=drive.text if drive.pictures else ""
         ),
         Section("amplitudes", "Amplitudes", tables=(tables.comparison(result, table),)),
         Section("speeds", "Critical speeds", tables=(tables.critical_speeds(result),)),
@@ -156,7 +156,7 @@ def spin_page(result: SpinRuns, facts: Facts | None = None) -> str:
         ),
         Section("remaining", "Remaining unbalance", tables=balance.tables),
         replace(floor, pictures=(), is_folded=True),
-        replace(drive, pictures=(), text=drive.text * (not drive.pictures)),
+        replace(drive, pictures=(), text="" if drive.pictures else drive.text),
         Section("springs", "Springs", tables=(tables.smallest_tensions(result),)),
         Section("more", "More measures", tables=more),
     ]
