@@ -73,7 +73,7 @@ class LedgerOptions(RunOptions):
     resume: bool = option(False, "Continue an unfinished study in the same folder.")
 
 
-class BatchOptions(LedgerOptions):
+class ClusterOptions(LedgerOptions):
     """Options of the driver for studies that run cases by `Executor.simulate`."""
 
     cluster: str | None = option(
@@ -174,7 +174,7 @@ def options_of_driver(study: Study) -> type[RunOptions]:
     """Return the model of the options that the driver has for a study."""
     if not study.has_runs:
         return RunOptions
-    return BatchOptions if study.has_cluster else LedgerOptions
+    return ClusterOptions if study.has_cluster else LedgerOptions
 
 
 def execute(order: Order) -> tuple[Result, Facts, tuple[str, ...]]:
@@ -329,7 +329,7 @@ def _executor(order: Order, run: CommandRun) -> Iterator[Executor]:
             return
         with ExitStack() as stack:
             client = None
-            if isinstance(chosen, BatchOptions) and chosen.cluster is not None:
+            if isinstance(chosen, ClusterOptions) and chosen.cluster is not None:
                 from wm_drake.batch.cluster import cluster_client
 
                 client = stack.enter_context(cluster_client(chosen.cluster))
