@@ -37,8 +37,8 @@ from wm_drake.parameters import (
 )
 from wm_drake.parameters.free import FreeFile
 from wm_drake.parameters.measured import EXPERIMENT
-from wm_drake.studies.calibrate.computed import Runner
-from wm_drake.studies.calibrate.study import Plan, calibrate, identity_of
+from wm_drake.studies.calibrate.computed import PointRunner
+from wm_drake.studies.calibrate.study import SearchPlan, calibrate, identity_of
 from wm_drake.studies.calibrate.targets import targets_of
 from wm_drake.studies.gasket.screening import Published, Screening, published_for
 
@@ -192,11 +192,13 @@ def damping_line(machine: MachineParameters, is_quick: bool) -> list[str]:
     targets = targets_of(machine, rows.assign(source=EXPERIMENT))
     free = FreeFile.model_validate({"quantities": FREE_DAMPING})
     built = build_machine(machine)
-    plan = Plan(starts=1, iterations=1 if is_quick else 0, deviation=DEVIATION, resolution=0.0)
+    plan = SearchPlan(
+        starts=1, iterations=1 if is_quick else 0, deviation=DEVIATION, resolution=0.0
+    )
     with tempfile.TemporaryDirectory() as folder:
         ledger_path = Path(folder) / "ledger.sqlite"
         with open_ledger(ledger_path, identity_of(built, free, targets, plan)) as ledger:
-            found = calibrate(Runner(built, ledger), free, targets, plan)
+            found = calibrate(PointRunner(built, ledger), free, targets, plan)
     best, known = found.solutions[0], found.parameter_map
     misses = float(np.sqrt(np.nanmean(np.log1p(best.errors) ** 2)))
     spread = np.sqrt(np.diag(best.posterior.covariance(misses / DEVIATION)))

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wm_drake.batch.ledger import Ledger, Result
+from wm_drake.batch.ledger import Ledger, LedgerEntry
 from wm_drake.batch.remembered import run_keys
 from wm_drake.batch.runs import Runner
 from wm_drake.batch.work_items import BatchKey, Preparation, WorkItem
@@ -131,7 +131,7 @@ def remembered_step_error(sample: Sample, ledger: Ledger) -> StepError | None:
     error = sample.step_error()
     if error is not None:
         numbers = np.array([error.difference, error.step, error.period, error.runs])
-        ledger.put_all({key: Result({"step_error": numbers}, error.case)})
+        ledger.put_all({key: LedgerEntry({"step_error": numbers}, error.case)})
     return error
 
 

@@ -37,7 +37,7 @@ from wm_drake.errors import input_error
 from wm_drake.model.frame_poses import FramePoses
 from wm_drake.model.state_layout import StateLayout
 from wm_drake.parameters import MachineParameters
-from wm_drake.parameters.sections import GASKET, SECTIONS, Section
+from wm_drake.parameters.sections import GASKET, SECTIONS, FileSection
 from wm_drake.parameters.types import FloatArray
 
 SHORTEST_STRUT = 1e-3
@@ -284,7 +284,9 @@ def placed_elements(
     )
 
 
-def _on_tub(poses: FramePoses, parameters: MachineParameters, section: Section) -> dict[str, Any]:
+def _on_tub(
+    poses: FramePoses, parameters: MachineParameters, section: FileSection
+) -> dict[str, Any]:
     """Place the elements of a section, each between a frame of the tub and one of the housing.
 
     A section whose elements and types are those of the last machine is placed already.
@@ -295,7 +297,7 @@ def _on_tub(poses: FramePoses, parameters: MachineParameters, section: Section) 
 
 
 def _placed_one_by_one(
-    poses: FramePoses, parameters: MachineParameters, section: Section
+    poses: FramePoses, parameters: MachineParameters, section: FileSection
 ) -> dict[str, Any]:
     """Place the elements of a section as far as they differ from those of the last machine."""
     placed = {}

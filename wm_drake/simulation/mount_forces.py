@@ -2,18 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
 
 from wm_drake.parameters import SpinProfile
-from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.types import BoolArray, FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.simulation.mounts import force_measures
 from wm_drake.simulation.records import Record, sample_period
 from wm_drake.simulation.vibration import region_samples
-
-BoolArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
 SPEED_STEP_RPM = 100.0
 """Width of the ranges of drum speed for a profile without regions. [rpm]"""

@@ -9,7 +9,7 @@ from wm_drake.model.scene import Scene
 from wm_drake.studies.response.figures import peaks_of, response_figure
 from wm_drake.studies.response.page import largest_table, summary
 from wm_drake.studies.response.response import settled_trajectory, steady_response
-from wm_drake.studies.response.study import SteadyCase, SteadyStudy, _envelopes
+from wm_drake.studies.response.study import ResponseCase, ResponseStudy, _envelopes
 
 RPM = np.pi / 30.0
 SPEEDS = (100.0, 120.0, 140.0, 160.0, 180.0)
@@ -24,7 +24,7 @@ def case(gasket, amplitudes_mm, stable=(True,) * 5, gaps_mm=(20.0,) * 5, run_up=
         },
         {"speed": ("point", RPM * np.array(SPEEDS)), "sensor": ["Xr"]},
     )
-    return SteadyCase("middle", gasket, response, run_up, 0.0)
+    return ResponseCase("middle", gasket, response, run_up, 0.0)
 
 
 @pytest.fixture
@@ -36,7 +36,7 @@ def study(reference):
         stable=(True, True, True, False, True),
         gaps_mm=(25.0, -4.5, 16.0, -170.0, 22.0),
     )
-    return SteadyStudy(reference, [case(True, (4.0, 6.0, 12.6, 7.0, 5.0)), without], None, 0.0)
+    return ResponseStudy(reference, [case(True, (4.0, 6.0, 12.6, 7.0, 5.0)), without], None, 0.0)
 
 
 def test_summary_leads_with_what_a_machine_reaches(study):
@@ -66,7 +66,7 @@ def test_table_and_peaks_have_reachable_motions_only(study):
 
 def test_nothing_reachable_is_said(reference):
     nothing = case(True, (9.0,) * 5, stable=(False,) * 5)
-    text = summary(SteadyStudy(reference, [nothing], None, 0.0))
+    text = summary(ResponseStudy(reference, [nothing], None, 0.0))
     assert text.startswith("With gasket no steady motion is stable and without contact. Unstable")
     assert "at 100 to 180 rpm, up to 9.0 mm" in text
     assert np.isnan(nothing.largest()).all()

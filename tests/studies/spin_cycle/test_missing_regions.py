@@ -13,7 +13,7 @@ from wm_drake.parameters.unbalance_cases import UnbalanceCase
 from wm_drake.simulation.vibration import region_rms, region_samples
 from wm_drake.studies.spin_cycle.measured import read_accelerations
 from wm_drake.studies.spin_cycle.page import SpinCycleReport, summary, warnings_of
-from wm_drake.studies.spin_cycle.study import SpinCycleResult, missing_regions
+from wm_drake.studies.spin_cycle.study import SpinCycleRuns, missing_regions
 from wm_drake.studies.spin_cycle.tables import missing_warnings
 
 PERIOD = 5e-3
@@ -74,7 +74,7 @@ def result(reference):
     by_case = {"case": LABELS["case"]}
     tension = xr.DataArray(np.ones((2, 1)), {**by_case, "spring": ["left"]})
     gap = xr.DataArray([0.02, 0.02], by_case)
-    return SpinCycleResult(
+    return SpinCycleRuns(
         reference,
         PROFILE,
         CASES,

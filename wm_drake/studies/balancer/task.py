@@ -17,7 +17,7 @@ from wm_drake.studies.balancer.study import (
     PLACE,
     RATE,
     WINDOW,
-    Trials,
+    BalancerTrials,
     base_of,
     numbers_of,
     with_factors,
@@ -79,7 +79,7 @@ class BalancerTask(Task):
 
     def run(self, executor: Executor) -> Answer:
         """Run loads, rings and releases."""
-        trials = Trials(self.machine, executor, self.high, self.rate, self.radius)
+        trials = BalancerTrials(self.machine, executor, self.high, self.rate, self.radius)
         loads = trials.loads(self.masses, self.places)
         base = base_of(loads)
         rings = trials.rings(base, self.ball_masses, self.dampings)

@@ -11,7 +11,7 @@ import pandas as pd
 from wm_drake.parameters import machine_yaml
 from wm_drake.report.formatting import MISSING, MM_PER_M, listed, plain, significant, with_interval
 from wm_drake.report.page import Picture, Section, SectionedPage, as_json, fragment, picture
-from wm_drake.report.table import Table, Value, line
+from wm_drake.report.table import CellValue, Table, line
 from wm_drake.studies.design.figures import (
     DESIGNS,
     PICKED,
@@ -244,7 +244,10 @@ def _promises(kept: Sequence[Promise]) -> Table:
     """Return what the chosen designs of a robust front promised and keep on fresh samples."""
     groups = []
     for p in kept:
-        cells: list[Value] = [f"{p.goal.given.quantity}, {p.goal.given.over}", p.goal.unit.label]
+        cells: list[CellValue] = [
+            f"{p.goal.given.quantity}, {p.goal.given.over}",
+            p.goal.unit.label,
+        ]
         cells += [with_interval(v.value, v.lower, v.upper) for v in (p.promised, p.fresh)]
         groups.append(line(p.design, [*cells, p.is_kept], "alarm" if p.is_kept is False else ""))
     caption = (

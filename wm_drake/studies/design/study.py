@@ -14,9 +14,10 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.displacements import envelopes
 from wm_drake.simulation.records import Record, sample_period
-from wm_drake.studies.design.problem import Goal, MachineDesigns, Run
-from wm_drake.studies.design.search import Problem, SearchResult, SearchSettings, search_front
+from wm_drake.studies.design.problem import DesignGoal, MachineDesigns
+from wm_drake.studies.design.search import DesignProblem, SearchResult, SearchSettings, search_front
 from wm_drake.studies.design.surrogate import search_with_surfaces
+from wm_drake.studies.executor import RunCases
 from wm_drake.studies.tolerance.distributions import base_samples
 from wm_drake.studies.tolerance.shares import CONFIDENCE, Percentile, percentile_of
 
@@ -48,7 +49,9 @@ class ParetoFront:
         """Return the machine of a design of the front."""
         return self.designs.machine_at(self.search.designs[number])
 
-    def goals(self, number: int) -> tuple[list[tuple[Goal, float]], list[tuple[Goal, float]]]:
+    def goals(
+        self, number: int
+    ) -> tuple[list[tuple[DesignGoal, float]], list[tuple[DesignGoal, float]]]:
         """Return objectives and constraints of a design with their values, in units for reading."""
         objectives = zip(self.designs.objectives, self.objectives[number].tolist(), strict=True)
         constraints = zip(self.designs.constraints, self.constraints[number].tolist(), strict=True)
@@ -61,14 +64,14 @@ class ParetoFront:
 
 
 def run_designs(
-    designs: MachineDesigns, run: Run, settings: SearchSettings, search: str = "genetic"
+    designs: MachineDesigns, run: RunCases, settings: SearchSettings, search: str = "genetic"
 ) -> ParetoFront:
     """Search the Pareto front of the designs of a machine.
 
     Args:
         search: Name in `SEARCHES`.
     """
-    problem = Problem(
+    problem = DesignProblem(
         lambda x: designs.costs(x, run),
         designs.nominal(),
         len(designs.objectives),
@@ -86,7 +89,7 @@ def run_designs(
     )
 
 
-def chosen_designs(goals: tuple[Goal, ...], costs: FloatArray) -> dict[str, int]:
+def chosen_designs(goals: tuple[DesignGoal, ...], costs: FloatArray) -> dict[str, int]:
     """Return the best design of each objective, and a compromise, by name.
 
     The compromise has the smallest distance to the best of all objectives, which are scaled to the
@@ -104,7 +107,7 @@ def chosen_designs(goals: tuple[Goal, ...], costs: FloatArray) -> dict[str, int]
     return chosen
 
 
-def _values(goals: tuple[Goal, ...], costs: FloatArray) -> FloatArray:
+def _values(goals: tuple[DesignGoal, ...], costs: FloatArray) -> FloatArray:
     """Return values in units for reading from what the search made small."""
     columns = []
     for goal, column in zip(goals, costs.T, strict=True):
@@ -133,13 +136,13 @@ class Promise:
     """
 
     design: str
-    goal: Goal
+    goal: DesignGoal
     promised: Percentile
     fresh: Percentile
     is_kept: bool | None
 
 
-def promises(front: ParetoFront, run: Run, seed: int) -> list[Promise]:
+def promises(front: ParetoFront, run: RunCases, seed: int) -> list[Promise]:
     """Return the promises of the chosen designs of a robust front; none of a nominal one."""
     designs, scores = front.designs, front.designs.scores
     if scores is None or not front.chosen:
@@ -160,7 +163,7 @@ def promises(front: ParetoFront, run: Run, seed: int) -> list[Promise]:
     return promises
 
 
-def _is_kept(goal: Goal, promised: Percentile, fresh: Percentile) -> bool | None:
+def _is_kept(goal: DesignGoal, promised: Percentile, fresh: Percentile) -> bool | None:
     if goal.given.over == "worst":
         return None
     if goal.is_small_better:
@@ -168,7 +171,7 @@ def _is_kept(goal: Goal, promised: Percentile, fresh: Percentile) -> bool | None
     return bool(fresh.value >= promised.lower)
 
 
-def summary_of(goal: Goal, values: FloatArray) -> Percentile:
+def summary_of(goal: DesignGoal, values: FloatArray) -> Percentile:
     """Return the value of a goal over samples of one design, with its 95 % interval.
 
     A run that failed has NaN, and so has then the value.

@@ -19,7 +19,7 @@ from wm_drake.report.formatting import MM_PER_M, MPA_PER_PA, number, percent, pl
 from wm_drake.report.page import Picture, Section, SectionedPage, picture
 from wm_drake.report.table import Column, Table, line
 from wm_drake.report.terminal import Printed
-from wm_drake.solid.curves import AXIAL, RADIAL, TILT, TWIST, Curve, Mesh, Motion, Point
+from wm_drake.solid.curves import AXIAL, RADIAL, TILT, TWIST, Curve, CurvePoint, Mesh, RimMotion
 from wm_drake.solid.mesh import Ring, axes_at
 from wm_drake.solid.touching import Faces
 from wm_drake.studies.gasket_curves.study import Checked, coupling
@@ -37,7 +37,7 @@ METHOD = (
     "2 π f, at the frequency below."
 )
 
-AXES: dict[str, tuple[Motion, str]] = {
+AXES: dict[str, tuple[RimMotion, str]] = {
     "x": (RADIAL, ""),
     "y": (AXIAL, ""),
     "z": (RADIAL, ""),
@@ -52,7 +52,7 @@ LARGEST_WORK_ERROR = 0.01
 
 
 @dataclass(frozen=True)
-class CurvesResult(Result):
+class GasketCurvesResult(Result):
     """Curves of a gasket.
 
     Attributes:
@@ -185,7 +185,7 @@ def _warnings_of(checked: Checked, has_contact: bool) -> Iterable[str]:
         )
 
 
-def curves_table(result: CurvesResult) -> pd.DataFrame:
+def curves_table(result: GasketCurvesResult) -> pd.DataFrame:
     """Return each point: force on the moved rim along its motion, along the others, energy, work.
 
     The motions are those of x (radial), y (axial), about y (twist) and about z (tilt).
@@ -211,7 +211,7 @@ def curves_table(result: CurvesResult) -> pd.DataFrame:
     return pd.concat(frames, ignore_index=True)
 
 
-def values_table(result: CurvesResult) -> pd.DataFrame:
+def values_table(result: GasketCurvesResult) -> pd.DataFrame:
     """Return stiffness and damping of the six axes, in SI."""
     rows = []
     for axis, (motion, kind) in AXES.items():
@@ -229,7 +229,7 @@ def values_table(result: CurvesResult) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def checks_table(result: CurvesResult) -> pd.DataFrame:
+def checks_table(result: GasketCurvesResult) -> pd.DataFrame:
     """Return stretch, stress, error of the work, touching folds and wrinkles of each curve."""
     rows = []
     for name, checked in result.curves.items():
@@ -278,7 +278,7 @@ def _pictures(curves: dict[str, Curve]) -> tuple[Picture, Picture, Picture]:
     return drawn, sections, rings
 
 
-def _rubber_section(result: CurvesResult) -> list[Section]:
+def _rubber_section(result: GasketCurvesResult) -> list[Section]:
     """Return the section of the tension test; none without one."""
     rubber = result.drawing.rubber
     figure = rubber_figure(rubber)
@@ -292,7 +292,7 @@ def _rubber_section(result: CurvesResult) -> list[Section]:
     return [Section("rubber", "Rubber", (picture(figure, "Stress over stretch.", about),))]
 
 
-def summary(result: CurvesResult) -> str:
+def summary(result: GasketCurvesResult) -> str:
     """Return the result in a few sentences."""
     slopes = {
         name: checked.curve.table.nominal_stiffness for name, checked in result.curves.items()
@@ -311,7 +311,7 @@ def summary(result: CurvesResult) -> str:
     )
 
 
-def _rubber_text(result: CurvesResult) -> str:
+def _rubber_text(result: GasketCurvesResult) -> str:
     rubber = result.drawing.rubber
     c1, c2, c3 = (significant(MPA_PER_PA * value, 3) for value in rubber.constants)
     modulus = rubber.modulus(result.frequency)
@@ -324,7 +324,7 @@ def _rubber_text(result: CurvesResult) -> str:
     )
 
 
-def values_shown(result: CurvesResult) -> Table:
+def values_shown(result: GasketCurvesResult) -> Table:
     """Return stiffness and damping of the six axes in units for reading."""
     groups = []
     for row in values_table(result).to_dict("records"):
@@ -350,14 +350,14 @@ def values_shown(result: CurvesResult) -> Table:
     return Table(caption, header, tuple(groups), text_columns=2)
 
 
-def _change(result: CurvesResult, name: str, end: int) -> float:
+def _change(result: GasketCurvesResult, name: str, end: int) -> float:
     """Return the secant stiffness at an end against the slope at rest. [%]"""
     curve = result.curves[name].curve
     secant = float(curve.wrench()[end] / curve.values[end])
     return 100.0 * (secant / curve.slope_at_rest() - 1.0)
 
 
-def _checks_shown(result: CurvesResult) -> Table:
+def _checks_shown(result: GasketCurvesResult) -> Table:
     groups = []
     for name, checked in result.curves.items():
         unit = units_of(checked.curve.motion.rotates)
@@ -492,7 +492,7 @@ def rings_figure(curves: dict[str, Curve]) -> fig.Figure:
     return fig.Figure(panels=fig.in_grid(panels, 2), height=210.0)
 
 
-def _outline(ring: Ring, point: Point, column: int) -> FloatArray:
+def _outline(ring: Ring, point: CurvePoint, column: int) -> FloatArray:
     """Return the closed outline of the wall in a cut: x and y of its nodes. (n, 2) [m]"""
     places = (ring.positions + point.u)[ring.grid[:, column]][..., :2]
     return np.concatenate([places[:, 0], places[-1], places[::-1, 2], places[0][::-1]])

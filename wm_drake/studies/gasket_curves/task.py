@@ -10,8 +10,8 @@ from wm_drake.solid.curves import MOTIONS, Curve, Gasket, Mesh
 from wm_drake.solid.deformed import deformed, wrinkles
 from wm_drake.solid.touching import Faces
 from wm_drake.studies.executor import Executor
-from wm_drake.studies.gasket_curves.options import CurvesOptions
-from wm_drake.studies.gasket_curves.page import CurvesResult
+from wm_drake.studies.gasket_curves.options import GasketCurvesOptions
+from wm_drake.studies.gasket_curves.page import GasketCurvesResult
 from wm_drake.studies.gasket_curves.study import (
     WRINKLED,
     Checked,
@@ -26,10 +26,10 @@ from wm_drake.studies.gasket_curves.study import (
 from wm_drake.studies.study import Result, Task
 
 
-class CurvesTask(Task):
+class GasketCurvesTask(Task):
     """The curves with checked options."""
 
-    def __init__(self, options: CurvesOptions, machine: Machine) -> None:
+    def __init__(self, options: GasketCurvesOptions, machine: Machine) -> None:
         """Read the drawing and the ranges, and mesh the gasket."""
         self.options, self.machine = options, machine.parameters
         check_gasket(self.machine)
@@ -53,7 +53,7 @@ class CurvesTask(Task):
             damping_per_stiffness(self.drawing, self.frequency),
             f"wm-drake gasket curves {name}, {options.elements} by {options.around} elements",
         )
-        return CurvesResult(name, self.drawing, self.mesh, curves, self.frequency, machine)
+        return GasketCurvesResult(name, self.drawing, self.mesh, curves, self.frequency, machine)
 
     def _checked(self, curve: Curve) -> Checked:
         """Return a curve with stretch, stress, touching folds and wrinkles.

@@ -17,7 +17,7 @@ from wm_drake.report.formatting import number, plain, significant
 from wm_drake.report.page import Picture, Section, SectionedPage, picture
 from wm_drake.report.table import Column, Table, line
 from wm_drake.report.terminal import Printed
-from wm_drake.studies.gasket_geometry.drawings import Factor
+from wm_drake.studies.gasket_geometry.drawings import DrawingFactor
 from wm_drake.studies.gasket_geometry.study import GAP, RESPONSES, Surface, excess, ranked
 from wm_drake.studies.study import Facts, Result
 
@@ -33,7 +33,7 @@ METHOD = (
 
 
 @dataclass(frozen=True)
-class GeometryResult(Result):
+class GasketGeometryResult(Result):
     """Result of the study.
 
     Attributes:
@@ -48,7 +48,7 @@ class GeometryResult(Result):
     """
 
     name: str
-    factors: tuple[Factor, ...]
+    factors: tuple[DrawingFactor, ...]
     levels: FloatArray
     responses: dict[str, FloatArray]
     design: int
@@ -142,7 +142,7 @@ class GeometryResult(Result):
         (folder / "best.yaml").write_text(yaml_text(drawing_tree(self.best)), encoding="utf-8")
 
 
-def drawings_table(result: GeometryResult) -> pd.DataFrame:
+def drawings_table(result: GasketGeometryResult) -> pd.DataFrame:
     """Return each drawing: what it is for, its factors, its responses."""
     values = {
         f"{factor.name} [{factor.unit}]": factor.middle + factor.half * column
@@ -151,7 +151,7 @@ def drawings_table(result: GeometryResult) -> pd.DataFrame:
     return pd.DataFrame({"kind": result.kinds, **values, **result.responses})
 
 
-def contributions_table(result: GeometryResult) -> pd.DataFrame:
+def contributions_table(result: GasketGeometryResult) -> pd.DataFrame:
     """Return the part of each factor in the variance of each response, and its change over it. [%]
 
     The change is that of the surface from the low to the high end, others in the middle.
@@ -195,7 +195,7 @@ def drawing_tree(drawing: GasketDrawing) -> dict[str, Any]:
     return tree if drawing.contact else tree | {"contact": False}
 
 
-def summary(result: GeometryResult) -> str:
+def summary(result: GasketGeometryResult) -> str:
     """Return the result in a few sentences."""
     best = ", ".join(
         f"{factor.words} {significant(factor.value(level), 3)} {factor.unit}"
@@ -216,12 +216,12 @@ def summary(result: GeometryResult) -> str:
     )
 
 
-def _limits_text(result: GeometryResult) -> str:
+def _limits_text(result: GasketGeometryResult) -> str:
     texts = [f"{RESPONSES[name]} up to {limit:g}" for name, limit in result.limits.items()]
     return "; ".join(texts) or "none"
 
 
-def _over_factors(result: GeometryResult) -> Picture:
+def _over_factors(result: GasketGeometryResult) -> Picture:
     surface, levels = result.surfaces[GAP], np.linspace(-1.0, 1.0, 41)
     panels = []
     for index, factor in enumerate(result.factors):
@@ -243,7 +243,7 @@ def _over_factors(result: GeometryResult) -> Picture:
     )
 
 
-def _agreement(result: GeometryResult) -> Picture:
+def _agreement(result: GasketGeometryResult) -> Picture:
     panels = []
     for name, words in RESPONSES.items():
         computed, surface = result.responses[name], result.surfaces[name].at(result.levels)
@@ -264,7 +264,7 @@ def _agreement(result: GeometryResult) -> Picture:
     )
 
 
-def contributions_shown(result: GeometryResult) -> Table:
+def contributions_shown(result: GasketGeometryResult) -> Table:
     """Return what each factor contributes, in units for reading."""
     groups = []
     for row in contributions_table(result).to_dict("records"):

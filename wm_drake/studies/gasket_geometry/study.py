@@ -43,7 +43,7 @@ GAP = "smallest_gap_mm"
 
 
 @dataclass(frozen=True)
-class Computed:
+class ComputedDrawing:
     """What the curves of a drawing give: stiffness, and the largest stretch at their ends."""
 
     stiffness: GasketStiffness

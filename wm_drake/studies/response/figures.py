@@ -12,7 +12,7 @@ from wm_drake.report import figure as fig
 from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number
 from wm_drake.simulation.outputs import point_positions
 from wm_drake.studies.modes.figures import VIEWS, joined, tub_lines, view_axis, view_panel
-from wm_drake.studies.response.study import SteadyCase, SteadyStudy
+from wm_drake.studies.response.study import ResponseCase, ResponseStudy
 
 COLUMNS = 3
 """Number of panels in a row."""
@@ -21,7 +21,7 @@ SHOWN_MOTION = 0.2
 """Largest displacement of a drawn deflection shape, as part of the tub's radius."""
 
 
-def response_figure(cases: list[SteadyCase]) -> fig.Figure:
+def response_figure(cases: list[ResponseCase]) -> fig.Figure:
     """Return the amplitudes of a load at the sensors over the speed, with the run-up beside them.
 
     Args:
@@ -41,7 +41,7 @@ def response_figure(cases: list[SteadyCase]) -> fig.Figure:
     return fig.Figure(panels=fig.in_grid(panels, COLUMNS, share="both"), height=160.0)
 
 
-def _shown_amplitude(cases: list[SteadyCase]) -> float | None:
+def _shown_amplitude(cases: list[ResponseCase]) -> float | None:
     """Return the upper end of the amplitudes: above what is reached, steady or in the run. [mm]
 
     Unstable motions may be much larger.
@@ -52,7 +52,7 @@ def _shown_amplitude(cases: list[SteadyCase]) -> float | None:
     return 1.25 * MM_PER_M * largest or None
 
 
-def _branch(case: SteadyCase, values: FloatArray, color: str) -> list[fig.Mark]:
+def _branch(case: ResponseCase, values: FloatArray, color: str) -> list[fig.Mark]:
     """Return a quantity along the branch: lines where it is stable, dots where it is not.
 
     The line is pale where the tub touches the housing.
@@ -76,7 +76,7 @@ def _branch(case: SteadyCase, values: FloatArray, color: str) -> list[fig.Mark]:
     return marks
 
 
-def _run_up(case: SteadyCase, sensor: str, color: str) -> list[fig.Mark]:
+def _run_up(case: ResponseCase, sensor: str, color: str) -> list[fig.Mark]:
     if case.run_up is None:
         return []
     run = case.run_up.sel(sensor=sensor)
@@ -92,7 +92,7 @@ def _run_up_size(run_up: xr.Dataset) -> FloatArray:
     return np.maximum(np.abs(run_up.upper.values), np.abs(run_up.lower.values))
 
 
-def forces_figure(cases: list[SteadyCase]) -> fig.Figure:
+def forces_figure(cases: list[ResponseCase]) -> fig.Figure:
     """Return displacement of the box and forces of the gasket over the speed, one line a load."""
     quantities = (
         ("detergent_displacement", MM_PER_M, "detergent box, mm"),
@@ -106,7 +106,7 @@ def forces_figure(cases: list[SteadyCase]) -> fig.Figure:
     return fig.Figure(panels=fig.in_grid(panels, COLUMNS, share="x"), height=210.0)
 
 
-def mounts_figure(cases: list[SteadyCase]) -> fig.Figure:
+def mounts_figure(cases: list[ResponseCase]) -> fig.Figure:
     """Return the force of each mount on the cabinet over the speed, one colour a load.
 
     The peak is a line, the RMS without the mean is dashed.
@@ -125,8 +125,8 @@ def mounts_figure(cases: list[SteadyCase]) -> fig.Figure:
 
 def _force_panel(
     title: str,
-    peaks: list[tuple[SteadyCase, FloatArray]],
-    dynamic: list[tuple[SteadyCase, FloatArray]],
+    peaks: list[tuple[ResponseCase, FloatArray]],
+    dynamic: list[tuple[ResponseCase, FloatArray]],
 ) -> fig.Panel:
     """Return values over the speed of cases, one colour a load; those of `dynamic` are dashed.
 
@@ -134,7 +134,7 @@ def _force_panel(
     """
     colors = colors_of_loads([case.load for case, _ in peaks])
     marks = []
-    kinds: tuple[tuple[fig.Dash, list[tuple[SteadyCase, FloatArray]]], ...] = (
+    kinds: tuple[tuple[fig.Dash, list[tuple[ResponseCase, FloatArray]]], ...] = (
         ("", peaks),
         ("dashed", dynamic),
     )
@@ -154,7 +154,7 @@ def colors_of_loads(loads: list[str]) -> dict[str, str]:
     return {name: fig.COLOURS[index % len(fig.COLOURS)] for index, name in enumerate(names)}
 
 
-def peaks_of(case: SteadyCase, most: int = 3) -> list[int]:
+def peaks_of(case: ResponseCase, most: int = 3) -> list[int]:
     """Return the points of the largest reachable peaks, in order of speed."""
     size = case.response.amplitude.values.max(axis=1)
     inner = np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] >= size[2:])) + 1
@@ -163,7 +163,7 @@ def peaks_of(case: SteadyCase, most: int = 3) -> list[int]:
     return sorted(int(index) for index in largest)
 
 
-def deflection_figure(case: SteadyCase, outlines: Mapping[str, Outline]) -> fig.Figure | None:
+def deflection_figure(case: ResponseCase, outlines: Mapping[str, Outline]) -> fig.Figure | None:
     """Return the operating deflection shapes at the peaks of a load; None without a peak."""
     points = peaks_of(case)
     if not points:
@@ -207,7 +207,7 @@ def _deflection(harmonic: FloatArray, lines: list[FloatArray]) -> list[fig.Panel
     return panels
 
 
-def sweep_figure(study: SteadyStudy) -> fig.Figure:
+def sweep_figure(study: ResponseStudy) -> fig.Figure:
     """Return how sweeps shift and lower the peak of each load, at its largest sensor."""
     assert study.sweeps is not None
     colors = colors_of_loads([case.load for case in study.cases])

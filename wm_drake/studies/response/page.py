@@ -22,7 +22,7 @@ from wm_drake.studies.response.figures import (
     response_figure,
     sweep_figure,
 )
-from wm_drake.studies.response.study import BoolArray, SteadyCase, SteadyStudy
+from wm_drake.studies.response.study import BoolArray, ResponseCase, ResponseStudy
 from wm_drake.studies.study import Facts, Result
 
 DEG_PER_RAD = Unit("rad/s", "deg/s").from_si(1.0)
@@ -40,7 +40,7 @@ METHOD = (
 )
 
 
-class Quantity(NamedTuple):
+class ResponseVariable(NamedTuple):
     """Variable of a response in files.
 
     Attributes:
@@ -59,16 +59,16 @@ class Quantity(NamedTuple):
 
 
 QUANTITIES = (
-    Quantity("amplitude", "sensor", "amplitudes_mm", "mm", MM_PER_M),
-    Quantity("detergent_displacement", "axis", "detergent_box_mm", "mm", MM_PER_M),
-    Quantity("gasket_force", "axis", "gasket_force_N"),
-    Quantity("gasket_moment", "axis", "gasket_moment_Nm", "Nm"),
-    Quantity("spring_tension", "spring", "spring_tension_N"),
-    Quantity("damper_tension", "damper", "damper_tension_N"),
-    Quantity("smallest_gap", "", "smallest_gap_mm", "mm", MM_PER_M),
-    Quantity("damper_spin", "spinning", "damper_spin_deg_s", "deg_s", DEG_PER_RAD),
+    ResponseVariable("amplitude", "sensor", "amplitudes_mm", "mm", MM_PER_M),
+    ResponseVariable("detergent_displacement", "axis", "detergent_box_mm", "mm", MM_PER_M),
+    ResponseVariable("gasket_force", "axis", "gasket_force_N"),
+    ResponseVariable("gasket_moment", "axis", "gasket_moment_Nm", "Nm"),
+    ResponseVariable("spring_tension", "spring", "spring_tension_N"),
+    ResponseVariable("damper_tension", "damper", "damper_tension_N"),
+    ResponseVariable("smallest_gap", "", "smallest_gap_mm", "mm", MM_PER_M),
+    ResponseVariable("damper_spin", "spinning", "damper_spin_deg_s", "deg_s", DEG_PER_RAD),
 )
-MOUNT_FORCES = tuple(Quantity(f"mount_force_{kind}", "mount", kind) for kind in KINDS)
+MOUNT_FORCES = tuple(ResponseVariable(f"mount_force_{kind}", "mount", kind) for kind in KINDS)
 """Force of each mount on the cabinet: peak and RMS; in JSON below `mount_force_N`."""
 
 
@@ -76,7 +76,7 @@ MOUNT_FORCES = tuple(Quantity(f"mount_force_{kind}", "mount", kind) for kind in 
 class ResponseResult(Result):
     """Result of the study."""
 
-    study: SteadyStudy
+    study: ResponseStudy
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """Return the responses and, if computed, the sweeps."""
@@ -141,7 +141,7 @@ class ResponseResult(Result):
         ).html()
 
 
-def _case_as_json(case: SteadyCase) -> dict[str, Any]:
+def _case_as_json(case: ResponseCase) -> dict[str, Any]:
     mounts = _by_label(case, MOUNT_FORCES)
     return {
         "load": case.load,
@@ -156,7 +156,7 @@ def _case_as_json(case: SteadyCase) -> dict[str, Any]:
     }
 
 
-def _along_branch(case: SteadyCase, quantity: Quantity) -> dict[str, FloatArray]:
+def _along_branch(case: ResponseCase, quantity: ResponseVariable) -> dict[str, FloatArray]:
     """Return a quantity along the branch by label; that of a quantity without any is ""."""
     values = quantity.factor * case.response[quantity.name]
     if not quantity.dim:
@@ -165,7 +165,7 @@ def _along_branch(case: SteadyCase, quantity: Quantity) -> dict[str, FloatArray]
     return {str(label): values.sel({quantity.dim: label}).values for label in labels}
 
 
-def _by_label(case: SteadyCase, quantities: Sequence[Quantity]) -> dict[str, Any]:
+def _by_label(case: ResponseCase, quantities: Sequence[ResponseVariable]) -> dict[str, Any]:
     """Return quantities along the branch, by name in JSON and label."""
     return {
         q.in_json: of_label if q.dim else of_label[""]
@@ -174,7 +174,7 @@ def _by_label(case: SteadyCase, quantities: Sequence[Quantity]) -> dict[str, Any
     }
 
 
-def _load_sections(study: SteadyStudy) -> list[Section]:
+def _load_sections(study: ResponseStudy) -> list[Section]:
     """Return a section for each load: responses, and deflection shapes at the peaks."""
     outlines = Scene(study.parameters).tub_outlines()
     sections = []
@@ -193,11 +193,11 @@ def _load_sections(study: SteadyStudy) -> list[Section]:
     return sections
 
 
-def _gasket(case: SteadyCase) -> str:
+def _gasket(case: ResponseCase) -> str:
     return "with gasket" if case.gasket else "without gasket"
 
 
-def summary(study: SteadyStudy) -> str:
+def summary(study: ResponseStudy) -> str:
     """Return one paragraph: what can be reached, where the tub touches, what is unstable."""
     speeds = RPM_PER_RAD_S * np.concatenate([case.response.speed.values for case in study.cases])
     folded = [c for c in study.cases if np.any(np.diff(c.response.speed.values) < 0.0)]
@@ -213,13 +213,13 @@ def summary(study: SteadyStudy) -> str:
     return " ".join(sentences)
 
 
-def _by_gasket(study: SteadyStudy) -> list[list[SteadyCase]]:
+def _by_gasket(study: ResponseStudy) -> list[list[ResponseCase]]:
     """Return the cases with the gasket, then those without it, as far as there are any."""
     of_kind = ([c for c in study.cases if c.gasket is kind] for kind in (True, False))
     return [cases for cases in of_kind if cases]
 
 
-def _reachable_sentence(cases: Sequence[SteadyCase]) -> str:
+def _reachable_sentence(cases: Sequence[ResponseCase]) -> str:
     """Return the largest amplitude of cases that a machine reaches."""
     known = [case for case in cases if case.reachable.any()]
     where = _gasket(cases[0]).capitalize()
@@ -235,7 +235,7 @@ def _reachable_sentence(cases: Sequence[SteadyCase]) -> str:
     )
 
 
-def _contact_sentence(case: SteadyCase) -> str:
+def _contact_sentence(case: ResponseCase) -> str:
     """Return at which speeds the tub touches the housing in stable motions of a case."""
     inside = case.stable & case.touches
     depth = -MM_PER_M * float(case.response.smallest_gap.values[inside].min())
@@ -245,7 +245,7 @@ def _contact_sentence(case: SteadyCase) -> str:
     )
 
 
-def _unstable_sentence(study: SteadyStudy) -> str:
+def _unstable_sentence(study: ResponseStudy) -> str:
     """Return which branches are unstable, where, and how large their motions are."""
     unstable = [case for case in study.cases if not case.stable.all()]
     if not unstable:
@@ -258,7 +258,7 @@ def _unstable_sentence(study: SteadyStudy) -> str:
     return f"Unstable motions, which a machine leaves for another motion: {'; '.join(texts)}."
 
 
-def _speeds(case: SteadyCase, which: BoolArray) -> str:
+def _speeds(case: ResponseCase, which: BoolArray) -> str:
     """Return the speeds of some points of a branch in words, such as "60 to 70 and 82 rpm"."""
     rpm = [number(value, 0) for value in RPM_PER_RAD_S * case.response.speed.values]
     changes = np.flatnonzero(np.diff(np.pad(which, 1).astype(int)))
@@ -269,7 +269,7 @@ def _speeds(case: SteadyCase, which: BoolArray) -> str:
     return f"{listed(ranges)} rpm"
 
 
-def largest_table(study: SteadyStudy) -> Table:
+def largest_table(study: ResponseStudy) -> Table:
     """Return the largest reachable amplitude of each sensor, and the speed of the largest."""
     rows = []
     for case in study.cases:
@@ -282,7 +282,7 @@ def largest_table(study: SteadyStudy) -> Table:
     return table_of(pd.DataFrame(rows, columns=["load", "gasket", *columns]), columns=columns)
 
 
-def _warnings(study: SteadyStudy) -> list[str]:
+def _warnings(study: ResponseStudy) -> list[str]:
     texts = [_spin_warning(case) for case in study.cases]
     return [text for text in texts if text] + [
         f"Load {case.load}, {_gasket(case)}: the branch could be followed only up to "
@@ -293,7 +293,7 @@ def _warnings(study: SteadyStudy) -> list[str]:
     ]
 
 
-def _spin_warning(case: SteadyCase) -> str:
+def _spin_warning(case: ResponseCase) -> str:
     """Return a text about telescopic dampers that spin; "" if none does."""
     turns = spin_per_revolution(case)
     if not turns.size or np.max(np.abs(turns)) < LEAST_SPIN:
@@ -309,13 +309,13 @@ def _spin_warning(case: SteadyCase) -> str:
     )
 
 
-def spin_per_revolution(case: SteadyCase) -> FloatArray:
+def spin_per_revolution(case: ResponseCase) -> FloatArray:
     """Return by how much telescopic dampers spin in a drum revolution. (points, dampers) [deg]"""
     rates = case.response.damper_spin.values / case.response.speed.values[:, None]
     return np.asarray(360.0 * rates)
 
 
-def _peaks_table(study: SteadyStudy) -> Table:
+def _peaks_table(study: ResponseStudy) -> Table:
     groups = []
     for case in study.cases:
         steady, speed = case.largest()
@@ -346,7 +346,7 @@ def _row(words: str, values: Iterable[float], decimals: int, kind: str = "") -> 
     return Row((words, *(number(float(value), decimals) for value in values)), kind)
 
 
-def _response_picture(load: str, cases: list[SteadyCase]) -> Picture:
+def _response_picture(load: str, cases: list[ResponseCase]) -> Picture:
     caption = (
         f"Load {load}: largest deviation from the mean at each sensor over the drum speed. Pale: "
         "the tub touches the housing. Dotted: unstable; larger motions are cut off. Dashed: "
@@ -355,7 +355,7 @@ def _response_picture(load: str, cases: list[SteadyCase]) -> Picture:
     return picture(response_figure(cases), f"Amplitudes of load {load} over the speed.", caption)
 
 
-def _sweep_picture(study: SteadyStudy) -> Picture | None:
+def _sweep_picture(study: ResponseStudy) -> Picture | None:
     if study.sweeps is None:
         return None
     caption = (
@@ -368,7 +368,7 @@ def _sweep_picture(study: SteadyStudy) -> Picture | None:
     return picture(sweep_figure(study), "Shift and height of peaks over the sweep rate.", caption)
 
 
-def response_frame(study: SteadyStudy) -> pd.DataFrame:
+def response_frame(study: ResponseStudy) -> pd.DataFrame:
     """Return all responses, a row for each point of a branch."""
     parts = []
     for case in study.cases:
@@ -388,7 +388,7 @@ def response_frame(study: SteadyStudy) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)
 
 
-def sweeps_frame(study: SteadyStudy) -> pd.DataFrame:
+def sweeps_frame(study: ResponseStudy) -> pd.DataFrame:
     """Return the peaks of the sweeps."""
     assert study.sweeps is not None
     table = study.sweeps.to_dataframe().reset_index()

@@ -19,7 +19,7 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.mounts import KINDS, force_measures, mount_names
 from wm_drake.simulation.outputs import variables_of
 from wm_drake.studies.response.balance import HARMONICS, SAMPLES, HarmonicBalance
-from wm_drake.studies.response.continuation import Point, first_motion, follow
+from wm_drake.studies.response.continuation import BranchPoint, first_motion, follow
 from wm_drake.studies.response.series import Series
 from wm_drake.studies.threads import on_one_thread
 
@@ -122,7 +122,7 @@ def branch_of(
     setup: Setup,
     speeds: FloatArray,
     progress: Callable[[float], None] = lambda fraction: None,
-) -> list[Point]:
+) -> list[BranchPoint]:
     """Return the branch of periodic motions over the speeds."""
 
     def guesses() -> Iterator[FloatArray]:
@@ -177,7 +177,7 @@ def trajectory_of_period(
     )
 
 
-def _measured(setup: Setup, balance: HarmonicBalance, points: list[Point]) -> xr.Dataset:
+def _measured(setup: Setup, balance: HarmonicBalance, points: list[BranchPoint]) -> xr.Dataset:
     """Return the dataset of `steady_response`."""
     samples, motions = balance.series.samples, _joined(balance, points)
     variables = variables_of(setup, motions)
@@ -225,7 +225,7 @@ def _measured(setup: Setup, balance: HarmonicBalance, points: list[Point]) -> xr
     )
 
 
-def _joined(balance: HarmonicBalance, points: list[Point]) -> Trajectory:
+def _joined(balance: HarmonicBalance, points: list[BranchPoint]) -> Trajectory:
     """Return the revolutions of all points, one after the other."""
     samples = balance.series.samples
     periods = [

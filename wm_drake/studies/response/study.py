@@ -39,7 +39,7 @@ BoolArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
 
 @dataclass(frozen=True)
-class SteadyCase:
+class ResponseCase:
     """Steady response to a load.
 
     Attributes:
@@ -87,7 +87,7 @@ class SteadyCase:
 
 
 @dataclass(frozen=True)
-class SteadyStudy:
+class ResponseStudy:
     """Results of the study.
 
     Attributes:
@@ -96,13 +96,13 @@ class SteadyStudy:
     """
 
     parameters: MachineParameters
-    cases: list[SteadyCase]
+    cases: list[ResponseCase]
     sweeps: xr.Dataset | None
     wall_s: float
 
 
 @dataclass(frozen=True)
-class Settings:
+class ResponseSettings:
     """What the study computes.
 
     Attributes:
@@ -131,12 +131,12 @@ class Settings:
         return max(1, self.threads // 2)
 
 
-def run_steady_study(
+def run_response_study(
     machine: Machine,
     loads: Mapping[str, Load],
-    settings: Settings,
+    settings: ResponseSettings,
     progress: Callable[[float], None] = lambda fraction: None,
-) -> SteadyStudy:
+) -> ResponseStudy:
     """Compute the steady response to loads, runs over the spin profile, and sweeps.
 
     Raises:
@@ -172,10 +172,10 @@ def run_steady_study(
             pool.shutdown(wait=True, cancel_futures=True)
             raise
     cases = [
-        SteadyCase(name, gasket, response, _envelopes(run, settings.speeds), wall)
+        ResponseCase(name, gasket, response, _envelopes(run, settings.speeds), wall)
         for (name, _, gasket), (response, wall), run in zip(pairs, responses, runs, strict=True)
     ]
-    return SteadyStudy(machine.parameters, cases, sweeps, time.perf_counter() - begin)
+    return ResponseStudy(machine.parameters, cases, sweeps, time.perf_counter() - begin)
 
 
 class _Progress:
@@ -207,7 +207,7 @@ def _records(machine: Machine, cases: list[Case], workers: int | None) -> list[R
 
 
 def _envelopes(record: Record | None, speeds: FloatArray) -> xr.Dataset | None:
-    """Return the `run_up` of a `SteadyCase`; None without samples at these speeds."""
+    """Return the `run_up` of a `ResponseCase`; None without samples at these speeds."""
     if record is None:
         return None
     edges = envelopes(record)
@@ -237,7 +237,7 @@ def sweep_profile(first: float, last: float, rate: float) -> SpinProfile:
 def _sweeps(
     machine: Machine,
     loads: Mapping[str, Load],
-    settings: Settings,
+    settings: ResponseSettings,
     progress: Callable[[float], None],
 ) -> xr.Dataset:
     """Return the largest amplitudes of sweeps and their speeds."""

@@ -11,7 +11,7 @@ from wm_drake.studies.inputs import quantities_of, selected_cases
 from wm_drake.studies.response.balance import SAMPLES
 from wm_drake.studies.response.options import ResponseOptions
 from wm_drake.studies.response.page import ResponseResult
-from wm_drake.studies.response.study import RATES_RPM_S, Settings, run_steady_study
+from wm_drake.studies.response.study import RATES_RPM_S, ResponseSettings, run_response_study
 from wm_drake.studies.study import Result, Task
 
 
@@ -48,7 +48,7 @@ class ResponseTask(Task):
         """Compute responses, runs over the spin profile, and sweeps."""
         options = self.options
         is_without = options.no_gasket or self.machine.parameters.gasket is None
-        settings = Settings(
+        settings = ResponseSettings(
             self.speeds,
             (False,) if is_without else (True, False),
             options.harmonics,
@@ -57,7 +57,7 @@ class ResponseTask(Task):
             options.workers,
         )
         with executor.fraction("response") as progress:
-            study = run_steady_study(self.machine, self.loads, settings, progress)
+            study = run_response_study(self.machine, self.loads, settings, progress)
         return ResponseResult(study)
 
 

@@ -20,7 +20,7 @@ from wm_drake.rigs import (
 from wm_drake.studies.components import axes_of, mass_of, target_of
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import quantities_of
-from wm_drake.studies.rig.options import AxisRigOptions, DamperRigOptions, RigOptions
+from wm_drake.studies.rig.options import RigAxisOptions, RigDamperOptions, RigOptions
 from wm_drake.studies.rig.page import RigResult
 from wm_drake.studies.rig.study import printed_errors, printed_verdict
 from wm_drake.studies.study import Task
@@ -33,10 +33,10 @@ class RigTask(Task):
         """Find the component, put it on the bench, and read its motions."""
         self.component = target_of(kind, options).component
         self.massless: Bench | None = None
-        if isinstance(options, DamperRigOptions):
+        if isinstance(options, RigDamperOptions):
             self._set_damper(options)
         else:
-            assert isinstance(options, AxisRigOptions)
+            assert isinstance(options, RigAxisOptions)
             self._set_axis(kind, options)
         self.motions = _motions(kind, self.bench, options)
         self.printed = (
@@ -45,7 +45,7 @@ class RigTask(Task):
             else None
         )
 
-    def _set_damper(self, options: DamperRigOptions) -> None:
+    def _set_damper(self, options: RigDamperOptions) -> None:
         sponge = mass_of(options.sponge_mass, "--sponge-mass")
         driven = mass_of(options.outer_mass, "--outer-mass")
         driven += mass_of(options.jig_mass, "--jig-mass")
@@ -58,7 +58,7 @@ class RigTask(Task):
         parts += [f"{driven:g} kg at the driven end"] if driven else []
         self.title = ", ".join(parts)
 
-    def _set_axis(self, kind: str, options: AxisRigOptions) -> None:
+    def _set_axis(self, kind: str, options: RigAxisOptions) -> None:
         axis, name = axes_of(options.axis)[0], self.component.name
         arm = quantities_of(options.arm, Unit("m", "mm"), "--arm")[0] if options.arm else 0.0
         if options.matrix is not None and axis.startswith("about") and not options.arm:

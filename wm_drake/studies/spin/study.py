@@ -87,7 +87,7 @@ def band_text(*cases: CaseResult) -> str:
     return ", ".join(f"{low:g}–{high:.3g} Hz" for low, high in bands)
 
 
-class Comparison(Enum):
+class ComparedCases(Enum):
     """Which cases are compared with the measured amplitudes of a machine.
 
     Attributes:
@@ -131,14 +131,14 @@ class SpinRuns:
     parameters: MachineParameters
     engine: str
     results: tuple[CaseResult, ...]
-    comparison: Comparison = Comparison.AS_MEASURED
+    comparison: ComparedCases = ComparedCases.AS_MEASURED
     modes: "NaturalModes | None" = None
     files: Files = Files()
 
     def is_compared(self, result: CaseResult) -> bool:
         """Return whether a case is compared with the measured amplitudes of the machine."""
-        if self.comparison is not Comparison.AS_MEASURED:
-            return self.comparison is Comparison.ALL
+        if self.comparison is not ComparedCases.AS_MEASURED:
+            return self.comparison is ComparedCases.ALL
         return is_as_measured(self.parameters, result.case)
 
     @property
@@ -197,7 +197,7 @@ def run_spin(
     step: float | None = None,
     progress: Callable[[int, float], None] = lambda index, fraction: None,
     workers: int | None = None,
-    comparison: Comparison = Comparison.AS_MEASURED,
+    comparison: ComparedCases = ComparedCases.AS_MEASURED,
     modes: bool = False,
 ) -> SpinRuns:
     """Run cases and return their records and measures.

@@ -14,12 +14,12 @@ from wm_drake.parameters.measured import BAND, EXPERIMENT
 from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number, percent, shape_name
 from wm_drake.report.table import (
     MOST_SHOWN,
+    CellValue,
     Column,
     Columns,
     Group,
     Row,
     Table,
-    Value,
     line,
     readable,
     table_of,
@@ -294,7 +294,7 @@ def _gap_rows(case: CaseResult) -> list[Row]:
     parts = shape_name(gap.moving), shape_name(gap.fixed)
     place = (MM_PER_M * float(value) for value in gap.point)
     size, speed = MM_PER_M * gap.distance, case.speed_rpm(gap.time)
-    cells: tuple[Value, ...] = (*parts, size, speed, gap.time, *place)
+    cells: tuple[CellValue, ...] = (*parts, size, speed, gap.time, *place)
     return [Row(cells, "alarm" if gap.distance <= 0.0 else "")]
 
 

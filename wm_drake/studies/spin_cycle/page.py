@@ -25,7 +25,7 @@ from wm_drake.studies.spin_cycle import tables
 from wm_drake.studies.spin_cycle.figures import bars_figure, heat_map_figure, profile_figure
 from wm_drake.studies.spin_cycle.measured import rms_table
 from wm_drake.studies.spin_cycle.study import (
-    SpinCycleResult,
+    SpinCycleRuns,
     average_errors,
     disagreement,
     largest,
@@ -40,10 +40,10 @@ SHOWN_MASSES = ((0.4, 0.0, 0.0), (0.0, 0.4, 0.0), (0.4, 0.4, 180.0))
 
 
 @dataclass(frozen=True)
-class SpinCycleReport(Result):
+class SpinCycleResult(Result):
     """Result of the study, and the engine of its runs."""
 
-    result: SpinCycleResult
+    result: SpinCycleRuns
     engine: str
 
     def tables(self) -> dict[str, pd.DataFrame]:
@@ -133,13 +133,13 @@ class SpinCycleReport(Result):
         ).html()
 
 
-def _missing(result: SpinCycleResult) -> list[str]:
+def _missing(result: SpinCycleRuns) -> list[str]:
     if result.measured is None:
         return []
     return tables.missing_warnings(result.displacement, result.measured)
 
 
-def _case_as_json(result: SpinCycleResult, case: UnbalanceCase, diverged: str) -> dict[str, Any]:
+def _case_as_json(result: SpinCycleRuns, case: UnbalanceCase, diverged: str) -> dict[str, Any]:
     here = {"case": case.name}
     tension, forces = result.smallest_tension.sel(here), as_json(result.forces.sel(here))
     return {
@@ -158,7 +158,7 @@ def _case_as_json(result: SpinCycleResult, case: UnbalanceCase, diverged: str) -
     }
 
 
-def summary(result: SpinCycleResult, engine: str) -> str:
+def summary(result: SpinCycleRuns, engine: str) -> str:
     """Return one paragraph about displacements, gaps, and errors against a measurement."""
     count = len(result.cases)
     sentences = [
@@ -215,7 +215,7 @@ def case_description(case: UnbalanceCase) -> str:
     return (" and ".join(masses) or "empty drum") + phase
 
 
-def shown_cases(result: SpinCycleResult) -> list[UnbalanceCase]:
+def shown_cases(result: SpinCycleRuns) -> list[UnbalanceCase]:
     """Return the cases that the page shows in detail.
 
     These are the cases of the figures of [A], or the first three if none of them was run, and the
@@ -232,7 +232,7 @@ def shown_cases(result: SpinCycleResult) -> list[UnbalanceCase]:
     return list({case.name: case for case in chosen}.values())
 
 
-def warnings_of(result: SpinCycleResult) -> list[str]:
+def warnings_of(result: SpinCycleRuns) -> list[str]:
     """Return warnings about divergence, overlap, slack springs, integration, imperfections."""
     texts = [
         f"Case {case.name}: {text}. Regions that this run did not complete have no values."
@@ -278,17 +278,17 @@ def warnings_of(result: SpinCycleResult) -> list[str]:
     return texts
 
 
-def _sample_period(result: SpinCycleResult) -> str:
+def _sample_period(result: SpinCycleRuns) -> str:
     """Return the time between the samples of a run."""
     period = result.profile.sample_period(result.parameters.output_period)
     return f"{MS_PER_S * period:g} ms"
 
 
-def _case(result: SpinCycleResult, name: str) -> UnbalanceCase:
+def _case(result: SpinCycleRuns, name: str) -> UnbalanceCase:
     return next(case for case in result.cases if case.name == name)
 
 
-def _profile_picture(result: SpinCycleResult) -> Picture:
+def _profile_picture(result: SpinCycleRuns) -> Picture:
     names = ", ".join(region.name for region in result.profile.regions)
     return picture(
         profile_figure(result.profile),
@@ -297,7 +297,7 @@ def _profile_picture(result: SpinCycleResult) -> Picture:
     )
 
 
-def _worst_picture(result: SpinCycleResult) -> tuple[Picture, ...]:
+def _worst_picture(result: SpinCycleRuns) -> tuple[Picture, ...]:
     """Return the largest displacements of all cases; nothing if no run completed a region."""
     if largest(result.displacement) is None:
         return ()
@@ -319,7 +319,7 @@ def _worst_picture(result: SpinCycleResult) -> tuple[Picture, ...]:
     return (picture(figure, words, caption),)
 
 
-def _bars(result: SpinCycleResult, case: str, title: str) -> Picture:
+def _bars(result: SpinCycleRuns, case: str, title: str) -> Picture:
     computed, integrated = (v.sel(case=case) for v in (result.displacement, result.integrated))
     measured = result.measured.sel(case=case) if result.measured is not None else None
     if measured is not None and not np.isfinite(measured).any():
@@ -332,7 +332,7 @@ def _bars(result: SpinCycleResult, case: str, title: str) -> Picture:
     return picture(bars_figure(computed, integrated, measured), words, caption)
 
 
-def _facts(result: SpinCycleResult, engine: str, facts: Facts) -> list[tuple[str, str]]:
+def _facts(result: SpinCycleRuns, engine: str, facts: Facts) -> list[tuple[str, str]]:
     sensors = [
         f"{name} (frame {frame})"
         for name, frame in result.parameters.accelerometer_frames().items()

@@ -3,9 +3,8 @@
 [A] section 4.2 identifies the parameters of its Table 8 in this way.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeAlias
 
 import numpy as np
 import xarray as xr
@@ -24,7 +23,8 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.unbalance_cases import UnbalanceCase
 from wm_drake.parameters.variation import number_at, range_of
 from wm_drake.simulation.cases import Case
-from wm_drake.studies.fitting.fit import Fit, Verdict, verdict_of
+from wm_drake.studies.executor import RunCases
+from wm_drake.studies.fitting.fit import Fit, FitVerdict, verdict_of
 from wm_drake.studies.fitting.methods import least_squares
 from wm_drake.studies.fitting.problem import FitProblem, Measurement, Progress, Unknown
 from wm_drake.studies.spin_cycle.measured import DIMS
@@ -54,9 +54,6 @@ TABLE_8 = (
 
 They are the friction about the axis of its bushings and all rotational numbers of the gasket.
 """
-
-Regions: TypeAlias = Callable[[Iterable[Case]], xr.Dataset]
-"""Function that runs cases and returns their table with "regions", as `simulate_many` does."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +124,7 @@ class SpinIdentification:
         return float(average_errors(self.after, self.measured).mean())
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> FitVerdict:
         """Whether the machine with the identified numbers fits the measured displacements."""
         return verdict_of(self.error_after)
 
@@ -265,7 +262,7 @@ class SpinModel:
     profile: SpinProfile
     cases: tuple[UnbalanceCase, ...]
     sought: tuple[Sought, ...]
-    regions: Regions
+    regions: RunCases
 
     def displacements(self, points: FloatArray) -> FloatArray:
         """Compute the RMS displacements at points.

@@ -60,7 +60,7 @@ _TYPES = {
 
 
 @dataclass(frozen=True)
-class Variable:
+class UncertainVariable:
     """An uncertain quantity: a variation with a distribution.
 
     Attributes:
@@ -98,7 +98,7 @@ class UncertainMachine:
     """
 
     parameters: MachineParameters
-    variables: tuple[Variable, ...]
+    variables: tuple[UncertainVariable, ...]
     joint: Joint
     case: Case
     _known: dict[tuple[float, ...], MachineParameters] = dataclasses.field(
@@ -214,7 +214,7 @@ def uncertain_machine(
         InputError: the machine does not have a key, a distribution is wrong, or the correlations
             name an unknown quantity.
     """
-    variables: list[Variable] = []
+    variables: list[UncertainVariable] = []
     groups = {name: quantity.keys for name, quantity in tolerances.quantities.items()}
     problems = owned_twice(groups, "quantity")
     for name, quantity in tolerances.quantities.items():
@@ -282,7 +282,7 @@ def with_types_apart(
     return with_values(with_values(parameters, {table: types}), changes), by_part
 
 
-def _laundry_variables(laundry: Laundry) -> tuple[list[Variable], list[Problem]]:
+def _laundry_variables(laundry: Laundry) -> tuple[list[UncertainVariable], list[Problem]]:
     variables, problems = [], []
     for field, spread in laundry.spreads().items():
         name, unit = f"{LAUNDRY}.{field}", _LAUNDRY_UNITS[field]
@@ -299,7 +299,7 @@ def _laundry_variables(laundry: Laundry) -> tuple[list[Variable], list[Problem]]
 
 def _variable(
     parameters: MachineParameters, name: str, keys: tuple[str, ...], spread: Spread, about: str
-) -> Variable:
+) -> UncertainVariable:
     variation, values = variation_of(parameters, name, keys, _places(spread), about)
     return _with_spread(variation, spread, values, keys[-1])
 
@@ -312,7 +312,7 @@ def _places(spread: Spread) -> dict[str, str]:
 
 def _with_spread(
     variation: Variation, spread: Spread, values: dict[str, float], key: str
-) -> Variable:
+) -> UncertainVariable:
     """Return a variation with a distribution.
 
     Args:
@@ -333,7 +333,7 @@ def _with_spread(
             raise input_error(message, key=f"{key}.deviation")
         values = values | {"deviation": deviation}
     marginal = _marginal(spread, values, key, can_be_negative=change is Change.DISTANCE)
-    return Variable(variation, marginal, _text(spread), spread.source)
+    return UncertainVariable(variation, marginal, _text(spread), spread.source)
 
 
 def _marginal(spread: Spread, n: dict[str, float], key: str, *, can_be_negative: bool) -> Marginal:

@@ -12,11 +12,11 @@ from wm_drake.studies.tolerance.study import (
     CRUDE,
     SUBSET,
     Contact,
-    ToleranceResult,
-    Verdict,
+    LimitVerdict,
+    ToleranceStudy,
     measure_key,
 )
-from wm_drake.studies.tolerance.variables import Variable
+from wm_drake.studies.tolerance.variables import UncertainVariable
 
 MOST_NAMED = 3
 """Number of quantities that the summary names."""
@@ -38,7 +38,7 @@ _LAUNDRY_WORDS = {
 }
 
 
-def summary(result: ToleranceResult) -> list[str]:
+def summary(result: ToleranceStudy) -> list[str]:
     """Return the findings, one sentence each."""
     sentences = ["The SDF has no shapes on both tub and housing, so contact cannot be judged."]
     if result.contact:
@@ -129,12 +129,12 @@ def quantity_words(name: str) -> str:
     return shape_name(name.replace(".", " "))
 
 
-def measure_titles(result: ToleranceResult) -> dict[str, tuple[str, str]]:
+def measure_titles(result: ToleranceStudy) -> dict[str, tuple[str, str]]:
     """Return name in words and unit of each measure, by its key such as smallest_gap_mm."""
     return {measure_key(r): (r.title.replace("_", " "), r.unit_text) for r in result.chosen}
 
 
-def _limit_sentences(verdicts: tuple[Verdict, ...]) -> list[str]:
+def _limit_sentences(verdicts: tuple[LimitVerdict, ...]) -> list[str]:
     if not verdicts:
         return []
     words = [v.word for v in verdicts]
@@ -142,7 +142,7 @@ def _limit_sentences(verdicts: tuple[Verdict, ...]) -> list[str]:
     return [f"Limits: {', '.join(parts)}."]
 
 
-def leading(result: ToleranceResult) -> tuple[str, list[tuple[Variable, Index]]]:
+def leading(result: ToleranceStudy) -> tuple[str, list[tuple[UncertainVariable, Index]]]:
     """Return the measure that the summary explains, and its quantities, largest total index first.
 
     The measure is the smallest gap if there is one, else the first measure.
@@ -155,7 +155,7 @@ def leading(result: ToleranceResult) -> tuple[str, list[tuple[Variable, Index]]]
     return name, sorted(pairs, key=lambda pair: -pair[1].total)
 
 
-def in_short(result: ToleranceResult) -> list[tuple[str, str]]:
+def in_short(result: ToleranceStudy) -> list[tuple[str, str]]:
     """Return the facts below the answer: probability, gap, what decides it, limits."""
     facts = []
     if result.contact:
@@ -194,7 +194,7 @@ def about_loads(gaps: Mapping[str, float]) -> str:
     )
 
 
-def _sensitivity_sentences(result: ToleranceResult) -> list[str]:
+def _sensitivity_sentences(result: ToleranceStudy) -> list[str]:
     key, indices = leading(result)
     if not indices:
         return [result.refused] if result.refused else []
@@ -218,7 +218,7 @@ def _listed(named: list[tuple[str, Index]]) -> str:
     return ", ".join(f"{quantity_words(name)} ({number(100 * i.total, 0)} %)" for name, i in named)
 
 
-def warnings(result: ToleranceResult) -> list[str]:
+def warnings(result: ToleranceStudy) -> list[str]:
     """Return what limits the use of the results."""
     texts = []
     if result.failed:

@@ -22,7 +22,7 @@ from wm_drake.report.table import Column, Table, table_of
 from wm_drake.report.terminal import Printed
 from wm_drake.simulation.measures.responses import GAP, Response
 from wm_drake.studies.study import Facts, Result
-from wm_drake.studies.verdict.study import Influence, Laundry, Outcome
+from wm_drake.studies.verdict.study import Influence, LaundryGaps, Outcome
 
 MOST_NAMED = 3
 """Number of quantities that the answer names."""
@@ -71,8 +71,8 @@ class VerdictResult(Result):
     influences: tuple[Influence, ...]
     single: Outcome | None
     combination: Outcome | None
-    laundry: Laundry
-    laundry_changed: Laundry | None
+    laundry: LaundryGaps
+    laundry_changed: LaundryGaps | None
     about: str
     responses: tuple[Response, ...]
     command: str
@@ -249,7 +249,7 @@ def facts_of(findings: VerdictResult) -> list[tuple[str, str]]:
     return [*rows, (LINE, line_to_copy(f))]
 
 
-def laundry_text(laundry: Laundry, about: str = "") -> str:
+def laundry_text(laundry: LaundryGaps, about: str = "") -> str:
     """Return probability and smallest gap of the samples."""
     estimate, lower, upper = laundry.probability
     what = "touch" if not laundry.clearance else f"keep less than {_mm(laundry.clearance)}"
