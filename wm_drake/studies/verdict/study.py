@@ -128,10 +128,12 @@ class Laundry:
     Attributes:
         gaps: (n,) [m], minus infinity for a run that failed.
         clearance: Gap that must remain. [m]
+        masses: Smallest and largest mass of the laundry [kg]; None if loads scatter in its place.
     """
 
     gaps: FloatArray
     clearance: float
+    masses: tuple[float, float] | None
 
     @property
     def probability(self) -> tuple[float, float, float]:
@@ -333,8 +335,13 @@ class VerdictTask(Task):
 
     def _samples(self, task: ToleranceTask, executor: Executor) -> Laundry:
         """Return the gaps of the samples of a tolerance study."""
-        (gaps,) = (column for _, column in task.sampled(executor).values.items())
-        return Laundry(np.nan_to_num(1e-3 * gaps.to_numpy(), nan=-np.inf), self.clearance)
+        result = task.sampled(executor)
+        (gaps,) = (column for _, column in result.values.items())
+        return Laundry(
+            np.nan_to_num(1e-3 * gaps.to_numpy(), nan=-np.inf),
+            self.clearance,
+            result.machine.laundry_masses(result.scores),
+        )
 
 
 def _length(text: str) -> float:
