@@ -20,7 +20,7 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case, case_of, notice_jumping_friction
 from wm_drake.simulation.feet import cabinet_of
 from wm_drake.simulation.first_call import compile_in_two_processes
-from wm_drake.simulation.measures import MEASURES, Variable
+from wm_drake.simulation.measures import MEASURES, Variable, measure_named
 from wm_drake.simulation.measures.labels import LABELS
 from wm_drake.simulation.steps import checked_integrator, checked_step
 
@@ -64,8 +64,9 @@ def simulate_many(
         machine: A built machine, its parameters, or its name or file.
         cases: Cases to run, or names of loads of the machine. They are taken one by one as needed,
             so memory stays constant if this is a generator.
-        measures: Names of measures, keys of `wm_drake.simulation.measures.MEASURES`, such as
-            "extremes" (D, F and M of [B]), "amplitudes" (and critical speeds), "gap", "mounts".
+        measures: Names of measures or of their variables, in
+            `wm_drake.simulation.measures.MEASURES`, such as "extremes" (D, F and M of [B]),
+            "amplitudes" or "amplitude" (and critical speeds), "gap", "mounts".
         step: Step size; the output period of 5 ms must be an integer multiple of it. If None, the
             step size of the machine is used. [s]
         integrator: Integrator, as in `simulate`; None for that of the machine.
@@ -92,8 +93,9 @@ def simulate_many(
     """
     machine = machine_of(machine)
     compile_in_two_processes(machine.parameters)
-    chosen = tuple(dict.fromkeys(measures))
-    if any("feet" in MEASURES.find(name, key="measures").needs for name in chosen):
+    named = dict.fromkeys(measure_named(name, key="measures") for name in measures)
+    chosen = tuple(measure.name for measure in named)
+    if any("feet" in measure.needs for measure in named):
         cabinet_of(machine.parameters)
     step = checked_step(machine.parameters, step)
     scheme = checked_integrator(machine.parameters, integrator)
