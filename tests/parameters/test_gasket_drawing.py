@@ -67,7 +67,8 @@ def with_test(text):
 
 def test_as_many_constants_are_fitted_as_make_a_stable_rubber():
     with pytest.warns(
-        InputNotice, match=r"3 constants make an unstable rubber; 1 can be used, with a fit within 1.2 %"
+        InputNotice,
+        match=r"3 constants make an unstable rubber; 1 can be used, with a fit within 1.2 %",
     ):
         fallen = with_test(SOFTENING).rubber
     count = fallen.test.fitted_terms
