@@ -28,9 +28,9 @@ from wm_drake.parameters import (
 )
 from wm_drake.parameters.free import FreeFile
 from wm_drake.parameters.measured import EXPERIMENT
-from wm_drake.studies.calibration.calibration import Plan, calibrate, identity_of
-from wm_drake.studies.calibration.computed import Runner
-from wm_drake.studies.calibration.targets import targets_of
+from wm_drake.studies.calibrate.computed import Runner
+from wm_drake.studies.calibrate.study import Plan, calibrate, identity_of
+from wm_drake.studies.calibrate.targets import targets_of
 from wm_drake.studies.gasket.screening import Published, Screening, published_for
 
 REFERENCE = "reference"

@@ -22,7 +22,7 @@ from wm_drake.parameters.tolerances import load_limits, load_tolerances
 from wm_drake.parameters.variation import number_at
 from wm_drake.simulation.measures import measure
 from wm_drake.simulation.runs import simulate
-from wm_drake.studies.calibration.parameter_map import parameter_map_of
+from wm_drake.studies.calibrate.parameter_map import parameter_map_of
 
 PAGES = [README, *HOW_TO]
 SHORT = SpinProfile(time=(0.0, 6.0), speed=(0.0, 12.0))

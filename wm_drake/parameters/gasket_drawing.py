@@ -405,8 +405,8 @@ def load_gasket_drawing(name_or_path: str | Path) -> GasketDrawing:
     test = drawing.rubber.test
     if test and not test.terms and test.fitted_terms < test.most_terms:
         message = (
-            f"{test.most_terms} constants make an unstable rubber; {test.fitted_terms} can be used, "
-            f"with a fit within {100.0 * test.deviation:.2g} % of the largest stress"
+            f"{test.most_terms} constants make an unstable rubber; {test.fitted_terms} can be "
+            f"used, with a fit within {100.0 * test.deviation:.2g} % of the largest stress"
         )
         warnings.warn(str(Problem(str(path), "rubber.test", message)), InputNotice, stacklevel=2)
     return drawing

@@ -154,8 +154,9 @@ def influential_keys(machine: OpenMachine, state: State) -> list[str]:
         sliders = machine.sliders
     return [
         key
-        for key in sliders
-        if not key.startswith(("cabinet.", "step", "profile.", "imperfections.phase_error"))
+        for key, slider in sliders.items()
+        if not slider.needs
+        and not key.startswith(("cabinet.", "step", "profile.", "imperfections.phase_error"))
         and (not key.startswith("loads.") or key.startswith(prefix))
         and (state.gasket or not key.startswith("gasket."))
     ]
@@ -184,7 +185,7 @@ def _turned(machine: OpenMachine, case: Case, keys: Iterable[str]) -> list[tuple
     preparation = machine.preparation(case.parameters)
     for key in keys:
         slider = machine.sliders.get(key)
-        for step in (slider.step, -slider.step) if slider is not None else ():
+        for step in (slider.step, -slider.step) if slider is not None and slider.step else ():
             try:
                 parameters = machine.moved_by(case.parameters, key, step)
             except InputError:
@@ -359,7 +360,7 @@ def _forces(record: Record) -> dict[str, Any]:
     for index, name in enumerate(record.mount.values):
         if name == "gasket" and not has_gasket:
             continue
-        forces[f"mount {name}"] = size[:, index]
+        forces[f"mount {words_of(str(name).split('.'))}"] = size[:, index]
     count = record.sizes["time"]
     begins = np.unique(np.linspace(0, count, min(BINS, count), endpoint=False).astype(int))
     return {

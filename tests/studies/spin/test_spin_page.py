@@ -19,7 +19,7 @@ from wm_drake.report.scripts import packed_plotly
 from wm_drake.report.table import readable
 from wm_drake.studies.spin.figures import orbits_figure, revolution_starts, simplified_indices
 from wm_drake.studies.spin.page import amplitude_table, spin_page, warnings_of
-from wm_drake.studies.spin.study import CaseResult, Files, SpinResult
+from wm_drake.studies.spin.study import CaseResult, Files, SpinRuns
 from wm_drake.studies.spin.tables import (
     accelerations,
     differences,
@@ -47,14 +47,14 @@ def machine() -> MachineParameters:
 
 
 @pytest.fixture(scope="module")
-def result(machine: MachineParameters) -> SpinResult:
+def result(machine: MachineParameters) -> SpinRuns:
     return spin_result(
         machine, [case_result(machine, "middle"), case_result(machine, "back", size=0.01, gap=0.03)]
     )
 
 
 @pytest.fixture(scope="module")
-def page(result: SpinResult) -> str:
+def page(result: SpinRuns) -> str:
     return spin_page(result, Facts("wm-drake spin --set 'a=<b>'"))
 
 
@@ -138,7 +138,7 @@ def test_every_figure_says_what_it_shows(page: str) -> None:
 
 
 def test_mount_forces_and_accelerations_of_planted_motion(
-    result: SpinResult, machine: MachineParameters
+    result: SpinRuns, machine: MachineParameters
 ) -> None:
     (table,) = mount_force_tables(result)
     assert table.header[-1] == "RMS 300 to 400 rpm, N"
@@ -159,7 +159,7 @@ def test_mount_forces_and_accelerations_of_planted_motion(
 
 
 @pytest.mark.slow
-def test_detail_draws_the_vibration_of_every_load(result: SpinResult, page: str) -> None:
+def test_detail_draws_the_vibration_of_every_load(result: SpinRuns, page: str) -> None:
     assert page.count("drawn for this load only, that with the largest amplitude") == 1
     detailed = spin_page(replace(result, files=Files(detail=True)))
     assert detailed.count("Mount forces over time, load") == len(result.results)
@@ -233,7 +233,7 @@ def test_names_cannot_inject_markup(machine: MachineParameters) -> None:
 
 
 def test_amplitude_table_has_only_measured_rows_that_match_a_case(
-    result: SpinResult, machine: MachineParameters
+    result: SpinRuns, machine: MachineParameters
 ) -> None:
     table = amplitude_table(result)
     assert list(table.columns) == ["load", "gasket", "source", *machine.sensors]
@@ -296,7 +296,7 @@ def test_percent_difference_row_by_hand(machine: MachineParameters) -> None:
     assert "The largest difference is −90 %, at sensor Zf" in page
 
 
-def test_same_result_gives_the_same_page(result: SpinResult, page: str) -> None:
+def test_same_result_gives_the_same_page(result: SpinRuns, page: str) -> None:
     footer = re.compile(r"<footer>.*?</footer>", re.DOTALL)  # has the date
     again = spin_page(result, Facts("wm-drake spin --set 'a=<b>'"))
     assert footer.sub("", again) == footer.sub("", page) != page

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.types import ComplexArray, FloatArray
 from wm_drake.studies.modes.linearisation import Spectrum
 
 CLEAR_MAC = 0.8
@@ -85,7 +85,7 @@ def campbell(spectrum_at: Callable[[float], Spectrum], speeds: FloatArray, count
         count: Number of modes to follow, the slowest at the first speed.
     """
     here = spectrum_at(float(speeds[0])).first(count)
-    values: list[FloatArray] = [here.values]
+    values: list[ComplexArray] = [here.values]
     macs: list[FloatArray] = [np.ones(len(here.values))]
     for before, after in itertools.pairwise(speeds):
         here, least = _joined(spectrum_at, float(before), float(after), here, MOST_HALVINGS)

@@ -39,6 +39,7 @@ from wm_drake.studies.modes.study import (
     AmplitudeValue,
     MachineModes,
     NaturalModes,
+    modes_frame,
 )
 from wm_drake.studies.study import Facts, Result
 
@@ -209,7 +210,10 @@ class ModesResult(Result):
             Group(
                 TITLES[name],
                 tuple(
-                    Row((mode, parts(gap), MM_PER_M * gap.distance), kind="ours" * is_nearest)
+                    Row(
+                        (mode, parts(gap), MM_PER_M * gap.distance),
+                        kind="ours" if is_nearest else "",
+                    )
                     for mode, gap in near.of_mode.items()
                     for is_nearest in [mode == near.nearest]
                 ),
@@ -399,30 +403,6 @@ def _sensitivity_picture(result: MachineModes, quantity: str) -> Picture:
         f"Numbers of the machine file that change the {words} most, {TITLES[SLIDING]}. A table is "
         "scaled as a whole. sensitivities.csv has all numbers and both linearisations.",
     )
-
-
-def modes_frame(result: MachineModes) -> pd.DataFrame:
-    """Return the modes with shapes, participation and shares of the elements."""
-    rows = []
-    for name in (STUCK, SLIDING):
-        for mode in result.modes[name]:
-            row: dict[str, Any] = {
-                "linearisation": name,
-                "mode": mode.name,
-                "frequency_Hz": mode.frequency_hz,
-                "damping_ratio": mode.damping_ratio,
-            }
-            for coordinate, value in zip(COORDINATES, mode.shape, strict=True):
-                unit = "rad" if coordinate in COORDINATES[:3] else "m"
-                row[f"shape_{coordinate}_real_{unit}"] = value.real
-                row[f"shape_{coordinate}_imag_{unit}"] = value.imag
-            for coordinate, share in zip(COORDINATES, mode.participation, strict=True):
-                row[f"participation_{coordinate}"] = share
-            for kind in ("strain_energy", "dissipation"):
-                for element, share in zip(result.elements, getattr(mode, kind), strict=True):
-                    row[f"{kind} {element}"] = share
-            rows.append(row)
-    return pd.DataFrame(rows)
 
 
 def amplitudes_frame(result: MachineModes) -> pd.DataFrame:

@@ -8,7 +8,7 @@ import numpy as np
 
 from wm_drake.engines.trajectory import COORDINATES
 from wm_drake.model.scene import Gap, Scene
-from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.types import ComplexArray, FloatArray
 from wm_drake.report.formatting import MM_PER_M, number, shape_name
 from wm_drake.studies.modes.linearisation import Spectrum
 
@@ -55,7 +55,7 @@ class Mode:
     eigenvalue: complex
     frequency_hz: float
     damping_ratio: float
-    shape: FloatArray
+    shape: ComplexArray
     participation: FloatArray
     strain_energy: FloatArray
     dissipation: FloatArray
@@ -93,7 +93,7 @@ def modes_of(spectrum: Spectrum, wrench_slopes: FloatArray) -> list[Mode]:
     return modes
 
 
-def shape_of(vector: FloatArray) -> FloatArray:
+def shape_of(vector: ComplexArray) -> ComplexArray:
     """Return the motion of the tub in an eigenvector; the largest component becomes 1. (6,)"""
     weight = np.repeat([ANGLE_ARM, 1.0], 3)
     tub = vector[_POSITIONS]
@@ -125,7 +125,7 @@ def names_of(shares: FloatArray) -> list[str]:
 
 
 def energies(
-    value: complex, vector: FloatArray, wrench_slopes: FloatArray
+    value: complex, vector: ComplexArray, wrench_slopes: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return the strain energy of each element and the energy that it dissipates. (elements,)
 
