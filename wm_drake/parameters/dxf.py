@@ -50,10 +50,10 @@ DEEPEST_BLOCK = 16
 """Most blocks within each other."""
 
 IGNORED = {
-    "ACAD_TABLE", "ARC_DIMENSION", "ATTDEF", "ATTRIB", "DIMENSION", "HATCH", "IMAGE", "INSERT",
-    "LARGE_RADIAL_DIMENSION", "LEADER", "LIGHT", "MLEADER", "MPOLYGON", "MTEXT", "MULTILEADER",
-    "OLE2FRAME", "POINT", "RAY", "SHAPE", "SOLID", "TEXT", "TOLERANCE", "TRACE", "UNDERLAY",
-    "VIEWPORT", "WIPEOUT", "XLINE",
+    "ACAD_TABLE", "ARC_DIMENSION", "ATTDEF", "ATTRIB", "DGNUNDERLAY", "DIMENSION", "DWFUNDERLAY",
+    "HATCH", "IMAGE", "INSERT", "LARGE_RADIAL_DIMENSION", "LEADER", "LIGHT", "MLEADER", "MPOLYGON",
+    "MTEXT", "MULTILEADER", "OLE2FRAME", "PDFUNDERLAY", "POINT", "RAY", "SHAPE", "SOLID", "TEXT",
+    "TOLERANCE", "TRACE", "VIEWPORT", "WIPEOUT", "XLINE",
 }  # fmt: skip
 """Entities that are no lines of a wall: text, dimensions, hatches, symbols, construction lines."""
 
