@@ -282,7 +282,11 @@ def main() -> None:
     short, study = study_text(machines, trials)
     origin = page.origin(
         "python analyses/write_paper_b.py --page docs/paper-b.md",
-        [f"Gasket study: {trials} trials, tables linear, as in [B], where nothing else is said."],
+        [
+            f"Tables 4 and 5: `wm-drake study gasket --design orthogonal --trials {trials} "
+            f"--tables linear`, and\n  the same with `--machine {MACHINES[1]}`, as in [B], where "
+            "nothing else is said."
+        ],
     )
     text = origin + short + amplitude_text(machines, arguments.quick) + study
     print(text)

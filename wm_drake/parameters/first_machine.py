@@ -179,11 +179,20 @@ class FirstMachine:
         n = self.numbers
         tub = shell(n.tub_mass, self.tub_radius, self.tub_depth)
         drum = shell(n.drum_mass, n.drum_radius, n.drum_depth)
-        about = "inertia of a thin shell of this mass (assumption)"
-        return {
-            "tub": Mass(n.tub_mass, np.array(n.tub_centre), tub, about),
-            "drum": Mass(n.drum_mass, np.zeros(3), drum, about),
+        about = {
+            body: f"mass {self.source(f'{body}_mass')}; inertia of a thin shell (assumption)"
+            for body in ("tub", "drum")
         }
+        return {
+            "tub": Mass(n.tub_mass, np.array(n.tub_centre), tub, about["tub"]),
+            "drum": Mass(n.drum_mass, np.zeros(3), drum, about["drum"]),
+        }
+
+    def source(self, name: str, reason: str = "") -> str:
+        """Return "given" for a number that is; else that it is an assumption, with its reason."""
+        if name in self.numbers.model_fields_set:
+            return "given"
+        return f"assumption: {reason}" if reason else "assumption"
 
     @cached_property
     def whole(self) -> Mass:
@@ -272,7 +281,11 @@ class FirstMachine:
         return _filled(
             "bodies.sdf",
             name=self.name,
-            gap_mm=_text(1e3 * n.gap),
+            gap=f"{_text(1e3 * n.gap)} mm beside the tub: {self.source('gap')}",
+            drum_size=(
+                f"radius {_text(1e3 * n.drum_radius)} mm: {self.source('drum_radius')}; depth "
+                f"{_text(1e3 * n.drum_depth)} mm: {self.source('drum_depth')}"
+            ),
             walls="\n".join(walls),
             frames="\n".join(frames),
             about_tub=tub.about,
@@ -290,12 +303,7 @@ class FirstMachine:
             file: Its path, for the commands in its comments.
             model: Path of the SDF from its folder.
         """
-        n, whole = self.numbers, self.whole
-        given = n.model_fields_set
-
-        def source(name: str, otherwise: str) -> str:
-            return "given" if name in given else f"assumption: {otherwise}"
-
+        n, whole, source = self.numbers, self.whole, self.source
         return _filled(
             "machine.yaml",
             name=self.name,
@@ -321,6 +329,7 @@ class FirstMachine:
             front_mm=_text(-350.0 * n.drum_depth),
             rear_mm=_text(350.0 * n.drum_depth),
             speed=f"{_text(n.speed * 30.0 / np.pi)} rpm",
+            speed_source=source("speed"),
         )
 
 

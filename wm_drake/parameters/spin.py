@@ -98,6 +98,11 @@ class Load(Frozen):
             raise ValueError("needs unbalances, static or couple; no unbalance is `unbalances: []`")
         return self
 
+    @property
+    def mass(self) -> float:
+        """Mass of the laundry. [kg]"""
+        return sum(unbalance.mass for unbalance in self.unbalances)
+
 
 class _Step(Frozen):
     """A step of a spin profile: a ramp, a constant speed until a time, or a staircase of holds.

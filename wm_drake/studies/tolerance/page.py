@@ -160,7 +160,7 @@ def facts_of(result: ToleranceStudy, gaps: Mapping[str, float]) -> list[tuple[st
     Args:
         gaps: Smallest gap of each load of the machine. [m]
     """
-    facts = [*in_short(result), ("Loads of the machine", about_loads(gaps))]
+    facts = [*in_short(result), ("Loads of the machine", about_loads(result, gaps))]
     return [(word, text) for word, text in facts if text]
 
 

@@ -85,6 +85,11 @@ class UncertainVariable:
         """Whether it is a quantity of the laundry."""
         return not self.variation.numbers
 
+    @property
+    def is_of_load(self) -> bool:
+        """Whether it is the laundry or a number of a load, which no tolerance of a part limits."""
+        return all(key.startswith("loads.") for key in self.variation.keys)
+
 
 @dataclass(frozen=True)
 class UncertainMachine:
@@ -104,6 +109,14 @@ class UncertainMachine:
     _known: dict[tuple[float, ...], MachineParameters] = dataclasses.field(
         default_factory=dict, init=False, repr=False, compare=False
     )
+
+    def laundry_masses(self, scores: FloatArray) -> tuple[float, float] | None:
+        """Return the smallest and largest mass of the laundry of samples [kg]; None without it."""
+        names = [variable.name for variable in self.variables]
+        if f"{LAUNDRY}.mass" not in names:
+            return None
+        masses = self.joint.values(scores)[:, names.index(f"{LAUNDRY}.mass")]
+        return float(masses.min()), float(masses.max())
 
     def cases(self, scores: FloatArray, first: int = 1) -> list[Case]:
         """Return the case of each sample.

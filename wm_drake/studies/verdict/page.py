@@ -22,6 +22,7 @@ from wm_drake.report.table import Column, Table, table_of
 from wm_drake.report.terminal import Printed
 from wm_drake.simulation.measures.responses import GAP, Response
 from wm_drake.studies.study import Facts, Result
+from wm_drake.studies.tolerance.words import masses_text
 from wm_drake.studies.verdict.study import Influence, LaundryGaps, Outcome
 
 MOST_NAMED = 3
@@ -229,6 +230,10 @@ def facts_of(findings: VerdictResult) -> list[tuple[str, str]]:
     f, named_influences = findings, findings.influences[:MOST_NAMED]
     margin = f.base.gap - f.clearance
     rows = [("Random laundry", laundry_text(f.laundry, f.about))]
+    heaviest = max(f.machine.loads[name].mass for name in f.loads)
+    if f.laundry.masses and f.laundry.masses[1] < heaviest:
+        compared = masses_text(f.machine, f.loads, f.laundry.masses)
+        rows.append(("Its mass", f"{compared} --laundry names a file with other laundry"))
     if f.clearance:
         kept = "more" if margin > 0.0 else "less"
         rows.append(("Margin", f"{_mm(abs(margin))} {kept} than the clearance, {_mm(f.clearance)}"))

@@ -108,10 +108,12 @@ class LaundryGaps:
     Attributes:
         gaps: (n,) [m], minus infinity for a run that failed.
         clearance: Gap that must remain. [m]
+        masses: Smallest and largest mass of the laundry [kg]; None if loads scatter in its place.
     """
 
     gaps: FloatArray
     clearance: float
+    masses: tuple[float, float] | None
 
     @property
     def probability(self) -> tuple[float, float, float]:

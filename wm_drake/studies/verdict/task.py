@@ -101,8 +101,13 @@ class VerdictTask(Task):
 
     def _samples(self, task: ToleranceTask, executor: Executor) -> LaundryGaps:
         """Return the gaps of the samples of a tolerance study."""
-        (gaps,) = (column for _, column in task.sampled(executor).values.items())
-        return LaundryGaps(np.nan_to_num(1e-3 * gaps.to_numpy(), nan=-np.inf), self.clearance)
+        result = task.sampled(executor)
+        (gaps,) = (column for _, column in result.values.items())
+        return LaundryGaps(
+            np.nan_to_num(1e-3 * gaps.to_numpy(), nan=-np.inf),
+            self.clearance,
+            result.machine.laundry_masses(result.scores),
+        )
 
 
 def _length(text: str) -> float:
