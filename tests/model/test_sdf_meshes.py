@@ -89,6 +89,8 @@ def test_mesh_that_is_measured(tmp_path, text, scale, reason):
     ("uri", "reason"),
     [
         ("http://localhost/a.obj", "allowed is the name of a file"),
+        ("package://drake/a.obj", "allowed is the name of a file"),
+        ("model://a.obj", "allowed is the name of a file"),
         ("file:///dev/zero", "allowed is the name of a file"),
         ("a.png", "allowed are files .obj, .vtk, .gltf"),
         ("a.stl", "allowed are files .obj, .vtk, .gltf"),

@@ -39,6 +39,7 @@ from wm_drake.model.state_layout import CABINET, CARRIER
 from wm_drake.parameters import BodyOverride, InertiaMatrix, Load, MachineParameters, with_value
 from wm_drake.parameters.cabinet import Cabinet
 from wm_drake.parameters.drive import motor_of
+from wm_drake.parameters.inertia import fault_of_mass_properties
 from wm_drake.parameters.text_files import check_regular, is_file
 from wm_drake.systems.speed_source import REFLECTED_INERTIA
 
@@ -426,7 +427,7 @@ def set_bodies(plant: MultibodyPlant, context: Any, parameters: MachineParameter
     for name, override in parameters.bodies.items():
         body = plant.GetBodyByName(name)
         body.SetSpatialInertiaInBodyFrame(
-            context, _overridden(body.default_spatial_inertia(), override)
+            context, _overridden(name, body.default_spatial_inertia(), override)
         )
     if parameters.cabinet is not None and parameters.cabinet.moves:
         body = plant.GetBodyByName(CABINET)
@@ -495,8 +496,12 @@ def _unbalanced(drum: SpatialInertia, load: Load) -> SpatialInertia:
         ) from None
 
 
-def _overridden(inertia: SpatialInertia, override: BodyOverride) -> SpatialInertia:
-    """Return a spatial inertia with the parts of an override; a new mass scales the inertia."""
+def _overridden(name: str, inertia: SpatialInertia, override: BodyOverride) -> SpatialInertia:
+    """Return a spatial inertia with the parts of an override; a new mass scales the inertia.
+
+    Raises:
+        InputError: no part of a machine has such an inertia for its mass.
+    """
     mass = inertia.get_mass() if override.mass is None else override.mass
     centre = (
         inertia.get_com() if override.centre_of_mass is None else np.array(override.centre_of_mass)
@@ -506,6 +511,8 @@ def _overridden(inertia: SpatialInertia, override: BodyOverride) -> SpatialInert
         about_centre = central * (mass / inertia.get_mass())
     else:
         about_centre = rotational_inertia(override.inertia)
+        if fault := fault_of_mass_properties(mass, override.inertia.matrix):
+            raise input_error(fault, key=f"bodies.{name}.inertia")
     return SpatialInertia.MakeFromCentralInertia(mass, centre, about_centre)
 
 
@@ -552,7 +559,7 @@ def _mass_properties(plant: MultibodyPlant, name: str, override: BodyOverride) -
             for index in plant.GetBodyIndices(plant.GetBodyByName("tub").model_instance())
         ]
         check_known(name, links, f"no link '{name}' in the SDF", key=f"bodies.{name}")
-    inertia = _overridden(plant.GetBodyByName(name).default_spatial_inertia(), override)
+    inertia = _overridden(name, plant.GetBodyByName(name).default_spatial_inertia(), override)
     matrix = inertia.Shift(inertia.get_com()).CalcRotationalInertia().CopyToFullMatrix3()
     indices = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
     return {

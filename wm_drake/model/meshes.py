@@ -6,7 +6,6 @@ where distances are measured, with how far the hull lies outside of it.
 
 import functools
 import itertools
-import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -50,8 +49,6 @@ def fault_of_mesh(uri: str, sdf: Path, scale: Sequence[float], *, is_measured: b
         is_measured: Whether distances are measured from the mesh itself, not from its hull.
     """
     shown = shortened(uri, 80)
-    if re.match(r"(package|model)://", uri):
-        return ""  # Drake finds these, or refuses them with a message
     if "://" in uri:
         return f"has the mesh '{shown}'; allowed is the name of a file"
     mesh = sdf.parent / uri

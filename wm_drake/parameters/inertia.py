@@ -83,15 +83,15 @@ def fault_of_inertia(matrix: FloatArray) -> str:
 
 def _fault_of_moments(matrix: FloatArray) -> str:
     smallest, middle, largest = np.linalg.eigvalsh(matrix)
+    if smallest > 0.0 and smallest + middle >= largest * (1.0 - 1e-12):
+        return ""
     moments = f"{smallest:g}, {middle:g}, {largest:g} kg m^2"
     if smallest <= 0.0:
         return f"is not positive definite: the principal moments {moments} must be above 0"
-    if smallest + middle < largest * (1.0 - 1e-12):
-        return (
-            f"belongs to no body: of the principal moments {moments} the largest must not exceed "
-            "the sum of the others"
-        )
-    return ""
+    return (
+        f"belongs to no body: of the principal moments {moments} the largest must not exceed "
+        "the sum of the others"
+    )
 
 
 def _guess_of_order(matrix: FloatArray) -> str:
@@ -156,6 +156,31 @@ def unlikely_mass_properties(mass: float, matrix: FloatArray, reach: float = np.
     return ""
 
 
+MOST_OF_STEINER = 0.6
+"""Share of Steiner's term from which an inertia is probably about the origin: a part around the
+axis that is about its own centre of mass has less."""
+
+
+def unlikely_reference(mass: float, matrix: FloatArray, centre: FloatArray) -> str:
+    """Return that an inertia may be about the origin, not the centre of mass; empty if not.
+
+    The inertia less Steiner's term m (d.d 1 - d d^T) is then that of a body, and smaller by far.
+
+    Args:
+        mass: [kg]
+        matrix: (3, 3) [kg m^2]
+        centre: Centre of mass. (3,) [m]
+    """
+    steiner = mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+    share = float(np.trace(steiner) / np.trace(matrix))
+    if share < MOST_OF_STEINER or _fault_of_moments(matrix - steiner):
+        return ""
+    return (
+        f"{100.0 * share:.0f} % of its inertia is that of its mass at this distance from the "
+        "origin; is the inertia about the origin? It has to be about the centre of mass"
+    )
+
+
 def gyration(mass: float, matrix: FloatArray) -> float:
     """Return the largest radius of gyration of a body. [m]"""
     return float(np.sqrt(np.linalg.eigvalsh(matrix)[-1] / mass))
@@ -174,4 +199,8 @@ def _guess_of_unit(mass: float, radius: float) -> str:
         for unit, size in OTHER_UNITS.items()
         if low <= radius * np.sqrt(size) <= 0.8 * USUAL_GYRATION
     ]
-    return f"; is it in {' or '.join(units)}?" if units else ""
+    low = np.sqrt(0.4) * ball_radius(1e3 * mass)
+    in_tonnes = low <= radius / np.sqrt(1e3) <= 0.8 * USUAL_GYRATION and 1e3 * mass < LARGEST_MASS
+    guesses = [f"is it in {' or '.join(units)}"] if units else []
+    guesses += ["is the mass in t"] if in_tonnes else []
+    return f"; {', or '.join(guesses)}?" if guesses else ""
