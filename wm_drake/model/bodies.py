@@ -251,7 +251,8 @@ def _check_axis(plant: MultibodyPlant, joint_name: str, file: str) -> None:
         turn = f"0 0 {np.sign(x) * 90:g}" if abs(x) > abs(z) else f"{np.sign(z) * -90:g} 0 0"
         how = (
             "x points to the right, y from the door to the rear, z up. To turn the model write "
-            f'<pose degrees="true">0 0 0 {turn}</pose> into <model>'
+            f'<pose degrees="true">0 0 0 {turn}</pose> into <model>; if only the axis is wrong, '
+            "write <xyz>0 1 0</xyz>"
         )
     raise input_error(
         f"SDF '{file}': joint '{joint_name}' turns the drum about {way}; allowed is y, from the "
