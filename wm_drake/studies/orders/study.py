@@ -3,10 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import pandas as pd
 import xarray as xr
 from scipy.integrate import cumulative_trapezoid
 
@@ -16,14 +14,8 @@ from wm_drake.parameters.lab_files import is_lab_file
 from wm_drake.parameters.lab_signals import SPEED as DRUM_SPEED
 from wm_drake.parameters.lab_signals import TIME_NAMES, available_channels, clock_of, on_clock
 from wm_drake.parameters.types import FloatArray
-from wm_drake.report.formatting import RPM_PER_RAD_S, plain
-from wm_drake.simulation.netcdf import netcdf_bytes
 from wm_drake.simulation.orders import REVOLUTIONS, frequency_map, order_map
 from wm_drake.simulation.records import read_measured
-from wm_drake.studies.inputs import channels_of, existing_file
-from wm_drake.studies.orders.options import OrdersOptions
-from wm_drake.studies.run import Executor
-from wm_drake.studies.study import Facts, Result, Task
 
 RAD_S_PER_RPM = np.pi / 30.0
 
@@ -58,7 +50,7 @@ class Signals:
 
 
 @dataclass(frozen=True)
-class Orders(Result):
+class Orders:
     """Order map and frequency map of signals, as `wm_drake.simulation.orders` returns them."""
 
     signals: Signals
@@ -73,58 +65,6 @@ class Orders(Result):
     def at_order(self, order: float) -> FloatArray:
         """Return the amplitude of the nearest order of the map. (times, signals)"""
         return np.asarray(self.orders.sel(order=order, method="nearest").values)
-
-    def tables(self) -> dict[str, pd.DataFrame]:
-        """Return amplitudes of some orders over time."""
-        columns: dict[str, FloatArray] = {
-            "time_s": self.orders.time.values,
-            "speed_rpm": RPM_PER_RAD_S * self.orders.speed.values,
-        }
-        for order in self.shown_orders():
-            values = self.at_order(order)
-            for index, name in enumerate(self.signals.names):
-                columns[f"order {order:g} {name}, {self.signals.unit}"] = values[:, index]
-        return {"orders": pd.DataFrame(columns)}
-
-    def write(self, folder: Path) -> None:
-        """Write the table, and the whole map as netCDF."""
-        super().write(folder)
-        maps = self.orders.assign_coords(signal=self.signals.names)
-        maps.name, maps.attrs["units"] = "amplitude", self.signals.unit
-        (folder / "orders.nc").write_bytes(netcdf_bytes(maps.to_dataset()))
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the table by columns."""
-        columns = self.tables()["orders"].to_dict("list")
-        signals = self.signals
-        about = {"file": signals.source, "unit": signals.unit, "signals": signals.names}
-        return about | {"orders": plain(columns)}
-
-    def terminal(self) -> list[str]:
-        """Return a sentence about the largest component."""
-        from wm_drake.studies.orders.page import summary
-
-        return [summary(self)]
-
-    def page(self, facts: Facts) -> str:
-        """Return the page."""
-        from wm_drake.studies.orders.page import orders_page
-
-        return orders_page(self, facts)
-
-
-class OrdersTask(Task):
-    """Orders of the signals of a file."""
-
-    def __init__(self, options: OrdersOptions) -> None:
-        """Read the file."""
-        file = existing_file(options.file, "FILE")
-        self.signals = read_signals(file, options.unit, channels_of(options.channels))
-        self.highest = options.highest
-
-    def run(self, executor: Executor) -> Orders:  # noqa: ARG002
-        """Compute the maps."""
-        return orders_of(self.signals, self.highest)
 
 
 def read_signals(path: Path, unit: str, channels: Mapping[str, str] | None = None) -> Signals:
