@@ -34,6 +34,7 @@ from wm_drake.elements.state_map import (
 )
 from wm_drake.elements.telescopic_damper import TelescopicDamperParameters
 from wm_drake.errors import input_error
+from wm_drake.model.bodies import drawn_pose
 from wm_drake.model.frame_poses import FramePoses
 from wm_drake.model.state_layout import StateLayout
 from wm_drake.parameters import MachineParameters
@@ -341,7 +342,7 @@ def _telescopes(
     for name, damper in parameters.telescopic_dampers.items():
         joint = plant.GetJointByName(damper.joint)
         outer = joint.parent_body().name()
-        X_OF = joint.frame_on_parent().GetFixedPoseInBodyFrame()
+        X_OF = drawn_pose(plant, joint.frame_on_parent())
         at_tub = SixComponentBushingParameters(
             *poses("tub", damper.tub_frame),
             *poses(outer, damper.outer_frame),
@@ -369,7 +370,7 @@ def _bearing(
     if bearing is None:
         return None
     joint = plant.GetJointByName(parameters.drive.joint)
-    X_TF = joint.frame_on_parent().GetFixedPoseInBodyFrame()
+    X_TF = drawn_pose(plant, joint.frame_on_parent())
     axis = X_TF.rotation() @ joint.revolute_axis()
     point = X_TF.translation() + bearing.y * axis
     across = np.eye(3)[int(abs(axis[0]) > 0.9)]  # x, if the axis is not near it

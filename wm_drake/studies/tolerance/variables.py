@@ -2,6 +2,7 @@
 
 import dataclasses
 import itertools
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from wm_drake.errors import InputError, Problem, check_known, input_error, problems_at
+from wm_drake.errors import InputError, InputNotice, Problem, check_known, input_error, problems_at
 from wm_drake.parameters import (
     Change,
     Load,
@@ -24,7 +25,7 @@ from wm_drake.parameters.problems import problems_of
 from wm_drake.parameters.tolerances import LAUNDRY, TRUNCATED, Laundry, Spread, Tolerances
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Share, Unit
-from wm_drake.parameters.variation import change_of, changes_of, owned_twice
+from wm_drake.parameters.variation import change_of, changes_of, number_at, owned_twice
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.tolerance.distributions import (
     Joint,
@@ -234,7 +235,8 @@ def uncertain_machine(
         try:
             parameters, draws = _groups(parameters, name, quantity.keys, quantity.draws)
             for draw, keys in draws.items():
-                variables.append(_variable(parameters, draw, keys, quantity, quantity.about))
+                if kept := _that_scatter(parameters, draw, keys, quantity):
+                    variables.append(_variable(parameters, draw, kept, quantity, quantity.about))
         except InputError as error:
             problems += [Problem(f"quantity {name}", p.key, p.message) for p in error.problems]
     if tolerances.laundry is not None:
@@ -268,6 +270,25 @@ def _groups(
         else:
             groups[f"{name}.{key}" if len(keys) > 1 else name] = (key,)
     return parameters, groups
+
+
+def _that_scatter(
+    parameters: MachineParameters, name: str, keys: tuple[str, ...], spread: Spread
+) -> tuple[str, ...]:
+    """Return the keys of a quantity without those of which it gives percents of 0, with a notice.
+
+    A machine without this damping or stiffness has nothing there that scatters.
+    """
+    kept = []
+    for key in keys:
+        number = number_at(parameters, key)
+        change, _ = changes_of(_places(spread), number.unit, key)
+        if change is Change.PERCENT and number.nominal == 0.0:
+            message = f"quantity {name}: {key} is 0, so percents of it do not scatter; left out"
+            warnings.warn(message, InputNotice, stacklevel=2)
+        else:
+            kept.append(key)
+    return tuple(kept)
 
 
 def with_types_apart(
