@@ -39,13 +39,13 @@ from wm_drake.parameters.measured import (
 from wm_drake.parameters.published import CONSTANT, published_results
 from wm_drake.report.progress import progress_bar
 from wm_drake.simulation.measures.responses import known_responses
-from wm_drake.studies.calibrate.computed import Runner
+from wm_drake.studies.calibrate.computed import PointRunner
 from wm_drake.studies.calibrate.prediction import Prediction, predict
 from wm_drake.studies.calibrate.response_targets import with_deviations
 from wm_drake.studies.calibrate.solutions import Solution, percents_of, solved_machine
 from wm_drake.studies.calibrate.study import (
     Calibration,
-    Plan,
+    SearchPlan,
     calibrate,
     identity_of,
 )
@@ -66,7 +66,7 @@ LIMITS = {"amplitudes": 0.1985, "displacement": 0.485, "force": 0.485, "moment":
 They lie a little within those that it must keep: 20 % of an amplitude, 50 % of a mean, 25 % of My.
 """
 
-PLAN = Plan(starts=1, iterations=1, deviation=0.033)
+PLAN = SearchPlan(starts=1, iterations=1, deviation=0.033)
 """The start of the free file is the end of a wide search within the limits; it is only evaluated.
 
 With this deviation of the amplitudes and that of the means below, the mean difference is below
@@ -109,7 +109,7 @@ def main() -> None:
         prediction_plan = replace(plan, draws=QUICK_DRAWS)
     ledger_path = arguments.out.with_suffix(".sqlite")
     with open_ledger(ledger_path, identity_of(machine, free, targets, plan), resume=True) as ledger:
-        runner = Runner(machine, ledger)
+        runner = PointRunner(machine, ledger)
         with progress_bar(plan.starts, "searches") as done:
             shown = replace(runner, report=lambda start, *_: done(start))
             calibration = calibrate(shown, free, targets, plan)
@@ -134,12 +134,14 @@ def main() -> None:
     arguments.out.write_text(text + "\n", encoding="utf-8")
 
 
-def _searched(arguments: argparse.Namespace) -> tuple[FreeFile, Plan, tuple[tuple[str, ...], ...]]:
+def _searched(
+    arguments: argparse.Namespace,
+) -> tuple[FreeFile, SearchPlan, tuple[tuple[str, ...], ...]]:
     """Return free quantities, plan of the search, and groups of loads that are held out."""
     free = load_free(Path(__file__).with_name(f"{arguments.machine}_free.yaml"))
     if arguments.quick:
         few = dict(list(free.quantities.items())[:3])
-        return FreeFile(quantities=few), Plan(starts=1, iterations=1), (("back", "front"),)
+        return FreeFile(quantities=few), SearchPlan(starts=1, iterations=1), (("back", "front"),)
     if arguments.machine == REFERENCE:
         return free, ADAMS_PLAN, HELD_OUT[REFERENCE] if arguments.predict else ()
     return free, PLAN, HELD_OUT[EARLIER]

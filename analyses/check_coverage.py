@@ -24,10 +24,10 @@ from wm_drake.model.machine import Machine
 from wm_drake.parameters import load_machine
 from wm_drake.parameters.free import FreeFile, load_free
 from wm_drake.parameters.types import FloatArray
-from wm_drake.studies.calibrate.computed import Evaluation, Runner
+from wm_drake.studies.calibrate.computed import Evaluation, PointRunner
 from wm_drake.studies.calibrate.options import CalibrateOptions
 from wm_drake.studies.calibrate.parameter_map import ParameterMap, parameter_map_of
-from wm_drake.studies.calibrate.study import Calibration, Plan, calibrate, identity_of
+from wm_drake.studies.calibrate.study import Calibration, SearchPlan, calibrate, identity_of
 from wm_drake.studies.calibrate.targets import Targets
 
 LOADS = tuple((name, True) for name in ("middle", "counter", "back", "front"))
@@ -54,7 +54,7 @@ def main() -> None:
     inside, worse = [], []
     for seed in seeds:
         truth, targets = _planted(machine, parameter_map, seed)
-        calibration = _calibrated(machine, free, targets, Plan(starts=starts, seed=seed))
+        calibration = _calibrated(machine, free, targets, SearchPlan(starts=starts, seed=seed))
         best = calibration.solutions[0]
         spread = best.posterior.spread() * parameter_map.deviation
         inside.append(np.abs(best.point - truth) <= Z * spread)
@@ -100,11 +100,13 @@ def _planted(
     return truth, replace(targets, amplitude=exact * np.exp(NOISE * rng.normal(size=ones.shape)))
 
 
-def _calibrated(machine: Machine, free: FreeFile, targets: Targets, plan: Plan) -> Calibration:
+def _calibrated(
+    machine: Machine, free: FreeFile, targets: Targets, plan: SearchPlan
+) -> Calibration:
     with tempfile.TemporaryDirectory() as folder:
         identity = identity_of(machine, free, targets, plan)
         with open_ledger(Path(folder) / "ledger.sqlite", identity) as ledger:
-            return calibrate(Runner(machine, ledger), free, targets, plan)
+            return calibrate(PointRunner(machine, ledger), free, targets, plan)
 
 
 def _binomial(hits: int, count: int) -> tuple[float, float]:

@@ -21,7 +21,7 @@ from wm_drake.parameters.designs import load_design
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.design.problem import MachineDesigns, machine_designs
-from wm_drake.studies.design.search import Problem, SearchResult, SearchSettings
+from wm_drake.studies.design.search import DesignProblem, SearchResult, SearchSettings
 from wm_drake.studies.design.study import SEARCHES
 
 
@@ -40,7 +40,7 @@ def searched(
 
     begin = time.process_time()
     goals, limits = len(designs.objectives), len(designs.constraints)
-    problem = Problem(evaluate, designs.nominal(), goals, limits)
+    problem = DesignProblem(evaluate, designs.nominal(), goals, limits)
     result = SEARCHES[name](problem, SearchSettings(evaluations, min(64, evaluations), seed))
     return result, time.process_time() - begin - running
 

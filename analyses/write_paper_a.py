@@ -35,7 +35,7 @@ from wm_drake.rigs import (
 )
 from wm_drake.studies.rig.study import printed_table
 from wm_drake.studies.spin_cycle.study import (
-    SpinCycleResult,
+    SpinCycleRuns,
     average_errors,
     compiled_runs,
     run_spin_cycle,
@@ -399,7 +399,7 @@ def table_9_lines(cases: list[UnbalanceCase]) -> list[list[str]]:
     ]
 
 
-def cycle_lines(result: SpinCycleResult) -> list[list[str]]:
+def cycle_lines(result: SpinCycleRuns) -> list[list[str]]:
     """Return lines for section 4.2: what it says in words of cases 2, 5 and 29."""
     words = {"met": verdict(True), "missed": verdict(False)}
     return [
@@ -416,7 +416,7 @@ def cycle_lines(result: SpinCycleResult) -> list[list[str]]:
 
 def displacements(
     machine: MachineParameters, cases: list[UnbalanceCase], profile: SpinProfile
-) -> SpinCycleResult:
+) -> SpinCycleRuns:
     """Return the spin cycle of a machine."""
     return run_spin_cycle(machine, cases, profile, compiled_runs(build_machine(machine)))
 
@@ -429,7 +429,7 @@ def begin_of(profile: SpinProfile) -> SpinProfile:
     )
 
 
-def cause_lines(machine: MachineParameters, perfect: SpinCycleResult) -> list[list[str]]:
+def cause_lines(machine: MachineParameters, perfect: SpinCycleRuns) -> list[list[str]]:
     """Return lines for the three causes of error: mean change of the RMS displacements by group.
 
     Args:

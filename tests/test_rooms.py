@@ -179,6 +179,19 @@ def test_folder_of_a_study_has_the_name_of_its_command():
             assert folder in (name, study.group, f"{study.group}_{name}")
 
 
+def test_classes_of_a_study_begin_with_its_name():
+    """Those of options, tasks and results: who knows the command finds them."""
+    for name, source, is_package in modules():
+        if not name.startswith("wm_drake.studies.") or name.count(".") != 3 or is_package:
+            continue
+        study = name.split(".")[2].title().replace("_", "")
+        for node in ast.parse(source).body:
+            if isinstance(node, ast.ClassDef):
+                bases = [base.id for base in node.bases if isinstance(base, ast.Name)]
+                if any(base.endswith(("Options", "Task", "Result")) for base in bases):
+                    assert node.name.startswith(study), name
+
+
 @pytest.mark.parametrize("at", ["{}", "def f():\n    {}", "if TYPE_CHECKING:\n    {}"])
 def test_planted_circle_is_found(at):
     back = at.format("from wm_drake.studies.spin.study import X")

@@ -7,6 +7,8 @@ import ast
 import re
 from pathlib import Path
 
+import pytest
+
 import wm_drake
 
 ROOT = Path(wm_drake.__file__).parent
@@ -71,6 +73,72 @@ def test_names_say_what_they_hold():
         if EMPTY_WORDS & {word.lower() for word in words_of(name)}
     ]
     assert not empty, "\n".join(empty)
+
+
+def conditions_as_factors(tree):
+    """Yield the line of each product with a condition, as in `"alarm" * is_late`.
+
+    Arrays of conditions are masks, so a comparison is a condition only beside a text.
+    """
+    for node in ast.walk(tree):
+        if not (isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult)):
+            continue
+        for text, factor in ((node.left, node.right), (node.right, node.left)):
+            is_text = isinstance(text, ast.JoinedStr) or isinstance(getattr(text, "value", 0), str)
+            match factor:
+                case ast.UnaryOp(op=ast.Not()) | ast.Call(func=ast.Name("bool")):
+                    yield node.lineno
+                case ast.Compare() | ast.BoolOp() if is_text:
+                    yield node.lineno
+                case ast.Name(name) | ast.Attribute(attr=name) if is_text:
+                    if name.startswith(("is_", "has_")):
+                        yield node.lineno
+
+
+@pytest.mark.parametrize(
+    ("source", "found"),
+    [
+        ("'ours' * is_nearest", 1),
+        ("'s' * (count > 1)", 1),
+        ("text * bool(pictures)", 1),
+        ("(not pictures) * text", 1),
+        ("'*' * len(labels)", 0),
+        ("values * (values > 0)", 0),
+    ],
+)
+def test_a_planted_product_with_a_condition_is_found(source, found):
+    assert len([*conditions_as_factors(ast.parse(source))]) == found
+
+
+def test_a_condition_is_no_factor():
+    assert [(file, line) for file, tree in sources() for line in conditions_as_factors(tree)] == []
+
+
+SHARED_NAMES = {
+    *("Accelerometer", "Bushing", "Cabinet", "Damper", "Imperfections", "Sensor", "Spring"),
+    "TelescopicDamper",
+}
+"""Public names with two homes: parts of a machine file, and the same parts in the description that
+`machine show --json` prints, whose schema has these names."""
+
+
+def homes():
+    """Return the modules in which each public class or alias is defined, by its name."""
+    places = {}
+    for file, tree in sources():
+        for node in tree.body:
+            match node:
+                case ast.ClassDef(name):
+                    places.setdefault(name, []).append(file)
+                case ast.AnnAssign(ast.Name(name), ast.Name("TypeAlias")):
+                    places.setdefault(name, []).append(file)
+    return {name: files for name, files in places.items() if not name.startswith("_")}
+
+
+def test_a_class_or_alias_has_one_home():
+    several = {name: files for name, files in homes().items() if len(files) > 1}
+    assert {name: files for name, files in several.items() if name not in SHARED_NAMES} == {}
+    assert set(several) >= SHARED_NAMES
 
 
 def test_functions_have_few_arguments():

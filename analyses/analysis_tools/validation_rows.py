@@ -13,7 +13,7 @@ from wm_drake.parameters import PublishedResults
 from wm_drake.parameters.published import CONSTANT
 from wm_drake.studies.gasket.screening import Screening
 from wm_drake.studies.spin.comparison import LARGE_STEADY, SMALL_STEADY
-from wm_drake.studies.spin_cycle.study import SpinCycleResult
+from wm_drake.studies.spin_cycle.study import SpinCycleRuns
 
 FITTED, PREDICTED = "fitted", "predicted"
 """Whether a published number was a target of the calibration."""
@@ -319,7 +319,7 @@ def mean_rows(
     return rows
 
 
-def spin_cycle_rows(result: SpinCycleResult) -> list[Row]:
+def spin_cycle_rows(result: SpinCycleRuns) -> list[Row]:
     """Return what [A] section 4 says in words about its spin cycle, and whether ours agrees.
 
     They are fitted: masses, mounts and profile of `free_stroke` were chosen so that they hold.

@@ -195,7 +195,7 @@ def _chains(machine: MachineParameters) -> dict[str, Chain]:
         **{f"spring {name}": [("spring", "")] for name in machine.springs},
         **{f"damper {name}": [("damper", "")] for name in machine.dampers},
         **{f"damper {name}": TUBES for name in machine.telescopic_dampers},
-        **{name: [("bushing", "")] for name in ("gasket",) * bool(machine.gasket)},
+        **{name: [("bushing", "")] for name in ("gasket",) if machine.gasket},
         **{name: [("bushing", "")] for name in machine.bushings},
     }
 

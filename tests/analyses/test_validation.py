@@ -32,7 +32,7 @@ from analysis_tools.validation_rows import (
 from wm_drake.parameters import PublishedTerm
 from wm_drake.studies.doe.design import make_design
 from wm_drake.studies.gasket.screening import Responses, run_screening
-from wm_drake.studies.spin_cycle.study import SpinCycleResult
+from wm_drake.studies.spin_cycle.study import SpinCycleRuns
 
 
 @pytest.fixture
@@ -110,7 +110,7 @@ def test_spin_cycle_is_judged_by_what_the_paper_says():
     size.loc["5", "R3", "b", "y"] = 1.0
     size.loc["5", "R2", "b", "y"] = 0.8
     size.loc["29", "R1", "c", "z"] = 0.4
-    result = SpinCycleResult(None, None, (), size, size, size, size, (), xr.Dataset())
+    result = SpinCycleRuns(None, None, (), size, size, size, size, (), xr.Dataset())
     y, z, rear, opposite, errors = spin_cycle_rows(result)
     assert [row.verdict for row in (y, z, rear, opposite, errors)] == [MET, MET, MISSED, MET, OPEN]
     assert (rear.published, rear.ours) == ("R2", "R3")

@@ -217,7 +217,7 @@ def test_ctrl_c_keeps_the_runs_that_had_ended(machine, cases, table):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"measures": ["extremes", "amplitude"]}, "did you mean 'amplitudes'"),
+        ({"measures": ["extremes", "amplitud"]}, "did you mean 'amplitudes'"),
         ({"step": 3e-3}, "does not divide the output period"),
     ],
 )

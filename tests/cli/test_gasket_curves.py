@@ -132,12 +132,12 @@ THIN = (
             "needs as many stretches as stresses; has 3 and 2",
         ),
         (
-            {"rubber": "{test: {stretch: [1, 1.5, 2], stress: '(0, 0.4, 0.6) MPa'}}"},
+            {"rubber": "{test: {stretch: [1, 1.5, 2], stress: '(0, 0.4, 0.6) MPa', terms: 3}}"},
             "has 2 stretches beside 1; 3 constants need at least 4",
         ),
         (
             {"rubber": "{test: {stretch: [1.2, 1.5, 2], stress: '(-1, -2, -3) MPa', terms: 1}}"},
-            "the rubber is unstable",
+            "of the test, no number of constants is stable",
         ),
         (
             {"points": "- {radius: 1 mm, y: 0 mm, T}\n- {radius: 1 mm, y: 9 mm, T}\n"},

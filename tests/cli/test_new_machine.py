@@ -75,8 +75,73 @@ def test_a_table_of_parts_gives_the_bodies(wm_drake):
     with pytest.raises(InputError, match="has no part of the drum"):
         read_parts(Path("parts.csv"))
     Path("parts.csv").write_text(PARTS.replace("shell,tub", "shell,tob"))
-    with pytest.raises(InputError, match=r"parts\.csv:2: body 'tob' is not allowed"):
+    with pytest.raises(InputError, match=r"parts\.csv:2: part 'shell' has the body 'tob'; allowed"):
         read_parts(Path("parts.csv"))
+
+
+UNITS = {"kg mm^2": 1e6, "g mm^2": 1e9, "g cm^2": 1e7, "kg cm^2": 1e4, "lb in^2": 3417.17, "t mm^2": 1e3, "lb ft^2": 23.7304}  # fmt: skip
+
+
+def part(mass=12.0, centre=(0, 0, 0), inertia=(0.6, 0.8, 0.6, 0, 0, 0), name="part"):
+    return f"{name},tub,{','.join(map(str, (mass, *centre, *inertia)))}\n"
+
+
+REFUSED = {
+    **{
+        f"inertia in {unit}": (part(inertia=np.array([0.6, 0.8, 0.6, 0, 0, 0]) * n), rf"radius of gyration .* is it in .*{re.escape(unit)}")
+        for unit, n in UNITS.items()
+    },
+    "mass in g": (part(mass=12000), "a mass of 12000 kg; allowed is above 0 up to 1000; is it in g"),
+    "mass in t": (part(mass=0.012), "or is the mass in t"),
+    "mass 0": (part(mass=0), "a mass of 0 kg"),
+    "mass below 0": (part(mass=-1), "a mass of -1 kg"),
+    "place in um": (part(centre=(0, 0, 250000)), "250000 mm from the middle|2.5e.05 mm from the middle"),
+    "rows of the matrix": (part(inertia=(0.6, 0.05, 0.02, 0.05, 0.8, 0.01)), "not positive definite.* rows of the matrix"),
+    "rows of the triangle": (part(inertia=(0.6, 0.05, 0.02, 0.8, 0.01, 0.6)), "rows of the matrix"),
+    "products that a body has": (part(inertia=(0.6, 0.6, 0.6, -0.25, -0.25, -0.25)), None),
+    "products of the other sign": (part(inertia=(0.6, 0.6, 0.6, 0.25, 0.25, 0.25)), "belongs to no body.* do the products have the other sign"),
+    "no triangle": (part(inertia=(0.04, 0.9, 0.1, 0, 0, 0)), "principal moments 0.04, 0.1, 0.9 kg m.2 the largest must not"),
+    "twice": (part() * 2, "is there already"),
+    "no name": (part(name=""), "has no name"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", REFUSED)
+def test_part_that_no_machine_has_is_refused_with_its_line(kind, wm_drake):
+    rows, reason = REFUSED[kind]
+    comments = f"# from CAD\n{','.join(COLUMNS)}\n\n{ROW}\n# a comment\n"
+    Path("parts.csv").write_text(f"{comments}{rows}{DRUM}")
+    ended = wm_drake("machine", "new", "cad", "--parts", "parts.csv")
+    assert Path("cad.yaml").exists() == Path("cad.sdf").exists() == (reason is None)
+    if reason:
+        assert ended.code == 2
+        (line,) = ended.messages
+        assert re.match(r"parts\.csv:[67]: part '.*' ", line)
+        assert re.search(reason, line)
+
+
+@pytest.mark.parametrize(
+    ("rows", "remark"),
+    [
+        (part(9, (0, -50, 250), (0.625, 0.6625, 0.1225, 0, 0, 0.1125)), "is the inertia about the origin?"),
+        (part(inertia=(6e-4, 8e-4, 6e-4, 0, 0, 0)), "denser than lead"),
+        (part(inertia=(3.6, 4.8, 3.6, 0, 0, 0)), "a radius of gyration of 632.5 mm, which is unusual"),
+        (part(9, (0, -50, 250), (0.04, 0.1, 0.1, 0, 0, 0)), ""),
+    ],
+)  # fmt: skip
+def test_part_that_is_unlikely_is_remarked_on(rows, remark, wm_drake):
+    Path("parts.csv").write_text(f"{','.join(COLUMNS)}\n{ROW}\n{rows}{DRUM}")
+    ended = wm_drake("machine", "new", "cad", "--parts", "parts.csv")
+    assert ended.code == 0
+    assert ("notice: parts.csv:3: part 'part': " in ended.err) == bool(remark)
+    assert remark in ended.err
+
+
+def test_places_in_metres_are_remarked_on(wm_drake):
+    rows = part(9, (0, -0.05, 0.25), (0.04, 0.1, 0.1, 0, 0, 0))
+    Path("parts.csv").write_text(f"{','.join(COLUMNS)}\n{ROW}\n{rows}{DRUM.replace('50', '0.05')}")
+    ended = wm_drake("machine", "new", "cad", "--parts", "parts.csv")
+    assert "notice: parts.csv: all centres of mass are within 2 mm" in ended.err
 
 
 def test_a_centre_off_the_plane_of_two_springs_gets_preloads_that_work(new, wm_drake):

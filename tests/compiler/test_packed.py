@@ -8,7 +8,7 @@ from wm_drake.compiler.compilation import generic, law
 from wm_drake.compiler.elementary import in_each_lane, lanes_to_rows, numbers, rows_to_lanes
 from wm_drake.compiler.elementary import whole_number as whole
 from wm_drake.compiler.lanes import WIDTH, lane_array
-from wm_drake.compiler.packed import ARRAY, LAYOUT, SCALAR, VECTOR, PackedLayout, Part
+from wm_drake.compiler.packed import ARRAY, LAYOUT, SCALAR, VECTOR, PackedLayout, PackedPart
 
 
 @law
@@ -16,7 +16,7 @@ def list_size(p, at):
     return 1 + whole(p[at])
 
 
-LIST = Part(list_size, lambda p, at: [whole(p[at])])
+LIST = PackedPart(list_size, lambda p, at: [whole(p[at])])
 INNER = PackedLayout("InnerNumbers", mass=SCALAR, points=LIST, name_behind=SCALAR)
 OUTER = PackedLayout(
     "OuterNumbers", place=VECTOR, gain=SCALAR, inner=LAYOUT(INNER), pair=ARRAY(2), last=LIST
@@ -160,7 +160,7 @@ def test_wrong_values_are_refused(values, message):
 
 
 def test_a_part_without_a_size_must_be_last():
-    open_ended = Part(None, lambda p, at: [])
+    open_ended = PackedPart(None, lambda p, at: [])
     with pytest.raises(ValueError, match="Odd: the part before 'behind' has no size"):
         PackedLayout("Odd", law=open_ended, behind=SCALAR)
     assert PackedLayout("Even", before=SCALAR, law=open_ended).size is None

@@ -58,17 +58,6 @@ REVERSED = (
 SLIDING = (
     (r'<joint name="drum_axis" type="revolute">', r'<joint name="drum_axis" type="prismatic">'),
 )
-EXTRA_FORCE = (
-    (
-        r"</model>",
-        """<drake:linear_bushing_rpy xmlns:drake="drake.mit.edu"><drake:bushing_frameA>gasket_tub</drake:bushing_frameA>
-        <drake:bushing_frameC>gasket_housing</drake:bushing_frameC>
-        <drake:bushing_torque_stiffness>1 1 1</drake:bushing_torque_stiffness>
-        <drake:bushing_torque_damping>1 1 1</drake:bushing_torque_damping>
-        <drake:bushing_force_stiffness>1 1 1</drake:bushing_force_stiffness>
-        <drake:bushing_force_damping>1 1 1</drake:bushing_force_damping></drake:linear_bushing_rpy></model>""",
-    ),
-)
 
 
 @pytest.mark.parametrize(
@@ -76,9 +65,8 @@ EXTRA_FORCE = (
     [
         (REVERSED, "joint 'drum_axis' has the tub as its child"),
         (SLIDING, "joint 'drum_axis' is prismatic, not revolute"),
-        (EXTRA_FORCE, "force element LinearBushingRollPitchYaw of the SDF"),
     ],
-    ids=["reversed joint", "sliding drum", "force element"],
+    ids=["reversed joint", "sliding drum"],
 )
 def test_what_it_cannot_represent_is_refused_by_name(changes, named, tmp_path):
     setup = build_machine(changed(model=redrawn(tmp_path, SDF, *changes))).set_up()

@@ -264,8 +264,8 @@ MSTV = load_machine("reference")
 CHOICES = {
     "reference": (MSTV, 42.0, 2.5e-3, "multistep", 2.5e-3),
     "1400 rpm": (MSTV, 146.6, 2.5e-3, "multistep", 1.25e-3),
-    "1400 rpm at 1 ms": (MSTV, 146.6, 1e-3, "multistep", 1e-3),
-    "2000 rpm": (MSTV, 209.4, 2.5e-3, "runge_kutta", 2.5e-3),
+    "1400 rpm at 1 ms": (MSTV, 146.6, 1e-3, "multistep", 0.625e-3),
+    "2000 rpm": (MSTV, 209.4, 2.5e-3, "multistep", 0.625e-3),
     "longer step": (MSTV, 42.0, 5e-3, "multistep", 2.5e-3),
     "Coulomb friction": (variant("coulomb", friction_force=25.0), 42.0, 2.5e-3, "runge_kutta", 2.5e-3),
     "smooth friction": (havsin(0.1), 42.0, 2.5e-3, "multistep", 2.5e-3),

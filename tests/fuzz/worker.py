@@ -38,7 +38,7 @@ COMPUTATIONS = (
     "wm_drake.studies.calibrate.study.calibrate",
     "wm_drake.studies.tolerance.study.run_tolerances",
     "wm_drake.studies.design.study.run_designs",
-    "wm_drake.studies.response.study.run_steady_study",
+    "wm_drake.studies.response.study.run_response_study",
     "wm_drake.studies.modes.study.modes",
     "wm_drake.studies.orders.study.orders_of",
     "wm_drake.rigs.run_rig",

@@ -212,13 +212,11 @@ def test_an_sdf_error_is_one_short_line(tmp_path):
         f"<sdf version='1.9'><model name='m'><{'x' * 500}/></model></sdf>"
     )
     (tmp_path / "own.yaml").write_text("extends: reference\nmodel: own.sdf\n")
-    with pytest.raises(InputError, match="cannot be read") as caught:
+    with pytest.raises(InputError, match="line 1: <xxx") as caught:
         build_machine(load_machine(tmp_path / "own.yaml"))
     (problem,) = caught.value.problems
-    quoted = problem.message.split("cannot be read: ")[1]
-    assert "\n" not in quoted
-    assert quoted.startswith("own.sdf:1: error")
-    assert len(quoted) <= 200
+    assert "\n" not in problem.message
+    assert len(problem.message) <= 400
 
 
 @pytest.mark.parametrize(

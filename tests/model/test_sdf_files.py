@@ -1,12 +1,11 @@
 """SDF files that include others, and links without mass: refused before sdformat reads them."""
 
-from xml.etree import ElementTree
-
 import pytest
 
 from wm_drake.errors import InputError
 from wm_drake.model.bodies import SDF_FOLDER
 from wm_drake.model.sdf_files import MOST_FILES, check_mass_properties, sdf_roots
+from wm_drake.model.sdf_text import read_sdf
 
 INERTIA = "<inertia><ixx>1</ixx><iyy>1</iyy><izz>1</izz></inertia>"
 
@@ -75,9 +74,9 @@ def test_included_files_are_read_once_and_limited(tmp_path):
     ],
 )
 def test_link_that_moves_states_mass_and_inertia(inertial, missing):
-    link = ElementTree.fromstring(f"<sdf><link name='tub'>{inertial}</link></sdf>")
+    link = read_sdf(f"<sdf><link name='tub'>{inertial}</link></sdf>")
     check_mass_properties({SDF_FOLDER / "a.sdf": link}, ["tub"])
-    with pytest.raises(InputError, match=f"link 'tub' does not state its {missing}$"):
+    with pytest.raises(InputError, match=f"line 1: link 'tub' does not state its {missing}$"):
         check_mass_properties({SDF_FOLDER / "a.sdf": link}, ["housing"])
 
 

@@ -283,6 +283,34 @@ def layer_in_other_letters():
     return {"layer": "außenKONTUR"}
 
 
+def layer_of_another_alphabet():
+    """R2000 has no letters outside its code page: they are written as U+0421 and so on."""
+    document, space = new("R2000")
+    polyline(space, layer="СТЕНКА")
+    space.add_circle((0, 0), 5, dxfattribs={"layer": "壁厚"})
+    assert "U+0421" in document_text(document)
+    return {"layer": "Стенка"}
+
+
+def hidden_layer_of_another_alphabet():
+    document, space = new("R2000")
+    document.layers.add("ОСЬ").off()
+    polyline(space)
+    space.add_circle((0, 0), 5, dxfattribs={"layer": "ось"})
+    return saved(document)
+
+
+def legs_as_splines_with_double_points():
+    document, space = new()
+    for begin, end in SIDES:
+        if begin[2]:
+            space.add_arc(*arc_of(begin, end))
+        else:
+            middle = [0.5 * (a + b) for a, b in zip(begin[:2], end[:2], strict=True)]
+            space.add_open_spline([begin[:2], begin[:2], middle, end[:2], end[:2]])
+    return saved(document)
+
+
 def document_text(document):
     saved(document)
     return Path("wall.dxf").read_text(encoding=document.encoding)
@@ -344,6 +372,9 @@ ORDINARY = {
     "text": text_dimension_hatch_and_axis,
     "hidden layers": hidden_layers,
     "layer": layer_in_other_letters,
+    "alphabet": layer_of_another_alphabet,
+    "hidden alphabet": hidden_layer_of_another_alphabet,
+    "double points": legs_as_splines_with_double_points,
     "elevation": raised,
     "binary": binary,
     "CRLF": changed(lambda text: text.replace("\n", "\r\n")),

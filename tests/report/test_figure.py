@@ -130,6 +130,24 @@ def test_files_and_picture_show_the_same_data(tmp_path):
     assert file_name("") == "picture"
 
 
+def test_the_name_of_a_file_ends_with_a_whole_word():
+    title = "Orbits of the drum axis front and rear around the largest amplitude of all"
+    assert file_name(title) == "orbits_of_the_drum_axis_front_and_rear_around_the_largest"
+    assert file_name("a" * 80) == "a" * 60
+    assert file_name("b" * 60) == "b" * 60
+
+
+def test_the_data_of_a_spectrum_are_compressed(tmp_path):
+    values = np.arange(30_000.0).reshape(100, 300)
+    cells = Cells(values, np.arange(300), np.arange(100), scale=Scale(low=0.0, high=3e4))
+    with collected() as figures:
+        picture(Figure(panels=(Panel(marks=(cells,)),)), "Map", "")
+    write_figures(figures, tmp_path)
+    path = tmp_path / "01_map.csv.gz"
+    assert path.stat().st_size < 0.2 * 30_000 * 20
+    assert pd.read_csv(path).value.tolist() == values.ravel().tolist()
+
+
 def test_drawing_has_the_axes_of_the_declaration():
     axes = matplotlib_of(every_mark()).axes
     left = next(a for a in axes if a.get_xlabel() == "time, s")

@@ -120,9 +120,16 @@ def test_measures_that_a_record_lacks_are_nan(machine):
         _ = measures.amplitud
 
 
+@pytest.mark.parametrize("name", ["amplitudes", "amplitude", "critical_speed"])
+def test_a_measure_has_the_names_of_its_variables_too(machine, name):
+    """As responses of a study do."""
+    table = simulate_many(machine, CASES[:1], measures=["amplitudes", name])
+    assert set(table.data_vars) == {"amplitude", "critical_speed", "diverged"}
+
+
 def test_unknown_and_repeated_names_are_refused(machine):
-    with pytest.raises(InputError, match=r"no measure 'amplitude'.*did you mean 'amplitudes'"):
-        simulate_many(machine, CASES[:1], measures=["amplitude"])
+    with pytest.raises(InputError, match=r"no measure 'amplitud'.*did you mean 'amplitudes'"):
+        simulate_many(machine, CASES[:1], measures=["amplitud"])
     again = type(MEASURES["gap"])("gap", (), MEASURES["gap"].evaluate)
     with pytest.raises(ValueError, match="measure 'gap' is registered already"):
         register_measure(again)

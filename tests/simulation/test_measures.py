@@ -159,6 +159,9 @@ def test_measures_are_a_table_in_units_for_reading(machine):
     rows = measures.to_dataframe().set_index(["measure", "of"])
     assert rows.value["amplitude", "Xr"] == 1e3 * measures.amplitude.sel(sensor="Xr")
     assert rows.unit["amplitude", "Xr"] == "mm"
-    assert "<td>Xr</td>" in measures._repr_html_()
+    shown = measures._repr_html_()
+    assert "<td>Xr</td>" in shown
+    assert "smallest gap needs wm.measure(record, wm.Scene(parameters))" in shown
+    assert rows.value.notna().all()
     bars = measures.plot().patches
     assert [bar.get_height() for bar in bars] == pytest.approx(1e3 * measures.amplitude.values)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from wm_drake.errors import InputError
-from wm_drake.studies.result_folder import RUN_FILE, SUFFIX, Run, check_folder, result_folder
+from wm_drake.studies.result_folder import RUN_FILE, SUFFIX, CommandRun, check_folder, result_folder
 
 OUT = Path("out")
 
@@ -33,13 +33,13 @@ def content(out=OUT):
 
 
 def test_second_run_needs_overwrite_and_leaves_nothing_stale():
-    written(Run("spin"), "report.html", "record_middle.nc")
+    written(CommandRun("spin"), "report.html", "record_middle.nc")
     before = content()
     with pytest.raises(InputError, match=r"out: holds an earlier run .*add --overwrite"):
-        written(Run("spin"), "report.html", "record_front.nc")
+        written(CommandRun("spin"), "report.html", "record_front.nc")
     assert content() == before
     Path("out/notes.txt").write_text("mine")
-    written(Run("spin", overwrite=True), "report.html", "record_front.nc")
+    written(CommandRun("spin", overwrite=True), "report.html", "record_front.nc")
     assert sorted(content()) == ["notes.txt", "record_front.nc", "report.html"]
     assert json.loads((OUT / RUN_FILE).read_text())["files"] == ["record_front.nc", "report.html"]
 
@@ -50,42 +50,42 @@ def test_files_that_no_run_wrote_are_never_touched(name, overwrite):
     OUT.mkdir()
     (OUT / name).write_text("mine")
     with pytest.raises(InputError, match=r"out: holds .* choose an empty or a new folder"):
-        written(Run("spin", overwrite), "report.html")
+        written(CommandRun("spin", overwrite), "report.html")
     assert content() == {name: "mine"}
 
 
 def test_file_of_the_user_with_the_name_of_a_result_is_kept():
-    written(Run("spin"), "report.html")
+    written(CommandRun("spin"), "report.html")
     (OUT / "record_a.nc").write_text("mine")
     with pytest.raises(InputError, match=r"'record_a.nc' that no run wrote"):
-        written(Run("spin", overwrite=True), "report.html", "record_a.nc")
+        written(CommandRun("spin", overwrite=True), "report.html", "record_a.nc")
     assert content() == {"record_a.nc": "mine", "report.html": "spin report.html"}
 
 
 def test_empty_folder_and_hidden_files_are_no_obstacle():
     OUT.mkdir()
     (OUT / ".DS_Store").write_text("")
-    written(Run("spin"), "report.html")
+    written(CommandRun("spin"), "report.html")
     assert "report.html" in content()
 
 
 def test_study_continues_and_another_one_is_named():
-    first = Run("study gasket", identity={"machine": "a", "design": "full"})
+    first = CommandRun("study gasket", identity={"machine": "a", "design": "full"})
     OUT.mkdir()
     (OUT / "ledger.sqlite").write_text("")
     (OUT / "ledger.sqlite-wal").write_text("")
     written(first, "report.html")
     written(first, "report.html")
-    other = Run("study gasket", identity={"machine": "a", "design": "d-optimal"})
+    other = CommandRun("study gasket", identity={"machine": "a", "design": "d-optimal"})
     with pytest.raises(InputError, match=r"design is 'full' there and 'd-optimal' now"):
         written(other, "report.html")
-    written(Run("study gasket", overwrite=True, identity=other.identity), "report.html")
+    written(CommandRun("study gasket", overwrite=True, identity=other.identity), "report.html")
     check_folder(OUT, other)
     assert "ledger.sqlite" in content()
 
 
 def test_run_file_has_date_version_and_revision():
-    written(Run("spin"), "report.html")
+    written(CommandRun("spin"), "report.html")
     run = json.loads((OUT / RUN_FILE).read_text())
     assert run["command"] == "spin"
     assert time.strptime(run["date"], "%Y-%m-%d %H:%M %z")
@@ -107,15 +107,15 @@ def test_damaged_run_file_is_refused(text):
     OUT.mkdir()
     (OUT / RUN_FILE).write_text(text)
     with pytest.raises(InputError, match="does not describe a run"):
-        written(Run("spin", overwrite=True), "report.html")
+        written(CommandRun("spin", overwrite=True), "report.html")
     assert Path("thesis.tex").read_text() == "mine"
 
 
 def test_two_runs_at_once_do_not_mix():
     def second_during_first():
-        with result_folder(OUT, Run("spin")) as folder:
+        with result_folder(OUT, CommandRun("spin")) as folder:
             (folder / "record_a.nc").write_text("a")
-            written(Run("spin"), "record_b.nc")
+            written(CommandRun("spin"), "record_b.nc")
 
     with pytest.raises(InputError, match="holds an earlier run"):
         second_during_first()
@@ -124,7 +124,7 @@ def test_two_runs_at_once_do_not_mix():
 
 
 def test_run_killed_while_moving_can_be_replaced(monkeypatch):
-    written(Run("spin"), "report.html", "record_a.nc")
+    written(CommandRun("spin"), "report.html", "record_a.nc")
     replace, moves = Path.replace, []
 
     def killed(path, target):
@@ -136,8 +136,8 @@ def test_run_killed_while_moving_can_be_replaced(monkeypatch):
     with monkeypatch.context() as patched:
         patched.setattr(Path, "replace", killed)
         with pytest.raises(KeyboardInterrupt):
-            written(Run("spin", overwrite=True), "report.html", "record_b.nc")
-    written(Run("spin", overwrite=True), "report.html", "record_c.nc")
+            written(CommandRun("spin", overwrite=True), "report.html", "record_b.nc")
+    written(CommandRun("spin", overwrite=True), "report.html", "record_c.nc")
     assert sorted(content()) == ["record_c.nc", "report.html"]
 
 
@@ -148,7 +148,7 @@ def test_folder_of_a_dead_process_is_removed_and_that_of_a_living_one_stays(tmp_
     for folder in (dead, *others):
         folder.mkdir()
         (folder / "file").write_text("x", encoding="utf-8")
-    run = Run("spin", overwrite=True)
+    run = CommandRun("spin", overwrite=True)
     with result_folder(out, run) as living, result_folder(out, run) as folder:
         assert not dead.exists()
         assert living.is_dir()
@@ -168,14 +168,14 @@ def test_killed_process_leaves_a_folder_that_the_next_run_removes(tmp_path):
     )
     subprocess.run([sys.executable, "-c", code], check=False)
     assert len(list(tmp_path.iterdir())) == 1
-    with result_folder(tmp_path / "out", Run("spin")):
+    with result_folder(tmp_path / "out", CommandRun("spin")):
         pass
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
 
 def test_full_disk_ends_with_a_message_and_nothing_written(tmp_path):
     def write():
-        with result_folder(tmp_path / "out", Run("spin")) as folder:
+        with result_folder(tmp_path / "out", CommandRun("spin")) as folder:
             (folder / "half.csv").write_text("x", encoding="utf-8")
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
@@ -185,7 +185,7 @@ def test_full_disk_ends_with_a_message_and_nothing_written(tmp_path):
 
 
 def test_other_errors_of_the_system_pass(tmp_path):
-    with pytest.raises(ConnectionError), result_folder(tmp_path / "out", Run("spin")):
+    with pytest.raises(ConnectionError), result_folder(tmp_path / "out", CommandRun("spin")):
         raise ConnectionResetError(errno.ECONNRESET, "reset")
 
 
@@ -214,5 +214,5 @@ def test_file_system_without_locks_is_refused_and_left_clean(monkeypatch):
 
     monkeypatch.setattr("wm_drake.studies.result_folder.fcntl.flock", no_locks)
     with pytest.raises(InputError, match="out: cannot be written to: No locks available"):
-        written(Run("spin"), "report.html")
+        written(CommandRun("spin"), "report.html")
     assert list(Path().iterdir()) == []

@@ -13,9 +13,9 @@ from wm_drake.errors import InputError
 from wm_drake.studio import jobs as jobs_module
 from wm_drake.studio.jobs import Jobs
 from wm_drake.studio.machines import Machines
-from wm_drake.studio.state import State
+from wm_drake.studio.state import PageState
 
-STATE = State(machine="reference", load="middle", values={"gasket.stiffness_x": "4 N/mm"})
+STATE = PageState(machine="reference", load="middle", values={"gasket.stiffness_x": "4 N/mm"})
 PROGRAM = """
 import sys, pathlib, time
 arguments = sys.argv[3:]

@@ -16,7 +16,7 @@ from typing import Any
 
 import xarray as xr
 
-from wm_drake.batch.ledger import Ledger, Result
+from wm_drake.batch.ledger import Ledger, LedgerEntry
 from wm_drake.batch.many import BatchOptions, simulate_many
 from wm_drake.batch.remembered import keyed, sources_version
 from wm_drake.batch.run_table import RunTable
@@ -180,7 +180,7 @@ def simulate_on_cluster(
                 running.setdefault(key, []).append((number, case.name))
                 yield key, case
 
-    def put(result: Result, number: int, name: str) -> None:
+    def put(result: LedgerEntry, number: int, name: str) -> None:
         table.put(number, name, result.values, result.note)
 
     queue = missing()
@@ -284,7 +284,7 @@ def run_work_item(
     work_item: tuple[tuple[str, Case], ...],
     measures: tuple[str, ...],
     step: float | None,
-) -> dict[str, Result]:
+) -> dict[str, LedgerEntry]:
     """Run the cases of a work item in the process of a worker and return their results by key.
 
     Args:
@@ -294,7 +294,7 @@ def run_work_item(
         step: Step size; None for that of the machine. [s]
     """
     cases = [case for _, case in work_item]
-    results: dict[str, Result] = {}
+    results: dict[str, LedgerEntry] = {}
     simulate_many(
         _built_machine(
             _HashableParameters(parameters.model_dump_json(exclude={"sources"}), parameters)
@@ -304,7 +304,7 @@ def run_work_item(
         step=step,
         workers=1,
         finished=lambda run: results.update(
-            {work_item[run.number][0]: Result(run.values, run.diverged)}
+            {work_item[run.number][0]: LedgerEntry(run.values, run.diverged)}
         ),
     )
     return results

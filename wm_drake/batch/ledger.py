@@ -54,7 +54,7 @@ class LedgerError(WmDrakeError):
 
 
 @dataclasses.dataclass(frozen=True)
-class Result:
+class LedgerEntry:
     """A finished result: named arrays, and a note (for example, why a run ended early)."""
 
     values: dict[str, FloatArray]
@@ -78,7 +78,7 @@ class Ledger:
     def __len__(self) -> int:
         return len(self._keys)
 
-    def get(self, key: str) -> Result:
+    def get(self, key: str) -> LedgerEntry:
         """Return the result with a key.
 
         Raises:
@@ -96,7 +96,7 @@ class Ledger:
             raise LedgerError(
                 f"{self.path}: is damaged: the checksum of result {key} is wrong; {_UNCHANGED}"
             )
-        return Result(_unpacked(shapes, numbers), note)
+        return LedgerEntry(_unpacked(shapes, numbers), note)
 
     def put(self, key: str, values: Mapping[str, Any], note: str = "") -> None:
         """Store a result; when the call returns, the result is safe against a kill of the process.
@@ -114,14 +114,14 @@ class Ledger:
         """
         self.put_all(
             {
-                key: Result(
+                key: LedgerEntry(
                     {name: np.asarray(value, dtype=np.float64) for name, value in values.items()},
                     note,
                 )
             }
         )
 
-    def put_all(self, results: Mapping[str, Result]) -> None:
+    def put_all(self, results: Mapping[str, LedgerEntry]) -> None:
         """Store several results in one transaction: all or none.
 
         This is much faster than storing them one by one.

@@ -17,7 +17,7 @@ from wm_drake.model.machine import Machine
 from wm_drake.simulation.cases import Case, case_of, notice_jumping_friction
 from wm_drake.simulation.feet import cabinet_of
 from wm_drake.simulation.first_call import compile_in_two_processes
-from wm_drake.simulation.measures import MEASURES
+from wm_drake.simulation.measures import MEASURES, measure_named
 from wm_drake.simulation.steps import checked_integrator, checked_step
 
 AHEAD = 3
@@ -57,8 +57,9 @@ def simulate_many(
         machine: A built machine, its parameters, or its name or file.
         cases: Cases to run, or names of loads of the machine. They are taken one by one as needed,
             so memory stays constant if this is a generator.
-        measures: Names of measures, keys of `wm_drake.simulation.measures.MEASURES`, such as
-            "extremes" (D, F and M of [B]), "amplitudes" (and critical speeds), "gap", "mounts".
+        measures: Names of measures or of their variables, in
+            `wm_drake.simulation.measures.MEASURES`, such as "extremes" (D, F and M of [B]),
+            "amplitudes" or "amplitude" (and critical speeds), "gap", "mounts".
         step: Step size; the output period of 5 ms must be an integer multiple of it. If None, the
             step size of the machine is used. [s]
         integrator: Integrator, as in `simulate`; None for that of the machine.
@@ -84,7 +85,8 @@ def simulate_many(
         {'run': 2, 'sensor': 6}
     """
     machine = machine_of(machine)
-    chosen = tuple(MEASURES.find(name, key="measures").name for name in dict.fromkeys(measures))
+    named = dict.fromkeys(measure_named(name, key="measures") for name in measures)
+    chosen = tuple(measure.name for measure in named)
     parameters = machine.parameters
     listed = (case_of(parameters, case) if isinstance(case, str) else case for case in cases)
     table = RunTable(parameters, chosen)

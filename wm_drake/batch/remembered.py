@@ -8,7 +8,7 @@ from pathlib import Path
 
 import xarray as xr
 
-from wm_drake.batch.ledger import Ledger, Result, key_of
+from wm_drake.batch.ledger import Ledger, LedgerEntry, key_of
 from wm_drake.batch.many import BatchOptions, SimulationInterrupted, run_cases
 from wm_drake.batch.run_table import RunTable
 from wm_drake.batch.runs import RunResult
@@ -132,7 +132,10 @@ def simulate_remembered(
         places = [running.pop(run.number) for run in runs]
         # runs that end together are stored together
         ledger.put_all(
-            {key: Result(r.values, r.diverged) for (_, key), r in zip(places, runs, strict=True)}
+            {
+                key: LedgerEntry(r.values, r.diverged)
+                for (_, key), r in zip(places, runs, strict=True)
+            }
         )
         for (number, _), run in zip(places, runs, strict=True):
             table.put(number, run.case.name, run.values, run.diverged)

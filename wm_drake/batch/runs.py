@@ -47,7 +47,7 @@ _NONE = np.empty(0, dtype=np.int64)
 
 
 @dataclass(frozen=True)
-class TubMotion:
+class ShownMotion:
     """The motion of a run, for a picture; a record, with all forces, takes much longer.
 
     Attributes:
@@ -88,7 +88,7 @@ class RunResult:
     diverged: str
     record: Record | None
     gap: Gap | None = None
-    motion: TubMotion | None = None
+    motion: ShownMotion | None = None
 
 
 class Runner:
@@ -331,7 +331,7 @@ class LaneRun(Run):
         """Hold a work item, its schedule, the function that returns the shapes, lane and path."""
         self.item, self.schedule, self._find_scene, self.lane = item, schedule, scene, lane
         self.path = path
-        self.profile, self.period = item.case.profile, item.numbers.setup.parameters.output_period
+        self.profile, self.period = item.case.profile, item.numbers.period
         self.good = int(lane.extremes[-1])
         self._sensors = lane.moved.shape[1] - 3  # the last three points are the detergent point's
 
@@ -385,7 +385,7 @@ class LaneRun(Run):
     def rest_pose(self) -> FloatArray:
         return self.item.begin[:6]
 
-    def motion(self) -> TubMotion | None:
+    def motion(self) -> ShownMotion | None:
         """Return the motion of the run; None if it has fewer than two samples."""
         if self.good < 2:
             return None
@@ -394,7 +394,7 @@ class LaneRun(Run):
             largest = at[np.nanargmax(sizes)]
         else:  # too short to be filtered
             largest = np.argmax(np.abs(self.displacement).max(axis=1))
-        return TubMotion(  # copies: the next batch uses the memory again
+        return ShownMotion(  # copies: the next batch uses the memory again
             self.time,
             self.poses.copy(),
             self.rest_pose.copy(),

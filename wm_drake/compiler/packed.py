@@ -39,7 +39,7 @@ class Fixed:
 
 
 @dataclass(frozen=True)
-class Part:
+class PackedPart:
     """A field with packed numbers of its own, whose size may depend on them.
 
     Attributes:
@@ -69,9 +69,9 @@ def ARRAY(size: int) -> Fixed:  # a kind, like the constants above
     return Fixed(size)
 
 
-def LAYOUT(layout: "PackedLayout") -> Part:
+def LAYOUT(layout: "PackedLayout") -> PackedPart:
     """Return the kind of a field that holds the numbers of another layout."""
-    return Part(layout.size, layout.structure, layout._fixed_size)
+    return PackedPart(layout.size, layout.structure, layout._fixed_size)
 
 
 class PackedLayout:
@@ -87,14 +87,14 @@ class PackedLayout:
             size.
     """
 
-    def __init__(self, name: str, **fields: Fixed | Part) -> None:
+    def __init__(self, name: str, **fields: Fixed | PackedPart) -> None:
         """Generate the laws.
 
         Raises:
             ValueError: A part without a size is not the last field.
         """
         self.name = name
-        self.fields: Mapping[str, Fixed | Part] = fields
+        self.fields: Mapping[str, Fixed | PackedPart] = fields
         self.offsets: dict[str, int] = {}
         self._fixed_size: int | None = None
         self.read: Any
@@ -144,7 +144,7 @@ class PackedLayout:
         write = f"write_{self.name}"
         lines = [f"def {write}(p, at, {', '.join(self.fields)}):"]
         for field, kind in self.fields.items():
-            if isinstance(kind, Part):
+            if isinstance(kind, PackedPart):
                 return
             for k in range(kind.size):
                 value = f"{field}[{k}]" if kind.is_tuple else field
@@ -220,7 +220,7 @@ class PackedLayout:
         return [
             number
             for field, kind in self.fields.items()
-            if isinstance(kind, Part)
+            if isinstance(kind, PackedPart)
             for number in kind.structure(*getattr(numbers, field))
         ]
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from wm_drake.compiler.elementary import whole_number
-from wm_drake.compiler.packed import PackedLayout, Part, generated
+from wm_drake.compiler.packed import PackedLayout, PackedPart, generated
 from wm_drake.elements.layouts import layout_of, packed_fields
 from wm_drake.parameters.damper_laws import DAMPER_LAWS, DamperLaw, DamperNumbers
 from wm_drake.parameters.types import FloatArray
@@ -111,5 +111,5 @@ sponge_with_mass = _choice(
 mass, of a law that has one on the bench; returns tension and velocity of the slider at the end of
 the step. [m, m/s, m/s, s, kg -> N, m/s]"""
 
-LAW = Part(None, law_structure)
+LAW = PackedPart(None, law_structure)
 """Kind of a field that holds a packed damper law; the last of a layout."""

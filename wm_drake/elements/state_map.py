@@ -87,7 +87,7 @@ class Begins(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Part:
+class StatePart:
     """Consecutive states of one part of a machine.
 
     Attributes:
@@ -122,7 +122,7 @@ class StateMap:
         parts: The parts that have states, in their order.
     """
 
-    parts: tuple[Part, ...]
+    parts: tuple[StatePart, ...]
 
     def __hash__(self) -> int:
         """Return a hash, which is computed once: thousands of runs are sorted by their states."""
@@ -133,9 +133,9 @@ class StateMap:
         return hash(self.parts)
 
     @classmethod
-    def of(cls, parts: Iterable[Part]) -> "StateMap":
+    def of(cls, parts: Iterable[StatePart]) -> "StateMap":
         """Return the map of parts in any order; those of one kind keep theirs."""
-        placed, begin = list[Part](), 0
+        placed, begin = list[StatePart](), 0
         for part in sorted(parts, key=lambda part: ORDER.index(part.kind)):
             placed.append(replace(part, begin=begin))
             begin = placed[-1].end
@@ -146,7 +146,7 @@ class StateMap:
         """Return the number of states."""
         return self.parts[-1].end
 
-    def of_kind(self, kind: str) -> list[Part]:
+    def of_kind(self, kind: str) -> list[StatePart]:
         """Return the parts of a kind."""
         return [part for part in self.parts if part.kind == kind]
 
@@ -237,46 +237,48 @@ class StateMap:
         return states
 
 
-def _part(kind: str, roles: Sequence[str], words: str) -> Part:
-    return Part(kind, tuple(roles), (words,) * len(roles))
+def _part(kind: str, roles: Sequence[str], words: str) -> StatePart:
+    return StatePart(kind, tuple(roles), (words,) * len(roles))
 
 
-def tub_part() -> Part:
+def tub_part() -> StatePart:
     """Return the states of tub and drum."""
     return _part(TUB, TREE_ROLES, TUB_WORDS)
 
 
-def sponge_part(name: str) -> Part:
+def sponge_part(name: str) -> StatePart:
     """Return the state of a strut damper: the deformation of its sponge, if it has one."""
     return _part(STRUT_SPONGE, [SPONGE], f"the sponge of damper '{name}'")
 
 
-def tubes_part(name: str) -> Part:
+def tubes_part(name: str) -> StatePart:
     """Return the states of a telescopic damper."""
     tubes, sponge = f"the tubes of damper '{name}'", f"the sponge of damper '{name}'"
-    return Part(TUBES, (*TREE_ROLES, SPONGE), (*[tubes] * len(TREE_ROLES), sponge))
+    return StatePart(TUBES, (*TREE_ROLES, SPONGE), (*[tubes] * len(TREE_ROLES), sponge))
 
 
-def stretches_part(name: str, roles: Sequence[str]) -> Part:
+def stretches_part(name: str, roles: Sequence[str]) -> StatePart:
     """Return the states of a bushing of rubber, each of the role `FRICTION` or `MAXWELL`."""
-    return Part(STRETCHES, tuple(roles), tuple(f"the {role} of bushing '{name}'" for role in roles))
+    return StatePart(
+        STRETCHES, tuple(roles), tuple(f"the {role} of bushing '{name}'" for role in roles)
+    )
 
 
-def element_part(name: str, size: int) -> Part:
+def element_part(name: str, size: int) -> StatePart:
     """Return the states of an element of another package."""
     return _part(ELEMENT, [ELEMENT_STATE] * size, f"element '{name}'")
 
 
-def carrier_part() -> Part:
+def carrier_part() -> StatePart:
     """Return the states of the drum carrier in a compliant bearing."""
     return _part(CARRIER, BODY_ROLES, BEARING_WORDS)
 
 
-def drive_part() -> Part:
+def drive_part() -> StatePart:
     """Return the states of a drive with a motor."""
     return _part(DRIVE, [CONTROL] * MOTOR_STATE_SIZE, DRIVE_WORDS)
 
 
-def cabinet_part() -> Part:
+def cabinet_part() -> StatePart:
     """Return the states of a cabinet that moves."""
     return _part(CABINET, [*BODY_ROLES, *[SLIP] * SLIP_SIZE], CABINET_WORDS)

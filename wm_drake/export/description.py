@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
 
-from wm_drake.export.model import ExportedModel, Variable
+from wm_drake.export.model import ExportedModel, FmuVariable
 from wm_drake.parameters.units import registry
 
 DIMENSIONS = {"[mass]": "kg", "[length]": "m", "[time]": "s", "[angle]": "rad", "[current]": "A"}
@@ -82,7 +82,7 @@ def _add_kinds(root: ET.Element, identity: Identity) -> None:
                 ET.SubElement(files, "File", name=name)
 
 
-def _add_units(root: ET.Element, variables: Sequence[Variable]) -> None:
+def _add_units(root: ET.Element, variables: Sequence[FmuVariable]) -> None:
     definitions = ET.SubElement(root, "UnitDefinitions")
     for unit in sorted({v.unit for v in variables if v.unit} | {"s"}):
         element = ET.SubElement(definitions, "Unit", name=unit)
@@ -95,7 +95,7 @@ def _base_unit(unit: str) -> dict[str, str]:
     return {DIMENSIONS[name]: str(round(power)) for name, power in powers.items() if power}
 
 
-def _attributes(variable: Variable) -> dict[str, str]:
+def _attributes(variable: FmuVariable) -> dict[str, str]:
     """Return what both versions write of a variable alike."""
     attributes = {
         "name": variable.name,
@@ -111,7 +111,7 @@ def _attributes(variable: Variable) -> dict[str, str]:
     return attributes
 
 
-def _of_float(variable: Variable) -> dict[str, str]:
+def _of_float(variable: FmuVariable) -> dict[str, str]:
     """Return the attributes of a number."""
     attributes = {"unit": variable.unit} if variable.unit else {}
     for name, value in (

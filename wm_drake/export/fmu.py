@@ -31,7 +31,7 @@ from wm_drake.engines.trajectory import LARGEST_ANGLE, LARGEST_DISPLACEMENT, LAR
 from wm_drake.errors import check_known, input_error, shortened
 from wm_drake.export.description import IDENTIFIER, Identity, model_description
 from wm_drake.export.kernel import kernel_code
-from wm_drake.export.model import ExportedModel, Variable, exported_model
+from wm_drake.export.model import ExportedModel, FmuVariable, exported_model
 from wm_drake.export.object_code import (
     PLATFORMS,
     Platform,
@@ -345,7 +345,7 @@ spin profile of the machine.</p>
     return text.encode()
 
 
-def _row(variable: Variable) -> str:
+def _row(variable: FmuVariable) -> str:
     start = "" if variable.start is None else f"{variable.start:.6g}"
     return (
         f"<tr><td>{html.escape(variable.name)}</td><td>{variable.causality}</td>"

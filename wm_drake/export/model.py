@@ -38,7 +38,7 @@ LARGEST_DRUM_TORQUE = 1e4
 
 
 @dataclass(frozen=True)
-class Variable:
+class FmuVariable:
     """A variable of an FMU.
 
     Attributes:
@@ -63,9 +63,9 @@ class Variable:
     variability: Literal["continuous", "tunable"] = "continuous"
 
 
-_input = partial(Variable, causality="input")
-_output = partial(Variable, causality="output")
-_tunable = partial(Variable, causality="parameter", variability="tunable")
+_input = partial(FmuVariable, causality="input")
+_output = partial(FmuVariable, causality="output")
+_tunable = partial(FmuVariable, causality="parameter", variability="tunable")
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class ExportedModel:
     plan: Any
     numbers: FloatArray
     constants: FloatArray
-    variables: tuple[Variable, ...] = field(repr=False)
+    variables: tuple[FmuVariable, ...] = field(repr=False)
     states: tuple[int, ...]
     step: float
     load: str
@@ -270,7 +270,7 @@ class _Contents:
         numbers[at.state : at.rate] = initial_state(self.setup, standing)
         return numbers
 
-    def _variables(self, at: Any, numbers: FloatArray) -> list[Variable]:
+    def _variables(self, at: Any, numbers: FloatArray) -> list[FmuVariable]:
         """Return all variables, in the order of the array."""
         return [
             *self._inputs(at, numbers),
@@ -279,7 +279,7 @@ class _Contents:
             *self._states(at, numbers),
         ]
 
-    def _inputs(self, at: Any, numbers: FloatArray) -> list[Variable]:
+    def _inputs(self, at: Any, numbers: FloatArray) -> list[FmuVariable]:
         if self.input_kind == "speed":
             variables = _speed_inputs(at, float(numbers[at.speed]))
         else:
@@ -300,7 +300,7 @@ class _Contents:
             ]
         return variables
 
-    def _parameters(self, at: Any) -> list[Variable]:
+    def _parameters(self, at: Any) -> list[FmuVariable]:
         return [
             _tunable(
                 structured(t.key), at.parameters + k, t.unit.si,
@@ -309,8 +309,8 @@ class _Contents:
             for k, t in enumerate(self.tuned)
         ]  # fmt: skip
 
-    def _outputs(self, at: Any) -> list[Variable]:
-        variables: list[Variable] = []
+    def _outputs(self, at: Any) -> list[FmuVariable]:
+        variables: list[FmuVariable] = []
 
         def add(names: Sequence[str], begin: int, unit: str, words: str) -> None:
             variables.extend(_output(name, begin + k, unit, words) for k, name in enumerate(names))
@@ -357,8 +357,8 @@ class _Contents:
             add(["gap"], at.gap, "m", "smallest distance of tub group and housing (lower bound)")
         return variables
 
-    def _states(self, at: Any, numbers: FloatArray) -> list[Variable]:
-        variables: list[Variable] = []
+    def _states(self, at: Any, numbers: FloatArray) -> list[FmuVariable]:
+        variables: list[FmuVariable] = []
         driven = set(self.states.indices(kinds=[DRIVE]).tolist())
         roles = self.states.kinds()
         words = self.states.words()
@@ -369,13 +369,13 @@ class _Contents:
             start = float(numbers[place])
             nominal = 1.0 if roles[k][1] not in PLACES else 0.1
             variables += [
-                Variable(name, place, words=about, start=start, nominal=nominal),
-                Variable(f"der({name})", rate, words=f"rate: {about}", derivative=place),
+                FmuVariable(name, place, words=about, start=start, nominal=nominal),
+                FmuVariable(f"der({name})", rate, words=f"rate: {about}", derivative=place),
             ]
         return variables
 
 
-def _speed_inputs(at: Any, speed: float) -> list[Variable]:
+def _speed_inputs(at: Any, speed: float) -> list[FmuVariable]:
     """Return the inputs of a machine whose drum follows a speed."""
     of_speed = "speed of the drum against the tub"
     of_rate = (

@@ -11,7 +11,7 @@ import numpy as np
 
 from wm_drake.compiler.compilation import law
 from wm_drake.compiler.elementary import anywhere, everywhere, where, whole_number
-from wm_drake.compiler.packed import SCALAR, PackedLayout, Part
+from wm_drake.compiler.packed import SCALAR, PackedLayout, PackedPart
 
 _PIECE = PackedLayout("Piece", begin=SCALAR, y=SCALAR, a=SCALAR, b=SCALAR, c=SCALAR)
 """A piece of a table: its begin and its four coefficients, the constant first."""
@@ -109,5 +109,5 @@ def number_of_points(packed, at):
     return [whole_number(packed[at])]
 
 
-CURVE = Part(packed_size, number_of_points)
+CURVE = PackedPart(packed_size, number_of_points)
 """Kind of a field that holds a packed stiffness."""

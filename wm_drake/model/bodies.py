@@ -4,13 +4,15 @@ import copy
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
-from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
     FixedOffsetFrame,
+    Frame,
     JointActuator,
     PrismaticJoint,
     RevoluteJoint,
@@ -23,12 +25,21 @@ from pydrake.multibody.tree import (
 
 from wm_drake.errors import InputError, Problem, check_known, input_error, nearest_names, shortened
 from wm_drake.model.rotor import set_rotor
-from wm_drake.model.sdf_files import LARGEST_SDF, check_mass_properties, check_shapes, sdf_roots
+from wm_drake.model.sdf_files import (
+    LARGEST_SDF,
+    PACKAGE,
+    check_elements,
+    check_mass_properties,
+    readable,
+    sdf_roots,
+)
 from wm_drake.model.sdf_names import frame_problems, sdf_names
+from wm_drake.model.sdf_text import Node
 from wm_drake.model.state_layout import CABINET, CARRIER
 from wm_drake.parameters import BodyOverride, InertiaMatrix, Load, MachineParameters, with_value
 from wm_drake.parameters.cabinet import Cabinet
 from wm_drake.parameters.drive import motor_of
+from wm_drake.parameters.inertia import fault_of_mass_properties
 from wm_drake.parameters.text_files import check_regular, is_file
 from wm_drake.systems.speed_source import REFLECTED_INERTIA
 
@@ -86,10 +97,9 @@ def add_bodies(plant: MultibodyPlant, parameters: MachineParameters) -> None:
     """
     path = sdf_path(parameters.model)
     roots = sdf_roots(path)
-    for each, root in roots.items():
-        check_shapes(each, root)
+    check_elements(roots)
     try:
-        _add_bodies(plant, parameters, path)
+        _add_bodies(plant, parameters, path, roots)
     except (RuntimeError, ValueError, SystemExit) as error:
         # Drake refuses what it reads or joins; it turns failed assertions into exits
         raise unusable(path, error) from None
@@ -97,11 +107,15 @@ def add_bodies(plant: MultibodyPlant, parameters: MachineParameters) -> None:
     check_mass_properties(roots, [body.name() for body in fixed])
 
 
-def _add_bodies(plant: MultibodyPlant, parameters: MachineParameters, path: Path) -> None:
+def _add_bodies(
+    plant: MultibodyPlant, parameters: MachineParameters, path: Path, roots: dict[Path, Node]
+) -> None:
     """Add the bodies of a checked SDF to a plant and finalize it, as `add_bodies` describes."""
     parser = Parser(plant)
     parser.SetStrictParsing()
-    parser.AddModels(str(path))
+    with readable(path, roots) as (file, folder):
+        parser.package_map().Add(PACKAGE, str(folder))
+        parser.AddModels(str(file))
     missing = [
         f"link '{name}'" for name in ("housing", "tub", "drum") if not plant.HasBodyNamed(name)
     ]
@@ -127,9 +141,8 @@ def _add_bodies(plant: MultibodyPlant, parameters: MachineParameters, path: Path
         *(outer_tube(plant, parameters, name) for name in parameters.telescopic_dampers),
     ]
     for body in floating:
-        plant.AddJoint(
-            RpyFloatingJoint(f"{body.name()}_floating", plant.world_frame(), body.body_frame())
-        )
+        frame = _add_drawn_frame(plant, body)
+        plant.AddJoint(RpyFloatingJoint(f"{body.name()}_floating", plant.world_frame(), frame))
     actuator = _drive_actuator(plant, parameters.drive.joint)
     if parameters.imperfections.bearing:
         actuator = _attach_drum_to_carrier(plant, actuator)
@@ -141,6 +154,111 @@ def _add_bodies(plant: MultibodyPlant, parameters: MachineParameters, path: Path
     plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -parameters.gravity])
     plant.Finalize()
     _check_degrees_of_freedom(plant, parameters)
+    _check_axis(plant, parameters.drive.joint, path.name)
+
+
+_DRAWN = "as_drawn"
+"""Model instance of the frames at the places of bodies whose links have a pose in the SDF."""
+
+
+def _add_drawn_frame(plant: MultibodyPlant, body: RigidBody) -> Frame:
+    """Return the frame of a floating body that coincides with W as drawn; add it if needed.
+
+    A link without a pose has its own frame there. The coordinates of the tub are those of this
+    frame, so that all of them are 0 as drawn, wherever the SDF has the frame of the link.
+    """
+    X_WB = plant.GetDefaultFloatingBaseBodyPose(body)
+    if X_WB.IsExactlyIdentity():
+        return body.body_frame()
+    if not plant.HasModelInstanceNamed(_DRAWN):
+        plant.AddModelInstance(_DRAWN)
+    instance = plant.GetModelInstanceByName(_DRAWN)
+    return plant.AddFrame(
+        FixedOffsetFrame(f"{body.name()}_{_DRAWN}", body.body_frame(), X_WB.inverse(), instance)
+    )
+
+
+def drawn_frame(plant: MultibodyPlant, body: RigidBody) -> Frame:
+    """Return the frame of a floating body that coincides with W as drawn: T, of the tub."""
+    name = f"{body.name()}_{_DRAWN}"
+    return plant.GetFrameByName(name) if plant.HasFrameNamed(name) else body.body_frame()
+
+
+def drawn_pose(plant: MultibodyPlant, frame: Frame) -> RigidTransform:
+    """Return the pose of a frame in the `drawn_frame` of its body."""
+    X_BT = drawn_frame(plant, frame.body()).GetFixedPoseInBodyFrame()
+    return X_BT.inverse() @ frame.GetFixedPoseInBodyFrame()
+
+
+_ROUNDING = 1e-9
+"""Largest difference of an axis from the y axis of its link that is rounding. [rad, m]"""
+
+_AXIS_POSES: WeakKeyDictionary[MultibodyPlant, RigidTransform] = WeakKeyDictionary()
+
+
+def axis_pose(plant: MultibodyPlant) -> RigidTransform:
+    """Return the pose of D, in which loads are given, in the frame of the link of the drum.
+
+    D is the link frame if the axis of the drum is its y axis. Otherwise the origin of D is the
+    point of the axis nearest to that of the link, y is along the axis, and z points up as drawn.
+    It is computed once for each plant.
+    """
+    pose = _AXIS_POSES.get(plant)
+    if pose is None:
+        pose = _AXIS_POSES[plant] = _axis_pose(plant)
+    return pose
+
+
+def _axis_pose(plant: MultibodyPlant) -> RigidTransform:
+    joint = plant.get_joint_actuator(plant.GetJointActuatorIndices()[0]).joint()
+    if not isinstance(joint, RevoluteJoint):
+        return RigidTransform()
+    context, drum = plant.CreateDefaultContext(), plant.GetBodyByName(DRUM).body_frame()
+    X_BF = plant.CalcRelativeTransform(context, drum, joint.frame_on_child())
+    axis, point = X_BF.rotation() @ joint.revolute_axis(), X_BF.translation()
+    origin = point - (axis @ point) * axis
+    if np.abs(axis - [0.0, 1.0, 0.0]).max() < _ROUNDING and np.abs(origin).max() < _ROUNDING:
+        return RigidTransform()
+    R_BW = plant.CalcRelativeRotationMatrix(context, drum, plant.world_frame())
+    up = R_BW @ np.array([0.0, 0.0, 1.0])
+    z = up - (axis @ up) * axis
+    z /= np.linalg.norm(z)
+    return RigidTransform(RotationMatrix(np.column_stack([np.cross(axis, z), axis, z])), origin)
+
+
+LARGEST_TILT_DEG = 45.0
+"""Largest angle between the drum axis and y: a front loader's drum is tilted by up to 20 deg."""
+
+
+def _check_axis(plant: MultibodyPlant, joint_name: str, file: str) -> None:
+    """Check that the drum of a finalized plant turns about an axis that points to the rear.
+
+    Raises:
+        InputError: it points elsewhere; the message says how to turn the model.
+    """
+    joint = plant.GetJointByName(joint_name)
+    if not isinstance(joint, RevoluteJoint):
+        return
+    frame = joint.frame_on_parent()
+    R_WF = frame.CalcPoseInWorld(plant.CreateDefaultContext()).rotation()
+    x, y, z = R_WF @ joint.revolute_axis()
+    if y >= np.cos(np.radians(LARGEST_TILT_DEG)):
+        return
+    way = f"{x:.3g} {y:.3g} {z:.3g} of the model"
+    if y <= -np.cos(np.radians(LARGEST_TILT_DEG)):
+        how = "write the opposite <xyz>, and the speeds of the profile below 0"
+    else:
+        turn = f"0 0 {np.sign(x) * 90:g}" if abs(x) > abs(z) else f"{np.sign(z) * -90:g} 0 0"
+        how = (
+            "x points to the right, y from the door to the rear, z up. To turn the model write "
+            f'<pose degrees="true">0 0 0 {turn}</pose> into <model>; if only the axis is wrong, '
+            "write <xyz>0 1 0</xyz>"
+        )
+    raise input_error(
+        f"SDF '{file}': joint '{joint_name}' turns the drum about {way}; allowed is y, from the "
+        f"front to the rear: {how}",
+        key="model",
+    )
 
 
 def outer_tube(plant: MultibodyPlant, parameters: MachineParameters, name: str) -> RigidBody:
@@ -198,7 +316,7 @@ def _attach_drum_to_carrier(plant: MultibodyPlant, actuator: JointActuator) -> J
             key=key,
         )
     name, axis, damping = joint.name(), joint.revolute_axis(), joint.default_damping_vector()[0]
-    X_TF, on_drum = joint.frame_on_parent().GetFixedPoseInBodyFrame(), joint.frame_on_child()
+    X_TF, on_drum = drawn_pose(plant, joint.frame_on_parent()), joint.frame_on_child()
     plant.RemoveJointActuator(actuator)
     plant.RemoveJoint(joint)
     carrier = plant.AddRigidBody(CARRIER, plant.AddModelInstance("bearing"), SpatialInertia.Zero())
@@ -290,8 +408,12 @@ def _loose(plant: MultibodyPlant, parameters: MachineParameters) -> str:
 
 
 def oscillating_bodies(plant: MultibodyPlant) -> list[RigidBody]:
-    """Return the tub, the bodies welded to it, and the drum."""
-    return [*plant.GetBodiesWeldedTo(plant.GetBodyByName("tub")), plant.GetBodyByName("drum")]
+    """Return the tub and the drum, each with the bodies that are welded to it."""
+    return [
+        body
+        for name in ("tub", DRUM)
+        for body in plant.GetBodiesWeldedTo(plant.GetBodyByName(name))
+    ]
 
 
 def set_bodies(plant: MultibodyPlant, context: Any, parameters: MachineParameters) -> None:
@@ -306,7 +428,7 @@ def set_bodies(plant: MultibodyPlant, context: Any, parameters: MachineParameter
     for name, override in parameters.bodies.items():
         body = plant.GetBodyByName(name)
         body.SetSpatialInertiaInBodyFrame(
-            context, _overridden(body.default_spatial_inertia(), override)
+            context, _overridden(name, body.default_spatial_inertia(), override)
         )
     if parameters.cabinet is not None and parameters.cabinet.moves:
         body = plant.GetBodyByName(CABINET)
@@ -321,9 +443,20 @@ def set_bodies(plant: MultibodyPlant, context: Any, parameters: MachineParameter
 
 def add_load(plant: MultibodyPlant, context: Any, load: Load) -> None:
     """Add the point masses of a load to the drum in a plant Context."""
-    drum = plant.GetBodyByName(DRUM)
-    loaded = with_load(drum.CalcSpatialInertiaInBodyFrame(context), load)
-    drum.SetSpatialInertiaInBodyFrame(context, loaded)
+    drum, X_BD = plant.GetBodyByName(DRUM), axis_pose(plant)
+    loaded = with_load(moved_to(drum.CalcSpatialInertiaInBodyFrame(context), X_BD), load)
+    drum.SetSpatialInertiaInBodyFrame(context, moved_to(loaded, X_BD.inverse()))
+
+
+def moved_to(inertia: SpatialInertia, pose: RigidTransform) -> SpatialInertia:
+    """Return a spatial inertia about the origin and in the axes of another frame.
+
+    Args:
+        pose: Pose of that frame in the frame in which the inertia is given.
+    """
+    if pose.IsExactlyIdentity():
+        return inertia
+    return inertia.Shift(pose.translation()).ReExpress(pose.rotation().inverse())
 
 
 def with_load(drum: SpatialInertia, load: Load) -> SpatialInertia:
@@ -364,8 +497,12 @@ def _unbalanced(drum: SpatialInertia, load: Load) -> SpatialInertia:
         ) from None
 
 
-def _overridden(inertia: SpatialInertia, override: BodyOverride) -> SpatialInertia:
-    """Return a spatial inertia with the parts of an override; a new mass scales the inertia."""
+def _overridden(name: str, inertia: SpatialInertia, override: BodyOverride) -> SpatialInertia:
+    """Return a spatial inertia with the parts of an override; a new mass scales the inertia.
+
+    Raises:
+        InputError: no part of a machine has such an inertia for its mass.
+    """
     mass = inertia.get_mass() if override.mass is None else override.mass
     centre = (
         inertia.get_com() if override.centre_of_mass is None else np.array(override.centre_of_mass)
@@ -375,6 +512,8 @@ def _overridden(inertia: SpatialInertia, override: BodyOverride) -> SpatialInert
         about_centre = central * (mass / inertia.get_mass())
     else:
         about_centre = rotational_inertia(override.inertia)
+        if fault := fault_of_mass_properties(mass, override.inertia.matrix):
+            raise input_error(fault, key=f"bodies.{name}.inertia")
     return SpatialInertia.MakeFromCentralInertia(mass, centre, about_centre)
 
 
@@ -421,7 +560,7 @@ def _mass_properties(plant: MultibodyPlant, name: str, override: BodyOverride) -
             for index in plant.GetBodyIndices(plant.GetBodyByName("tub").model_instance())
         ]
         check_known(name, links, f"no link '{name}' in the SDF", key=f"bodies.{name}")
-    inertia = _overridden(plant.GetBodyByName(name).default_spatial_inertia(), override)
+    inertia = _overridden(name, plant.GetBodyByName(name).default_spatial_inertia(), override)
     matrix = inertia.Shift(inertia.get_com()).CalcRotationalInertia().CopyToFullMatrix3()
     indices = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
     return {

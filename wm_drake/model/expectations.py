@@ -3,6 +3,7 @@
 What is unexpected is legal: it is reported as unusual, not refused.
 """
 
+import itertools
 from collections.abc import Iterator
 
 import numpy as np
@@ -10,12 +11,14 @@ import numpy as np
 from wm_drake.elements.layouts import packed_stiffness
 from wm_drake.errors import Problem
 from wm_drake.laws.table import stiffness_force
-from wm_drake.model.bodies import oscillating_bodies
+from wm_drake.model.bodies import drawn_frame, oscillating_bodies
 from wm_drake.model.equilibrium import spring_force
 from wm_drake.model.machine import Setup
 from wm_drake.model.scene import Outline, Scene
 from wm_drake.parameters.elements import ForceTable, TorqueTable
+from wm_drake.parameters.inertia import unlikely_mass_properties
 from wm_drake.parameters.plausibility import unusual_numbers
+from wm_drake.parameters.types import FloatArray
 
 LARGEST_RING_RADIUS = 0.2
 """Radius of the largest usual gasket: 150 to 200 mm. [m]"""
@@ -51,6 +54,7 @@ def unexpected(setup: Setup, scene: Scene) -> list[Problem]:
         *_gasket_place(setup, scene),
         *_unbalance_radii(setup, scene),
         *_densities(setup, scene),
+        *_inertias(setup, scene),
     ]
 
 
@@ -186,6 +190,27 @@ def _densities(setup: Setup, scene: Scene) -> Iterator[Problem]:
                 f"{body.get_mass(setup.plant_context):.4g} kg in the shape of the SDF are "
                 f"{density:.0f} kg/m^3, which is unusual; usual is up to {largest:.0f} ({what})",
             )
+
+
+def _inertias(setup: Setup, scene: Scene) -> Iterator[Problem]:
+    """Yield a problem for each body whose inertia fits neither its mass nor its shapes."""
+    plant, context = setup.machine.plant, setup.plant_context
+    tub = drawn_frame(plant, plant.GetBodyByName("tub"))
+    for body in oscillating_bodies(plant):
+        M_B = body.CalcSpatialInertiaInBodyFrame(context)
+        centre = plant.CalcRelativeTransform(context, tub, body.body_frame()) @ M_B.get_com()
+        outlines = scene.outlines(body.name()).values()
+        reach = max((_farthest(outline, centre) for outline in outlines), default=np.inf)
+        matrix = M_B.Shift(M_B.get_com()).CalcRotationalInertia().CopyToFullMatrix3()
+        if remark := unlikely_mass_properties(M_B.get_mass(), matrix, reach):
+            yield Problem("", f"bodies.{body.name()}.inertia", remark)
+
+
+def _farthest(outline: Outline, point: FloatArray) -> float:
+    """Return the largest distance of a corner of an outline from a point in T. [m]"""
+    signs = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
+    corners = outline.centre + (signs * outline.half) @ outline.axes
+    return float(np.linalg.norm(corners - point, axis=1).max())
 
 
 def _extent(outline: Outline, axis: int) -> tuple[float, float]:

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
+from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import MultibodyPlant
 
 from wm_drake.compiler.vectors import rotation_from_rpy
 from wm_drake.elements.bushing import AXES
 from wm_drake.elements.sensor import MEASURED_POINT
-from wm_drake.model.bodies import DRUM, set_bodies
+from wm_drake.model.bodies import DRUM, axis_pose, drawn_frame, set_bodies
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
 
@@ -31,7 +32,7 @@ class FramePoses:
         Raises:
             InputError: names unknown to the SDF.
         """
-        self.frames, self._plant, self._drive = parameters.frames, plant, parameters.drive.joint
+        self.frames, self._plant = parameters.frames, plant
         self._context = plant.CreateDefaultContext()
         set_bodies(plant, self._context, parameters)
         self._known: dict[tuple[str, str], tuple[FloatArray, FloatArray]] = {}
@@ -40,9 +41,10 @@ class FramePoses:
     def __call__(self, body: str, frame: str) -> tuple[FloatArray, FloatArray]:
         """Return position (3,) [m] and rotation (3, 3) of a frame in the frame of a body."""
         if (body, frame) not in self._known:
-            body_frame = self._plant.GetBodyByName(body).body_frame()
             pose = self._plant.CalcRelativeTransform(
-                self._context, body_frame, self._plant.GetFrameByName(frame)
+                self._context,
+                drawn_frame(self._plant, self._plant.GetBodyByName(body)),
+                self._plant.GetFrameByName(frame),
             )
             self._known[body, frame] = (
                 np.array(pose.translation()),
@@ -64,17 +66,9 @@ class FramePoses:
             y: Position along the axis from the origin of D. [m]
         """
         position, rotation = self("tub", self._plant.GetBodyByName(DRUM).body_frame().name())
-        joint = self._plant.GetJointByName(self._drive)
-        frame = joint.frame_on_parent()
-        X_TF = self._plant.CalcRelativeTransform(
-            self._context, self._plant.GetBodyByName("tub").body_frame(), frame
-        )
-        axis = X_TF.rotation() @ joint.revolute_axis()
-        origin = X_TF.translation()
-        centre = origin + (axis @ (position - origin) + y) * axis
-        top = rotation[:, 2] - (axis @ rotation[:, 2]) * axis
-        top /= np.linalg.norm(top)
-        return centre, np.column_stack([np.cross(axis, top), axis, top])
+        X_TB = RigidTransform(RotationMatrix(rotation), position)
+        X_TD = X_TB @ axis_pose(self._plant)
+        return np.asarray(X_TD @ np.array([0.0, y, 0.0])), X_TD.rotation().matrix()
 
     def placed(self, key: str, parts: tuple[Any, ...], place: Callable[[], Placed]) -> Placed:
         """Return an element placed at these frames; that of the last call, if its parts were these.

@@ -34,10 +34,11 @@ from wm_drake.elements.state_map import (
 )
 from wm_drake.elements.telescopic_damper import TelescopicDamperParameters
 from wm_drake.errors import input_error
+from wm_drake.model.bodies import drawn_pose
 from wm_drake.model.frame_poses import FramePoses
 from wm_drake.model.state_layout import StateLayout
 from wm_drake.parameters import MachineParameters
-from wm_drake.parameters.sections import GASKET, SECTIONS, Section
+from wm_drake.parameters.sections import GASKET, SECTIONS, FileSection
 from wm_drake.parameters.types import FloatArray
 
 SHORTEST_STRUT = 1e-3
@@ -284,7 +285,9 @@ def placed_elements(
     )
 
 
-def _on_tub(poses: FramePoses, parameters: MachineParameters, section: Section) -> dict[str, Any]:
+def _on_tub(
+    poses: FramePoses, parameters: MachineParameters, section: FileSection
+) -> dict[str, Any]:
     """Place the elements of a section, each between a frame of the tub and one of the housing.
 
     A section whose elements and types are those of the last machine is placed already.
@@ -295,7 +298,7 @@ def _on_tub(poses: FramePoses, parameters: MachineParameters, section: Section) 
 
 
 def _placed_one_by_one(
-    poses: FramePoses, parameters: MachineParameters, section: Section
+    poses: FramePoses, parameters: MachineParameters, section: FileSection
 ) -> dict[str, Any]:
     """Place the elements of a section as far as they differ from those of the last machine."""
     placed = {}
@@ -339,7 +342,7 @@ def _telescopes(
     for name, damper in parameters.telescopic_dampers.items():
         joint = plant.GetJointByName(damper.joint)
         outer = joint.parent_body().name()
-        X_OF = joint.frame_on_parent().GetFixedPoseInBodyFrame()
+        X_OF = drawn_pose(plant, joint.frame_on_parent())
         at_tub = SixComponentBushingParameters(
             *poses("tub", damper.tub_frame),
             *poses(outer, damper.outer_frame),
@@ -367,7 +370,7 @@ def _bearing(
     if bearing is None:
         return None
     joint = plant.GetJointByName(parameters.drive.joint)
-    X_TF = joint.frame_on_parent().GetFixedPoseInBodyFrame()
+    X_TF = drawn_pose(plant, joint.frame_on_parent())
     axis = X_TF.rotation() @ joint.revolute_axis()
     point = X_TF.translation() + bearing.y * axis
     across = np.eye(3)[int(abs(axis[0]) > 0.9)]  # x, if the axis is not near it

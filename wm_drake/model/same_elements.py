@@ -11,7 +11,7 @@ from wm_drake.errors import InputError, input_error, nearest_names
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.drive import motor_of
 from wm_drake.parameters.elements import ForceTable, TorqueTable
-from wm_drake.parameters.sections import SECTIONS, Section
+from wm_drake.parameters.sections import SECTIONS, FileSection
 
 BUILT_IN = {
     "kind": "kind",
@@ -72,7 +72,7 @@ def check_same_elements(
 
 
 def _check_section(
-    section: Section, built: MachineParameters, requested: MachineParameters
+    section: FileSection, built: MachineParameters, requested: MachineParameters
 ) -> None:
     """Raise InputError if the elements of a section have other names, or are built otherwise."""
     others, elements = section.elements(built), section.elements(requested)

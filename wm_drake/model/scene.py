@@ -17,7 +17,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from wm_drake.compiler.lane_memory import aligned, fill_lanes
 from wm_drake.compiler.lanes import WIDTH
-from wm_drake.model.bodies import add_bodies, sdf_path, set_bodies, unusable
+from wm_drake.model.bodies import add_bodies, drawn_frame, sdf_path, set_bodies, unusable
 from wm_drake.model.cabinet import with_fixed_cabinet
 from wm_drake.model.outline import (
     BLOCK,
@@ -225,7 +225,9 @@ class Scene:
         grounded = self.plant.GetBodiesWeldedTo(self.plant.world_body())
         is_fixed = any(body.index() == other.index() for other in grounded)
         carrier = (
-            self.plant.world_frame() if is_fixed else self.plant.GetBodyByName("tub").body_frame()
+            self.plant.world_frame()
+            if is_fixed
+            else drawn_frame(self.plant, self.plant.GetBodyByName("tub"))
         )
         X_CB = self.plant.CalcRelativeTransform(self._plant_context, carrier, body.body_frame())
         X_CS = X_CB.multiply(inspector.GetPoseInFrame(shape))
@@ -484,8 +486,9 @@ class Scene:
             bound[index] = np.inf  # this distance is known
 
     def pose_in_world(self, body: str) -> RigidTransform:
-        """Return the pose of a body in W at the pose that was set last."""
-        return self.plant.EvalBodyPoseInWorld(self._plant_context, self.plant.GetBodyByName(body))
+        """Return the pose in W of T or another body at the pose that was set last."""
+        frame = drawn_frame(self.plant, self.plant.GetBodyByName(body))
+        return frame.CalcPoseInWorld(self._plant_context)
 
     def animate(
         self,

@@ -5,13 +5,18 @@ process on a cycle of files. So all this is checked here.
 """
 
 import re
+import tempfile
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from xml.etree import ElementTree
-from xml.etree.ElementTree import Element
+from xml.sax.saxutils import escape, unescape
 
 from wm_drake.errors import InputError, Problem, input_error
-from wm_drake.parameters.text_files import check_regular, read_text
+from wm_drake.model.meshes import fault_of_mesh
+from wm_drake.model.sdf_elements import element_problems, problem_at
+from wm_drake.model.sdf_text import Node, SdfTextError, read_sdf
+from wm_drake.parameters.inertia import fault_of_mass_properties, inertia_matrix
+from wm_drake.parameters.text_files import read_text
 
 MOST_FILES = 50
 """Largest number of files that an SDF consists of."""
@@ -20,7 +25,7 @@ LARGEST_SDF = 16 << 20
 """Largest size of an SDF file. [byte]"""
 
 
-def sdf_roots(path: Path) -> dict[Path, Element]:
+def sdf_roots(path: Path) -> dict[Path, Node]:
     """Return the root element of an SDF file and of each file that it includes, by path.
 
     Args:
@@ -29,7 +34,7 @@ def sdf_roots(path: Path) -> dict[Path, Element]:
     Raises:
         InputError: a file is missing, outside of this folder, not SDF, or includes itself.
     """
-    folder, roots = path.parent, dict[Path, Element]()
+    folder, roots = path.parent, dict[Path, Node]()
     waiting: list[tuple[Path, tuple[Path, ...]]] = [(path, ())]
     while waiting:
         current, above = waiting.pop()
@@ -37,7 +42,7 @@ def sdf_roots(path: Path) -> dict[Path, Element]:
         if len(roots) > MOST_FILES:
             raise _refused(path, f"includes more than {MOST_FILES} files")
         for include in root.iter("include"):
-            uri = _text_at(include, "uri")
+            uri = include.text_at("uri")
             included = _included(folder, current, uri)
             if included.resolve() in (p.resolve() for p in (*above, current)):
                 raise _refused(current, f"includes '{uri}', and so itself")
@@ -45,7 +50,59 @@ def sdf_roots(path: Path) -> dict[Path, Element]:
     return roots
 
 
-def check_mass_properties(roots: dict[Path, Element], fixed: Iterable[str]) -> None:
+PACKAGE = "wm_drake_sdf"
+"""Name under which the parser finds the files that an SDF includes."""
+
+
+@contextmanager
+def readable(path: Path, roots: dict[Path, Node]) -> Iterator[tuple[Path, Path]]:
+    """Yield an SDF file as sdformat finds what it includes, and the folder of `PACKAGE`.
+
+    sdformat looks for the name of an included file in the current folder only. So files that
+    include others are copied, with names that do not depend on it.
+    """
+    if len(roots) == 1:
+        yield path, path.parent
+        return
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for file, root in roots.items():
+            copy = folder / file.relative_to(path.parent)
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            copy.write_text(_with_whole_names(file, root), encoding="utf-8")
+        yield folder / path.name, folder
+
+
+def _with_whole_names(file: Path, root: Node) -> str:
+    """Return the text of an SDF file with names of other files that are not relative."""
+    included = {node.text_at("uri") for node in root.iter("include")}
+
+    def whole(match: re.Match[str]) -> str:
+        uri = unescape(match[1].strip())
+        if uri in included:
+            return f"<uri>package://{PACKAGE}/{escape(uri)}</uri>"
+        return match[0] if "://" in uri else f"<uri>{escape(str(file.parent / uri))}</uri>"
+
+    return re.sub(r"<uri>(.*?)</uri>", whole, read_text(file, key="model"), flags=re.DOTALL)
+
+
+def check_elements(roots: dict[Path, Node]) -> None:
+    """Check all elements of an SDF, its shapes, and the mass properties of its links.
+
+    Raises:
+        InputError: there is one problem for each.
+    """
+    problems = []
+    for path, root in roots.items():
+        problems += element_problems(path.name, root)
+    for path, root in roots.items() if not problems else ():
+        problems += _mesh_problems(path, root)
+        problems += _inertia_problems(path, root)
+    if problems:
+        raise InputError(problems)
+
+
+def check_mass_properties(roots: dict[Path, Node], fixed: Iterable[str]) -> None:
     """Check that each link that moves states its mass and its moments of inertia.
 
     Args:
@@ -57,34 +114,61 @@ def check_mass_properties(roots: dict[Path, Element], fixed: Iterable[str]) -> N
     at_rest, problems = set(fixed), list[Problem]()
     for path, root in roots.items():
         for link in root.iter("link"):
-            missing = [part for part in _MASS_PROPERTIES if not _text_at(link, part)]
-            if missing and link.get("name", "") not in at_rest:
-                names = ", ".join(part.rpartition("/")[2] for part in missing)
-                message = (
-                    f"SDF '{path.name}': link '{link.get('name', '')}' does not state its {names}"
-                )
-                problems.append(Problem("", "model", message))
+            missing = [part[-1] for part in _MASS_PROPERTIES if not link.text_at(*part)]
+            if missing and link.name not in at_rest:
+                message = f"does not state its {', '.join(missing)}"
+                problems.append(problem_at(path.name, link, message))
     if problems:
         raise InputError(problems)
 
 
+_MOMENTS = ("ixx", "iyy", "izz")
 _MASS_PROPERTIES = (
-    "inertial/mass",
-    *(f"inertial/inertia/{name}" for name in ("ixx", "iyy", "izz")),
+    ("inertial", "mass"),
+    *(("inertial", "inertia", name) for name in _MOMENTS),
 )
 
 
-def _text_at(element: Element, part: str) -> str:
-    """Return the text of an element below another one; empty if there is none."""
-    return (element.findtext(part) or "").strip()
+def _inertia_problems(path: Path, root: Node) -> list[Problem]:
+    """Return a problem for each link whose mass and inertia no part of a machine has."""
+    problems = []
+    for link in root.iter("link"):
+        if not all(link.text_at(*part) for part in _MASS_PROPERTIES):
+            continue
+        numbers = {
+            name: float(link.text_at("inertial", "inertia", name) or 0.0)
+            for name in (*_MOMENTS, "ixy", "ixz", "iyz")
+        }
+        matrix = inertia_matrix(*numbers.values())
+        fault = fault_of_mass_properties(float(link.text_at("inertial", "mass")), matrix)
+        if fault:
+            inertia = link.find("inertial", "inertia")
+            problems.append(problem_at(path.name, inertia or link, fault))
+    return problems
 
 
-def _root(path: Path) -> Element:
+def _mesh_problems(path: Path, root: Node) -> list[Problem]:
+    """Return a problem for each mesh that cannot be used."""
+    problems = []
+    for tag in ("collision", "visual"):
+        for part in root.iter(tag):
+            mesh = part.find("geometry", "mesh")
+            if mesh is None:
+                continue
+            scale = [float(word) for word in (mesh.text_at("scale") or "1 1 1").split()]
+            is_measured = tag == "collision" and not mesh.find("drake:declare_convex")
+            fault = fault_of_mesh(mesh.text_at("uri"), path, scale, is_measured=is_measured)
+            if fault:
+                problems.append(problem_at(path.name, part, fault))
+    return problems
+
+
+def _root(path: Path) -> Node:
     text = read_text(path, key="model", largest=LARGEST_SDF)
     try:
-        root = ElementTree.fromstring(text)
-    except (ElementTree.ParseError, ValueError, RecursionError) as error:
-        raise _refused(path, f"cannot be read: {error}") from None
+        root = read_sdf(text)
+    except SdfTextError as error:
+        raise _refused(path, str(error)) from None
     if root.tag != "sdf":
         raise _refused(path, f"cannot be read: it is <{root.tag[:40]}>, not <sdf>")
     return root
@@ -114,97 +198,3 @@ def _included(folder: Path, current: Path, uri: str) -> Path:
 
 def _refused(path: Path, reason: str) -> InputError:
     return input_error(f"SDF '{path.name}' {reason}", key="model")
-
-
-UNBOUNDED = ("plane", "heightmap")
-SIZES = ("size", "radius", "radii", "length")
-MESH_SUFFIXES = (".obj", ".vtk", ".gltf")
-
-LONGEST_LENGTH = 1000.0
-"""Largest length in an SDF file: far above any machine, and squares of it never overflow. [m]"""
-
-_LENGTHS = f"numbers up to {LONGEST_LENGTH:g} (metres)"
-
-
-def check_shapes(path: Path, root: Element) -> None:
-    """Check that all shapes and poses of an SDF file are bounded and that its meshes can be read.
-
-    Args:
-        path: The SDF file; names of meshes are relative to it.
-
-    Raises:
-        InputError: a shape is unbounded, or a mesh is missing, empty, of another type, has a corner
-            that is not finite, or is not a file; or a pose is too far away. There is one problem
-            per shape and pose.
-    """
-    problems = []
-    for name, shape in _shapes(root):
-        reason = _fault(shape, path)
-        if reason:
-            message = f"SDF '{path.name}': shape '{name}' {reason}"
-            problems.append(Problem("", "model", message))
-    for pose in root.iter("pose"):
-        words = (pose.text or "").split()
-        if not all(map(_is_length, words)):
-            message = (
-                f"SDF '{path.name}': a pose is '{' '.join(words)[:60]}'; allowed are {_LENGTHS}"
-            )
-            problems.append(Problem("", "model", message))
-    if problems:
-        raise InputError(problems)
-
-
-def _shapes(root: Element) -> Iterator[tuple[str, Element]]:
-    for tag in ("collision", "visual"):
-        for part in root.iter(tag):
-            for geometry in part.findall("geometry"):
-                for shape in geometry:
-                    yield part.get("name", ""), shape
-
-
-def _fault(shape: Element, path: Path) -> str:
-    """Return what is wrong with a shape; empty if nothing is."""
-    if shape.tag in UNBOUNDED:
-        return f"is a {shape.tag}, which has no bounds; allowed are bounded shapes such as a box"
-    if shape.tag == "mesh":
-        return _fault_of_mesh((shape.findtext("uri") or "").strip(), path)
-    for part in shape.iter():
-        words = (part.text or "").split()
-        if part.tag in SIZES and not all(_is_length(word) and float(word) > 0.0 for word in words):
-            return (
-                f"has '{' '.join(words)[:60]}' as its {part.tag}; allowed are {_LENGTHS}, above 0"
-            )
-    return ""
-
-
-def _fault_of_mesh(uri: str, path: Path) -> str:
-    if re.match(r"(package|model)://", uri):
-        return ""  # Drake finds these, or refuses them with a message
-    if "://" in uri:
-        return f"has the mesh '{uri}'; allowed is the name of a file"
-    mesh = path.parent / uri
-    if mesh.suffix.lower() not in MESH_SUFFIXES:
-        return f"has the mesh '{uri}'; allowed are files {', '.join(MESH_SUFFIXES)}"
-    try:
-        check_regular(mesh)
-    except InputError as error:
-        return f"has the mesh '{uri}', which cannot be read: {error.problems[0].message}"
-    if mesh.suffix.lower() != ".obj":
-        return "" if mesh.stat().st_size else f"has the mesh '{uri}', which is empty"
-    corners = [
-        line.split()[1:4]
-        for line in mesh.read_text(encoding="utf-8", errors="replace").splitlines()
-        if line.split()[:1] == ["v"]
-    ]
-    if not corners:
-        return f"has the mesh '{uri}', which has no corners"
-    if not all(len(corner) == 3 and all(map(_is_length, corner)) for corner in corners):
-        return f"has the mesh '{uri}', which has a corner that is not three {_LENGTHS}"
-    return ""
-
-
-def _is_length(text: str) -> bool:
-    try:
-        return abs(float(text)) <= LONGEST_LENGTH  # false for nan
-    except ValueError:
-        return False

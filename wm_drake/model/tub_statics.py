@@ -15,6 +15,7 @@ from wm_drake.compiler.lanes import WIDTH
 from wm_drake.compiler.vectors import rotation_from_rpy
 from wm_drake.elements.mount import WRENCH_SIZE, mount_wrench_history
 from wm_drake.elements.state_map import ELEMENT
+from wm_drake.model.bodies import drawn_frame
 from wm_drake.model.placed_elements import PlacedElements
 from wm_drake.model.state_layout import CABINET
 from wm_drake.parameters.types import FloatArray
@@ -72,7 +73,7 @@ def weight_of(plant: MultibodyPlant, context: Context) -> Weight:
     tub = plant.GetBodyByName("tub")
     links = plant.GetBodyIndices(tub.model_instance())
     moving = [index for index in links if int(index) not in fixed]
-    inertia = plant.CalcSpatialInertia(context, tub.body_frame(), moving)
+    inertia = plant.CalcSpatialInertia(context, drawn_frame(plant, tub), moving)
     gravity = np.array(plant.gravity_field().gravity_vector())
     return Weight(inertia.get_mass() * gravity, np.array(inertia.get_com()))
 

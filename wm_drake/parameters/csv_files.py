@@ -86,6 +86,12 @@ def finite_numbers(table: "pd.DataFrame", path: str | Path, key: str = "") -> Fl
     return numbers
 
 
+def data_lines(path: Path) -> list[int]:
+    """Return the numbers of the lines of a CSV file with rows of data: no comment, not blank."""
+    lines = enumerate(read_text(path).splitlines(), start=1)
+    return [number for number, line in lines if line.partition("#")[0].strip()][1:]
+
+
 def read_header(path: Path, key: str = "") -> list[str]:
     """Return the names of the columns of a CSV file."""
     try:

@@ -26,8 +26,10 @@ from wm_drake.parameters.elements import (
     PositiveVelocity,
 )
 
-Kind: TypeAlias = Literal["force", "stiffness", "damping", "speed", "length", "branch", "dashpot"]
-Search: TypeAlias = Kind | tuple[float, float]
+NumberKind: TypeAlias = Literal[
+    "force", "stiffness", "damping", "speed", "length", "branch", "dashpot"
+]
+SearchRange: TypeAlias = NumberKind | tuple[float, float]
 """Where the identification searches a number: in the range of its kind, which follows from the
 measured loops, or between two bounds in SI."""
 
@@ -189,7 +191,7 @@ class DamperLaw:
     parameters: type[DamperNumbers]
     response: Any
     equations: str
-    unknowns: Mapping[str, Search]
+    unknowns: Mapping[str, SearchRange]
     sponge_with_mass: Any = None
     slider_friction: Any = None
 

@@ -100,7 +100,7 @@ class Robust(Frozen):
         return self
 
 
-class DesignTask(Frozen):
+class DesignFile(Frozen):
     """What a design study searches.
 
     Attributes:
@@ -121,7 +121,7 @@ class DesignTask(Frozen):
     robust: Robust | None = None
 
     @model_validator(mode="after")
-    def _is_complete(self) -> "DesignTask":
+    def _is_complete(self) -> "DesignFile":
         if not self.variables and not self.choices:
             raise ValueError("nothing to design; needs variables, choices or both")
         both = sorted(set(self.variables) & set(self.choices))
@@ -132,7 +132,7 @@ class DesignTask(Frozen):
         return self
 
 
-def check_loads(task: DesignTask, machine: MachineParameters) -> None:
+def check_loads(task: DesignFile, machine: MachineParameters) -> None:
     """Raise an InputError for a load that the machine does not have, or that is named twice."""
     for number, name in enumerate(task.loads):
         key = f"loads.{number}"
@@ -154,6 +154,6 @@ def check_over(text: str) -> None:
             ) from None
 
 
-def load_design(name_or_path: str | Path = "gasket") -> DesignTask:
+def load_design(name_or_path: str | Path = "gasket") -> DesignFile:
     """Read a design file."""
-    return read_model(DesignTask, DESIGNS.path(name_or_path))
+    return read_model(DesignFile, DESIGNS.path(name_or_path))

@@ -50,10 +50,10 @@ DEEPEST_BLOCK = 16
 """Most blocks within each other."""
 
 IGNORED = {
-    "ACAD_TABLE", "ARC_DIMENSION", "ATTDEF", "ATTRIB", "DIMENSION", "HATCH", "IMAGE", "INSERT",
-    "LARGE_RADIAL_DIMENSION", "LEADER", "LIGHT", "MLEADER", "MPOLYGON", "MTEXT", "MULTILEADER",
-    "OLE2FRAME", "POINT", "RAY", "SHAPE", "SOLID", "TEXT", "TOLERANCE", "TRACE", "UNDERLAY",
-    "VIEWPORT", "WIPEOUT", "XLINE",
+    "ACAD_TABLE", "ARC_DIMENSION", "ATTDEF", "ATTRIB", "DGNUNDERLAY", "DIMENSION", "DWFUNDERLAY",
+    "HATCH", "IMAGE", "INSERT", "LARGE_RADIAL_DIMENSION", "LEADER", "LIGHT", "MLEADER", "MPOLYGON",
+    "MTEXT", "MULTILEADER", "OLE2FRAME", "PDFUNDERLAY", "POINT", "RAY", "SHAPE", "SOLID", "TEXT",
+    "TOLERANCE", "TRACE", "VIEWPORT", "WIPEOUT", "XLINE",
 }  # fmt: skip
 """Entities that are no lines of a wall: text, dimensions, hatches, symbols, construction lines."""
 
@@ -221,7 +221,14 @@ def _path(drawing: "Drawing", line: DxfLine) -> list[Segment]:
 
 def _layer(entity: "DXFGraphic") -> str:
     """Return the layer of an entity; "0" if ezdxf does not know its kind."""
-    return str(entity.dxf.get("layer", "0")) if entity.dxf.is_supported("layer") else "0"
+    return _plain(entity.dxf.get("layer", "0")) if entity.dxf.is_supported("layer") else "0"
+
+
+def _plain(name: str) -> str:
+    r"""Return a name without escapes, such as \U+00E4, of letters that a code page lacks."""
+    from ezdxf.lldxf.encoding import decode_dxf_unicode, decode_mif_to_unicode
+
+    return decode_mif_to_unicode(decode_dxf_unicode(name))
 
 
 def _folded(layer: str) -> str:
@@ -252,8 +259,8 @@ def _from_housing(path: list[Segment], end: str) -> list[Segment]:
 def _shown(drawing: "Drawing", layer: str) -> Iterator["DXFGraphic"]:
     """Yield the entities of the model and its blocks; those of hidden layers only with a layer."""
     layers = [] if layer else list(drawing.layers)
-    frozen = {_folded(each.dxf.name) for each in layers if each.is_frozen()}
-    off = {_folded(each.dxf.name) for each in layers if each.is_off()}
+    frozen = {_folded(_plain(each.dxf.name)) for each in layers if each.is_frozen()}
+    off = {_folded(_plain(each.dxf.name)) for each in layers if each.is_off()}
 
     def is_shown(entity: "DXFGraphic") -> bool:
         hidden = frozen if entity.dxftype() == "INSERT" else frozen | off
@@ -443,7 +450,7 @@ def _curved(entity: Any, plane: _Plane, spline: "BSpline") -> Iterator[Segment]:
         return place, along / abs(along)
 
     for begin, end in itertools.pairwise(knots):
-        inside = 1e-9 * (end - begin)  # a kink has two directions at its knot
+        inside = 1e-6 * (end - begin)  # at a knot a kink has two directions, a double point none
         yield from arcs_along(at, begin + inside, end - inside)
 
 

@@ -36,7 +36,7 @@ curves".
 """
 
 
-class Table(Frozen):
+class CurveTable(Frozen):
     """A curve through points: a monotone cubic between them, straight lines beyond them.
 
     The first field has the rising abscissas, at least two; the second the ordinates, never falling.
@@ -95,7 +95,7 @@ class Table(Frozen):
         return 0.0
 
 
-class ForceTable(Table):
+class ForceTable(CurveTable):
     """Force over displacement: a monotone cubic through the points, straight lines beyond them.
 
     Attributes:
@@ -108,7 +108,7 @@ class ForceTable(Table):
     force: u.Forces
 
 
-class TorqueTable(Table):
+class TorqueTable(CurveTable):
     """Torque over angle: a monotone cubic through the points, straight lines beyond them.
 
     Attributes:

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field, ValidationError
 
 from wm_drake.errors import InputError, Problem, input_error
-from wm_drake.parameters.elements import Frozen, Table
+from wm_drake.parameters.elements import CurveTable, Frozen
 from wm_drake.parameters.files import read_yaml
 from wm_drake.parameters.keys import with_value, with_values
 from wm_drake.parameters.machine import MachineParameters
@@ -151,7 +151,7 @@ def at_places(
     changes: dict[str, Value] = {}
     for factor, place in zip(factors, places, strict=True):
         for key, middle in factor.settings[1].items():
-            if isinstance(middle, Table):
+            if isinstance(middle, CurveTable):
                 numbers = factor.numbers[key]
                 changes[key] = middle.scaled(_between(place, numbers) / numbers[1])
             else:
@@ -224,7 +224,7 @@ def _levels(number: Number, factor: Factor) -> tuple[float, float, float]:
 def _setting(parameters: MachineParameters, number: Number, level: float, tables: str) -> Value:
     """Return the number or table of a level, after checking that the machine allows it."""
     setting: Value = level
-    if isinstance(number.original, Table):
+    if isinstance(number.original, CurveTable):
         if number.takes_numbers:
             with_value(parameters, number.key, level)  # a slope like this is allowed
         if tables == "scaled" or not number.takes_numbers:

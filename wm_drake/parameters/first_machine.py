@@ -5,6 +5,7 @@ are placed around the centre of mass of all that hangs in them, and above it. Al
 assumptions, which the files say; they are meant to be replaced.
 """
 
+import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,10 +16,16 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from wm_drake.errors import input_error
+from wm_drake.errors import InputError, InputNotice, Problem, input_error, shortened
 from wm_drake.parameters import units as u
-from wm_drake.parameters.csv_files import finite_numbers, read_csv
+from wm_drake.parameters.csv_files import data_lines, finite_numbers, read_csv
 from wm_drake.parameters.elements import Frozen
+from wm_drake.parameters.inertia import (
+    fault_of_mass_properties,
+    inertia_matrix,
+    unlikely_mass_properties,
+    unlikely_reference,
+)
 from wm_drake.parameters.types import FloatArray
 
 TEMPLATES = Path(__file__).parents[1] / "data" / "first_machine"
@@ -121,31 +128,72 @@ def read_parts(path: Path) -> dict[str, Mass]:
     """Return tub and drum, combined from a table of parts (`COLUMNS`).
 
     Raises:
-        InputError: the file cannot be read, a body is neither tub nor drum, or one has no part.
+        InputError: the file cannot be read, or a body has no part; or, for each row, its body is
+            neither tub nor drum, its part is there already, or no part of a machine has its
+            numbers.
     """
     table = read_csv(path, COLUMNS)
     numbers = finite_numbers(table[COLUMNS[2:]], path)
-    parts: dict[str, list[Mass]] = {"tub": [], "drum": []}
-    for place, (body, row) in enumerate(zip(table["body"], numbers, strict=True), start=2):
+    parts, problems, known = dict[str, list[Mass]](tub=[], drum=[]), list[Problem](), set[str]()
+    names, bodies = (table[name].fillna("").astype(str).str.strip() for name in COLUMNS[:2])
+    for line, name, body, row in zip(data_lines(path), names, bodies, numbers, strict=True):
+        part = Mass(float(row[0]), 1e-3 * row[1:4], inertia_matrix(*row[4:]), "")
         if body not in parts:
-            message = f"body '{body}' is not allowed; allowed are tub, drum"
-            raise input_error(message, where=f"{path}:{place}")
-        if row[0] <= 0.0:
-            raise input_error("mass_kg must be above 0", where=f"{path}:{place}")
-        parts[body].append(_part(row))
+            fault = f"has the body '{body}'; allowed are tub, drum"
+        elif not name:
+            fault = "has no name"
+        elif name in known:
+            fault = "is there already; give parts that occur several times a number each"
+        else:
+            parts[body].append(part)
+            fault = _fault_of_part(part)
+        known.add(name)
+        if fault:
+            problems.append(Problem(f"{path}:{line}", "", f"part '{shortened(name, 60)}' {fault}"))
+        elif remark := _remark_on_part(part):
+            message = str(Problem(f"{path}:{line}", "", f"part '{shortened(name, 60)}': {remark}"))
+            warnings.warn(message, InputNotice, stacklevel=2)
+    if problems:
+        raise InputError(problems)
     empty = [body for body, of in parts.items() if not of]
     if empty:
         raise input_error(f"has no part of the {empty[0]}", where=str(path))
+    _check_places(parts, path)
     return {
         body: combined(of, f"{len(of)} parts of {path.name}, combined")
         for body, of in parts.items()
     }
 
 
-def _part(row: FloatArray) -> Mass:
-    xx, yy, zz, xy, xz, yz = row[4:]
-    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    return Mass(float(row[0]), 1e-3 * row[1:4], inertia, "")
+LARGEST_MM = 1500.0
+"""Largest distance of a part from the middle of the drum. [mm]"""
+
+
+def _fault_of_part(part: Mass) -> str:
+    """Return why no part of a machine has the numbers of a row; empty if one may have."""
+    farthest = 1e3 * float(np.abs(part.centre).max())
+    if farthest > LARGEST_MM:
+        return (
+            f"has its centre of mass {farthest:.4g} mm from the middle of the drum; allowed are "
+            f"{LARGEST_MM:g} mm"
+        )
+    return fault_of_mass_properties(part.mass, part.inertia)
+
+
+def _remark_on_part(part: Mass) -> str:
+    """Return what is unlikely about the numbers of a row; empty for nothing."""
+    return unlikely_mass_properties(part.mass, part.inertia) or unlikely_reference(
+        part.mass, part.inertia, part.centre
+    )
+
+
+def _check_places(parts: dict[str, list[Mass]], path: Path) -> None:
+    """Warn if the places of several parts are so near to each other that they are in metres."""
+    centres = np.array([part.centre for of in parts.values() for part in of])
+    moved = centres[np.abs(centres).max(axis=1) > 0.0]
+    if len(moved) > 1 and np.abs(moved).max() < 2e-3:
+        message = "all centres of mass are within 2 mm of the middle of the drum; are they in m?"
+        warnings.warn(str(Problem(str(path), "", message)), InputNotice, stacklevel=3)
 
 
 @dataclass(frozen=True)
@@ -179,11 +227,20 @@ class FirstMachine:
         n = self.numbers
         tub = shell(n.tub_mass, self.tub_radius, self.tub_depth)
         drum = shell(n.drum_mass, n.drum_radius, n.drum_depth)
-        about = "inertia of a thin shell of this mass (assumption)"
-        return {
-            "tub": Mass(n.tub_mass, np.array(n.tub_centre), tub, about),
-            "drum": Mass(n.drum_mass, np.zeros(3), drum, about),
+        about = {
+            body: f"mass {self.source(f'{body}_mass')}; inertia of a thin shell (assumption)"
+            for body in ("tub", "drum")
         }
+        return {
+            "tub": Mass(n.tub_mass, np.array(n.tub_centre), tub, about["tub"]),
+            "drum": Mass(n.drum_mass, np.zeros(3), drum, about["drum"]),
+        }
+
+    def source(self, name: str, reason: str = "") -> str:
+        """Return "given" for a number that is; else that it is an assumption, with its reason."""
+        if name in self.numbers.model_fields_set:
+            return "given"
+        return f"assumption: {reason}" if reason else "assumption"
 
     @cached_property
     def whole(self) -> Mass:
@@ -272,7 +329,11 @@ class FirstMachine:
         return _filled(
             "bodies.sdf",
             name=self.name,
-            gap_mm=_text(1e3 * n.gap),
+            gap=f"{_text(1e3 * n.gap)} mm beside the tub: {self.source('gap')}",
+            drum_size=(
+                f"radius {_text(1e3 * n.drum_radius)} mm: {self.source('drum_radius')}; depth "
+                f"{_text(1e3 * n.drum_depth)} mm: {self.source('drum_depth')}"
+            ),
             walls="\n".join(walls),
             frames="\n".join(frames),
             about_tub=tub.about,
@@ -290,12 +351,7 @@ class FirstMachine:
             file: Its path, for the commands in its comments.
             model: Path of the SDF from its folder.
         """
-        n, whole = self.numbers, self.whole
-        given = n.model_fields_set
-
-        def source(name: str, otherwise: str) -> str:
-            return "given" if name in given else f"assumption: {otherwise}"
-
+        n, whole, source = self.numbers, self.whole, self.source
         return _filled(
             "machine.yaml",
             name=self.name,
@@ -321,6 +377,7 @@ class FirstMachine:
             front_mm=_text(-350.0 * n.drum_depth),
             rear_mm=_text(350.0 * n.drum_depth),
             speed=f"{_text(n.speed * 30.0 / np.pi)} rpm",
+            speed_source=source("speed"),
         )
 
 

@@ -12,7 +12,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, ValidationError, model_validator
 
-from wm_drake.errors import InputError, InputNotice
+from wm_drake.errors import InputError, InputNotice, Problem
 from wm_drake.parameters import units as u
 from wm_drake.parameters.dxf import MOST_CORNERS, DxfLine, corners_of_line
 from wm_drake.parameters.elements import Frozen
@@ -50,6 +50,13 @@ def tension_stress(stretch: FloatArray, constants: Sequence[float]) -> FloatArra
     return np.asarray(_tension_terms(stretch) @ np.asarray(constants))
 
 
+def falls_at(constants: Sequence[float]) -> float | None:
+    """Return the stretch at which the force of a rubber falls most; None if it rises everywhere."""
+    stretch = np.linspace(1.0 / STIFFEST_STRETCH, STIFFEST_STRETCH, 201)
+    rise = np.diff(tension_stress(stretch, constants))
+    return None if np.all(rise > 0.0) else float(stretch[int(np.argmin(rise))])
+
+
 def _tension_terms(stretch: FloatArray) -> FloatArray:
     """Return the stress in tension per constant of Yeoh. (n, 3)"""
     x = stretch**2 + 2.0 / stretch - 3.0
@@ -62,12 +69,13 @@ class TensionTest(Frozen):
     Attributes:
         stretch: Length over first length, at each point.
         stress: Force over first cross-section, at each point.
-        terms: Number of constants that are fitted: c1, then c2, then c3.
+        terms: Number of constants that are fitted: c1, then c2, then c3. None for the most with
+            which the rubber is stable, one less than there are stretches beside 1, up to 3.
     """
 
     stretch: tuple[Annotated[float, u.PureNumber(), Field(gt=0.05, lt=20.0)], ...]
     stress: Annotated[tuple[float, ...], u.Unit("Pa", "MPa")]
-    terms: Annotated[int, Field(ge=1, le=3)] = 3
+    terms: Annotated[int, Field(ge=1, le=3)] | None = None
 
     @model_validator(mode="after")
     def _can_be_fitted(self) -> "TensionTest":
@@ -77,26 +85,55 @@ class TensionTest(Frozen):
                 f"{len(self.stress)}"
             )
         loaded = len({stretch for stretch in self.stretch if abs(stretch - 1.0) > 1e-6})
-        if loaded <= self.terms:
+        needed = self.terms or 1
+        if loaded <= needed:
             raise ValueError(
-                f"has {loaded} stretches beside 1; {self.terms} constants need at least "
-                f"{self.terms + 1}"
+                f"has {loaded} stretches beside 1; {needed} constants need at least {needed + 1}"
             )
         return self
 
     @property
+    def most_terms(self) -> int:
+        """Largest number of constants that the test can give."""
+        loaded = {stretch for stretch in self.stretch if abs(stretch - 1.0) > 1e-6}
+        return min(3, len(loaded) - 1)
+
+    @property
+    def fitted_terms(self) -> int:
+        """Number of constants that are fitted."""
+        stable = (n for n in range(self.most_terms, 0, -1) if falls_at(self.fitted(n)) is None)
+        return self.terms or next(stable, self.most_terms)
+
+    @property
     def constants(self) -> tuple[float, float, float]:
-        """Constants of Yeoh with the smallest sum of squared differences of the stress. [Pa]"""
-        terms = _tension_terms(np.array(self.stretch))[:, : self.terms]
-        fitted = np.linalg.lstsq(terms, np.array(self.stress), rcond=None)[0]
-        c1, c2, c3 = (*fitted.tolist(), 0.0, 0.0)[:3]
+        """Constants of Yeoh. [Pa]"""
+        return self.fitted(self.fitted_terms)
+
+    def fitted(self, count: int) -> tuple[float, float, float]:
+        """Return constants with the smallest sum of squared differences of the stress. [Pa]"""
+        terms = _tension_terms(np.array(self.stretch))[:, :count]
+        numbers = np.linalg.lstsq(terms, np.array(self.stress), rcond=None)[0]
+        c1, c2, c3 = (*numbers.tolist(), 0.0, 0.0)[:3]
         return c1, c2, c3
 
     @property
     def deviation(self) -> float:
         """Root mean square of fitted less measured stress, by the largest measured one."""
-        error = tension_stress(np.array(self.stretch), self.constants) - np.array(self.stress)
+        return self.deviation_of(self.fitted_terms)
+
+    def deviation_of(self, count: int) -> float:
+        """Return the deviation with a number of constants."""
+        error = tension_stress(np.array(self.stretch), self.fitted(count)) - np.array(self.stress)
         return float(np.sqrt(np.mean(error**2)) / np.max(np.abs(self.stress)))
+
+    def stable_fits(self) -> str:
+        """Return which numbers of constants make a stable rubber, and how well they fit."""
+        fits = [
+            f"terms: {count} is stable and fits within {100.0 * self.deviation_of(count):.2g} %"
+            for count in range(1, self.most_terms + 1)
+            if falls_at(self.fitted(count)) is None
+        ]
+        return "; ".join(fits) or "no number of constants is stable"
 
 
 class PronySeries(Frozen):
@@ -166,14 +203,13 @@ class Rubber(Frozen):
 
     @model_validator(mode="after")
     def _is_stable(self) -> "Rubber":
-        stretch = np.linspace(1.0 / STIFFEST_STRETCH, STIFFEST_STRETCH, 201)
-        force = tension_stress(stretch, self.constants)
-        if not np.all(np.diff(force) > 0.0):
-            at = stretch[int(np.argmin(np.diff(force)))]
+        at = falls_at(self.constants)
+        if at is not None:
+            fits = f"; of the test, {self.test.stable_fits()}" if self.test else ""
             raise ValueError(
                 f"the rubber is unstable: its force falls at stretch {at:.2g}; allowed are "
                 f"constants with which it rises from {1.0 / STIFFEST_STRETCH:.2g} to "
-                f"{STIFFEST_STRETCH:g}"
+                f"{STIFFEST_STRETCH:g}{fits}"
             )
         return self
 
@@ -366,6 +402,13 @@ def load_gasket_drawing(name_or_path: str | Path) -> GasketDrawing:
     for key, values in drawing.sizes.items():
         for remark in unusual_values(key, values, u.Unit("m", "mm")):
             warnings.warn(str(replace(remark, where=str(path))), InputNotice, stacklevel=2)
+    test = drawing.rubber.test
+    if test and not test.terms and test.fitted_terms < test.most_terms:
+        message = (
+            f"{test.most_terms} constants make an unstable rubber; {test.fitted_terms} can be "
+            f"used, with a fit within {100.0 * test.deviation:.2g} % of the largest stress"
+        )
+        warnings.warn(str(Problem(str(path), "rubber.test", message)), InputNotice, stacklevel=2)
     return drawing
 
 

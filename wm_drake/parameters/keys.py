@@ -12,7 +12,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
 from wm_drake.errors import InputError, Problem, input_error, nearest_names
-from wm_drake.parameters.elements import Table
+from wm_drake.parameters.elements import CurveTable
 from wm_drake.parameters.machine import MachineParameters
 from wm_drake.parameters.problems import problems_of
 from wm_drake.parameters.units import Share, Unit
@@ -135,7 +135,7 @@ class _Edit:
         """Return what the changes make of a value."""
         if self.whole:
             new = self.whole[0]
-            if isinstance(node, Table) and isinstance(new, str) and new.strip().endswith("%"):
+            if isinstance(node, CurveTable) and isinstance(new, str) and new.strip().endswith("%"):
                 try:
                     new = node.scaled(Share().number(new))
                 except ValueError as error:
@@ -232,7 +232,7 @@ class _Edit:
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, float | int | Table) and not isinstance(value, bool)
+    return isinstance(value, float | int | CurveTable) and not isinstance(value, bool)
 
 
 def _with_key_of_change(problem: Problem, keys: list[str]) -> Problem:

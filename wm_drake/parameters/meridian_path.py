@@ -26,7 +26,7 @@ MOST_HALVINGS = 12
 Corner: TypeAlias = tuple[float, float, float]
 """Radius, y and fillet of a corner. [m]"""
 
-Curve: TypeAlias = Callable[[float], tuple[complex, complex]]
+MeridianCurve: TypeAlias = Callable[[float], tuple[complex, complex]]
 """Place on a curve [m] and direction there, of size 1, over a parameter."""
 
 
@@ -84,7 +84,9 @@ class Segment(NamedTuple):
             yield Segment(begin, end, self.turn / count)
 
 
-def arcs_along(curve: Curve, begin: float, end: float, halvings: int = 0) -> Iterator[Segment]:
+def arcs_along(
+    curve: MeridianCurve, begin: float, end: float, halvings: int = 0
+) -> Iterator[Segment]:
     """Yield arcs within `SAME_PLACE` of a curve, each in the direction of the one before.
 
     Args:

@@ -10,7 +10,7 @@ GASKET = "gasket"
 
 
 @dataclass(frozen=True)
-class Section:
+class FileSection:
     """A section of a machine file that has elements in their places, by name.
 
     Attributes:
@@ -47,10 +47,10 @@ class Section:
 SECTIONS = {
     section.name: section
     for section in (
-        Section("springs", {"type": "spring_types"}),
-        Section("dampers", {"type": "damper_types"}),
-        Section("bushings"),
-        Section(
+        FileSection("springs", {"type": "spring_types"}),
+        FileSection("dampers", {"type": "damper_types"}),
+        FileSection("bushings"),
+        FileSection(
             "telescopic_dampers",
             {
                 "type": "damper_types",
@@ -58,7 +58,7 @@ SECTIONS = {
                 "housing_bushing": "bushing_types",
             },
         ),
-        Section("elements"),
+        FileSection("elements"),
     )
 }
 """All sections by name, in the order of the mounts."""

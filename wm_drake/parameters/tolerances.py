@@ -19,7 +19,7 @@ from wm_drake.parameters.units import Share
 TOLERANCES = ShippedFiles("tolerance file", DATA / "tolerances")
 """Tolerance files of the package."""
 
-Kind: TypeAlias = Literal["normal", "lognormal", "uniform", "triangular"]
+DistributionKind: TypeAlias = Literal["normal", "lognormal", "uniform", "triangular"]
 
 NEEDED: Mapping[str, tuple[str, ...]] = {
     "normal": ("mean", "deviation"),
@@ -51,7 +51,7 @@ class Spread(Frozen):
         source: Where the numbers come from.
     """
 
-    distribution: Kind
+    distribution: DistributionKind
     mean: str | None = None
     deviation: str | None = None
     mode: str | None = None
@@ -79,7 +79,7 @@ class Spread(Frozen):
         return self
 
 
-class Quantity(Spread):
+class UncertainQuantity(Spread):
     """An uncertain quantity of the machine file, the SDF or the load.
 
     Attributes:
@@ -174,7 +174,7 @@ class Tolerances(Frozen):
 
     about: str = ""
     load: str | None = None
-    quantities: dict[Name, Quantity] = {}
+    quantities: dict[Name, UncertainQuantity] = {}
     laundry: Laundry | None = None
     correlations: Correlations | None = None
 

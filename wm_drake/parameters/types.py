@@ -8,6 +8,12 @@ from pydantic import StringConstraints
 FloatArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
 """An array of floats; the docstring of each use gives shape and unit."""
 
+BoolArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+"""An array of truth values."""
+
+IndexArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
+"""An array of places in another one."""
+
 ComplexArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.complex128]]
 """An array of complex numbers; the docstring of each use gives shape and unit."""
 

@@ -14,12 +14,12 @@ from typing import Any, TypeAlias
 from pydantic import BaseModel
 
 from wm_drake.errors import Problem, input_error
-from wm_drake.parameters.elements import Table
+from wm_drake.parameters.elements import CurveTable
 from wm_drake.parameters.keys import field_at, unit_of, with_values
 from wm_drake.parameters.machine import MachineParameters
 from wm_drake.parameters.units import Share, Unit
 
-Value: TypeAlias = float | Table
+Value: TypeAlias = float | CurveTable
 
 _NOMINAL = re.compile(r"nominal\s*(?:([+-])\s*(.+))?")
 _RANGE = re.compile(r"\(([^(),]+),([^(),]+)\)(.*)")
@@ -49,14 +49,14 @@ class Number:
     """
 
     key: str
-    original: float | tuple[float, ...] | Table | None
+    original: float | tuple[float, ...] | CurveTable | None
     unit: Unit
     takes_numbers: bool = True
 
     @cached_property
     def nominal(self) -> float | None:
         """Value of the machine, or nominal stiffness of its table; None if only the SDF has it."""
-        if isinstance(self.original, Table):
+        if isinstance(self.original, CurveTable):
             return self.original.nominal_stiffness
         assert not isinstance(self.original, tuple)
         return self.original
@@ -64,23 +64,23 @@ class Number:
     @property
     def is_table(self) -> bool:
         """Whether the machine has a table here."""
-        return isinstance(self.original, Table)
+        return isinstance(self.original, CurveTable)
 
     def changed(self, change: Change, value: float) -> Any:
         """Return what `value` makes of this number: a number, a table, or the column of one."""
         original = self.original
         if change is Change.VALUE:
             return value
-        if isinstance(original, Table):
+        if isinstance(original, CurveTable):
             return original.scaled(value)
         if isinstance(original, tuple):
             return tuple(value * number for number in original)
         assert original is not None
         return original * value if change is Change.PERCENT else original + value
 
-    def at(self, value: float) -> float | Table:
+    def at(self, value: float) -> float | CurveTable:
         """Return the value in SI, or of a curve the one with this nominal stiffness."""
-        if isinstance(self.original, Table) and self.nominal:
+        if isinstance(self.original, CurveTable) and self.nominal:
             return self.original.scaled(value / self.nominal)
         return value
 
@@ -250,7 +250,7 @@ def number_at(parameters: MachineParameters, key: str) -> Number:
     """Return a number of a machine by key path; a table is a number, its nominal stiffness."""
     value, field = field_at(parameters, key)
     unit = None if field is None else unit_of(field.annotation, field.metadata)
-    if isinstance(value, Table):
+    if isinstance(value, CurveTable):
         return Number(key, value, value.stiffness_unit, takes_numbers=unit is not None)
     if isinstance(value, tuple) and unit is not None:
         message = f"is a list of numbers; name one of them by its index, for example {key}.0"

@@ -23,6 +23,9 @@ DPI = 300
 LONGEST_NAME = 60
 """Largest number of characters of the name of a file, without number and suffix."""
 
+LONGEST_PLAIN = 20_000
+"""Largest number of rows of a CSV file that is not compressed."""
+
 _figures: ContextVar[list[tuple[Figure, str]] | None] = ContextVar("figures", default=None)
 
 
@@ -66,13 +69,22 @@ def write_figures(figures: list[tuple[Figure, str]], folder: Path) -> None:
         metadata = {"CreationDate": None, "Producer": None, "Creator": None}
         drawing.savefig(folder / f"{stem}.pdf", dpi=DPI, metadata=metadata)
         drawing.savefig(folder / f"{stem}.png", dpi=DPI, metadata={"Software": None})
-        figure_data(figure).to_csv(folder / f"{stem}.csv", index=False, float_format="%.9g")
+        _write_data(figure_data(figure), folder / f"{stem}.csv")
+
+
+def _write_data(table: pd.DataFrame, path: Path) -> None:
+    """Write what a figure shows as CSV; a large one, as of a spectrum, compressed."""
+    packed: Any = {"method": "gzip", "mtime": 0} if len(table) > LONGEST_PLAIN else None
+    path = path.with_name(f"{path.name}.gz") if packed else path
+    table.to_csv(path, index=False, float_format="%.9g", compression=packed)
 
 
 def file_name(title: str) -> str:
     """Return a text as name of a file: lower-case letters, digits and underscores."""
     words = re.sub(r"[^a-z0-9]+", "_", title.lower()).strip("_")
-    return words[:LONGEST_NAME].strip("_") or "picture"
+    if len(words) > LONGEST_NAME:  # end with a whole word
+        words = words[: LONGEST_NAME + 1].rpartition("_")[0] or words[:LONGEST_NAME]
+    return words or "picture"
 
 
 def figure_data(figure: Figure) -> pd.DataFrame:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:  # not needed for pages
 Columns: TypeAlias = "tuple[Column | str, ...]"
 """Columns of a table."""
 
-Value: TypeAlias = str | float | bool | None
+CellValue: TypeAlias = str | float | bool | None
 """Content of a cell. A missing value is None or NaN."""
 
 MOST_SHOWN = 24
@@ -55,7 +55,7 @@ class Column:
         """Return the head with the unit."""
         return f"{self.name}, {self.unit}" if self.unit else self.name
 
-    def text(self, value: Value) -> str:
+    def text(self, value: CellValue) -> str:
         """Return a value for reading; a text is shown as it is."""
         if isinstance(value, str):
             return value
@@ -77,7 +77,7 @@ class Row:
         kind: Style of the line: ours, measured, difference, other, alarm or empty.
     """
 
-    cells: tuple[Value, ...]
+    cells: tuple[CellValue, ...]
     kind: str = ""
 
 
@@ -85,7 +85,7 @@ class Row:
 class Group:
     """Lines under one heading. The heading is printed in the first column."""
 
-    heading: Value
+    heading: CellValue
     rows: tuple[Row, ...]
 
 
@@ -128,7 +128,7 @@ class Table:
         rows = [(group.heading, *row.cells) for group in self.groups for row in group.rows]
         return pd.DataFrame(rows, columns=list(self.header))
 
-    def records(self) -> list[dict[str, Value]]:
+    def records(self) -> list[dict[str, CellValue]]:
         """Return the rows as objects for JSON; a missing number is None."""
         return [
             {
@@ -226,6 +226,6 @@ def readable(value: Any, unit: Unit) -> str:
     return f"{shown} {unit.shown.replace('*', ' ').replace('^2', '²')}"
 
 
-def line(heading: Value, cells: Iterable[Value], kind: str = "") -> Group:
+def line(heading: CellValue, cells: Iterable[CellValue], kind: str = "") -> Group:
     """Return a group with one row."""
     return Group(heading, (Row(tuple(cells), kind),))

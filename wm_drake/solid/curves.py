@@ -21,7 +21,7 @@ FIRST_STEP, SMALLEST_STEP = 1.0 / 16.0, 1.0 / 512.0
 
 
 @dataclass(frozen=True)
-class Motion:
+class RimMotion:
     """A motion of the rim.
 
     Attributes:
@@ -46,14 +46,14 @@ class Motion:
         return np.asarray(Rotation.from_rotvec(amount[3:]).apply(arms) - arms + amount[:3])
 
 
-AXIAL, TWIST = Motion("axial", 1, is_mirrored=False), Motion("twist", 4)
-RADIAL, TILT = Motion("radial", 0), Motion("tilt", 5)
+AXIAL, TWIST = RimMotion("axial", 1, is_mirrored=False), RimMotion("twist", 4)
+RADIAL, TILT = RimMotion("radial", 0), RimMotion("tilt", 5)
 MOTIONS = (AXIAL, RADIAL, TWIST, TILT)
 """Motions by which a ring is tested."""
 
 
 @dataclass(frozen=True)
-class Point:
+class CurvePoint:
     """A point of a curve.
 
     Attributes:
@@ -80,9 +80,9 @@ class Curve:
         stopped: Why the curve ends before the values asked for; "" if it does not.
     """
 
-    motion: Motion
+    motion: RimMotion
     ring: Ring
-    points: tuple[Point, ...]
+    points: tuple[CurvePoint, ...]
     stopped: str = ""
 
     @property
@@ -140,7 +140,7 @@ class Curve:
 
 
 def curve(
-    solver: Solver, motion: Motion, values: Sequence[float], progress: Callable[[float], None]
+    solver: Solver, motion: RimMotion, values: Sequence[float], progress: Callable[[float], None]
 ) -> Curve:
     """Return a curve through given values.
 
@@ -149,7 +149,7 @@ def curve(
         values: Rising values above 0. [m or rad]
         progress: Called with the finished fraction.
     """
-    rest = Point(0.0, np.zeros(6), 0.0, solver.at_rest().u)
+    rest = CurvePoint(0.0, np.zeros(6), 0.0, solver.at_rest().u)
     forward, stopped = _follow(solver, motion, values, progress)
     if motion.is_mirrored:
         backward = [_mirrored(solver.ring, point) for point in forward]
@@ -159,7 +159,7 @@ def curve(
     return Curve(motion, solver.ring, (*backward[::-1], rest, *forward), stopped)
 
 
-def _mirrored(ring: Ring, point: Point) -> Point:
+def _mirrored(ring: Ring, point: CurvePoint) -> CurvePoint:
     """Return the point at the opposite motion: its mirror image in a plane through the axis.
 
     Half a ring is mirrored in the plane x = 0, a wedge in its middle plane. Only the force along
@@ -173,11 +173,11 @@ def _mirrored(ring: Ring, point: Point) -> Point:
 
 
 def _follow(
-    solver: Solver, motion: Motion, values: Sequence[float], progress: Callable[[float], None]
-) -> tuple[list[Point], str]:
+    solver: Solver, motion: RimMotion, values: Sequence[float], progress: Callable[[float], None]
+) -> tuple[list[CurvePoint], str]:
     """Return the points of a curve on one side, and why it ends early."""
     ring, reach = solver.ring, values[-1]
-    last, at, points = solver.at_rest(), 0.0, list[Point]()
+    last, at, points = solver.at_rest(), 0.0, list[CurvePoint]()
     slope, step = np.zeros_like(last.u), FIRST_STEP * reach
     for number, value in enumerate(values):
         while at != value:
@@ -196,12 +196,12 @@ def _follow(
             slope = (reached.u - last.u) / (following - at)
             last, at, step = reached, following, 1.5 * step
         wrench = _wrench(ring, motion, value, last)
-        points.append(Point(value, wrench, last.energy, last.u))
+        points.append(CurvePoint(value, wrench, last.energy, last.u))
         progress((number + 1) / len(values))
     return points, ""
 
 
-def _wrench(ring: Ring, motion: Motion, value: float, solved: Solved) -> FloatArray:
+def _wrench(ring: Ring, motion: RimMotion, value: float, solved: Solved) -> FloatArray:
     """Return force, and moment about the moved centre, that hold the rim. (6,) [N, N m]"""
     centre = ring.centre
     if not motion.rotates:
@@ -240,7 +240,7 @@ class Gasket:
         )
 
     def curve(
-        self, motion: Motion, values: Sequence[float], progress: Callable[[float], None]
+        self, motion: RimMotion, values: Sequence[float], progress: Callable[[float], None]
     ) -> Curve:
         """Return the curve of a motion.
 

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from wm_drake.report.progress import progress_bar, progress_bars
 
@@ -17,6 +17,9 @@ if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     from wm_drake.model.machine import Machine
     from wm_drake.simulation.cases import Case
     from wm_drake.simulation.records import Record
+
+RunCases: TypeAlias = "Callable[[Iterable[Case]], xr.Dataset]"
+"""Function that runs cases and returns the table of their measures, as `simulate_many` does."""
 
 
 @dataclass
@@ -176,7 +179,7 @@ class Executor:
             yield case
 
     def verify(self, machine: "Machine", cases: "Iterable[Case]") -> None:
-        """Add cases to those of which a sample is run with half the step, after the study."""
+        """Add cases to those of which a sample is run twice as fine, after the study."""
         from wm_drake.batch.verification import Sample
 
         if self._sample is None:

@@ -63,7 +63,7 @@ def runnable_profile(name_or_path: str | Path, parameters: "MachineParameters") 
 
     profile = load_profile(name_or_path)
     with problems_of_file(Path(name_or_path)):
-        check_size(profile, parameters.step, parameters.output_period)
+        check_size(profile, parameters.step, profile.sample_period(parameters.output_period))
     return profile
 
 
@@ -104,6 +104,8 @@ def with_sets(
 
     changes: dict[str, Any] = {}
     for name, text in pairs_of(sets, "--set"):
+        if _RELATIVE.match(text):
+            parameters = _with_sdf_number(parameters, name)
         for key, value in _set(parameters, name, text).items():
             changes.pop(key, None)
             changes[key] = value
@@ -117,18 +119,44 @@ def with_sets(
 def _set(parameters: "Tree", name: str, text: str) -> dict[str, Any]:
     """Return the values by key that an option `--set NAME=TEXT` sets.
 
-    The name is a key path, or a symbol of [B] such as C_L, whose numbers change together; a symbol
-    also takes percents of the numbers of the machine.
+    The name is a key path, or a symbol of [B] such as C_L, whose numbers change together. The text
+    is a value, or relative to the machine: percents of its number, or nominal + a distance.
     """
     from wm_drake.parameters import GASKET_FACTORS, MachineParameters, load_factors
-    from wm_drake.parameters.variation import variation_of
+    from wm_drake.parameters.variation import Change, change_of, number_at, variation_of
 
+    if not isinstance(parameters, MachineParameters):
+        return {name: _value(text)}
     factor = None if "." in name else load_factors(GASKET_FACTORS).get(name)
-    if factor is None or not isinstance(parameters, MachineParameters):
-        return {name: None if text in ("null", "~") else text}
     with problems_at("--set", name):
-        variation, values = variation_of(parameters, name, factor.keys, {name: text})
+        if factor is None:
+            if not _RELATIVE.match(text):
+                return {name: _value(text)}
+            change, _ = change_of(text, number_at(parameters, name).unit, name)
+            if change is Change.VALUE:  # percents of a share are values
+                return {name: text}
+        keys = factor.keys if factor else (name,)
+        variation, values = variation_of(parameters, name, keys, {name: text})
     return variation.changes(values[name])
+
+
+_RELATIVE = re.compile(r"\s*nominal\b|[^(]*%\s*$")
+
+
+def _value(text: str) -> str | None:
+    return None if text in ("null", "~") else text
+
+
+def _with_sdf_number(parameters: Any, key: str) -> Any:
+    """Return a machine with the number of a key path that only its SDF may have."""
+    from wm_drake.parameters import MachineParameters
+
+    if not key.startswith(("bodies.", "frames.")) or not isinstance(parameters, MachineParameters):
+        return parameters
+    from wm_drake.model.bodies import with_sdf_values
+    from wm_drake.model.build import build_machine
+
+    return with_sdf_values(build_machine(parameters).plant, parameters, [key])
 
 
 def pairs_of(entries: Sequence[str] | None, option: str) -> list[tuple[str, str]]:
@@ -153,7 +181,7 @@ def machine_warnings(parameters: "MachineParameters", profile: Path | None = Non
 
     unused = [UNUSED_PHASE_ERROR] if parameters.imperfections.phase_error else []
     chosen = profile_of(parameters, profile)
-    return [*unused, *band_warnings(chosen, parameters.output_period)]
+    return [*unused, *band_warnings(chosen)]
 
 
 def friction_warnings(parameters: "MachineParameters") -> list[str]:
@@ -240,7 +268,8 @@ def built_with_problems(
         measured_amplitudes(parameters)
         published_results(parameters.published)
         step = checked_step(parameters, None)
-        check_size(parameters.profile, step, parameters.output_period)
+        period = parameters.profile.sample_period(parameters.output_period)
+        check_size(parameters.profile, step, period)
         machine = build_machine(parameters)
         setup = machine.set_up()
         choose_stepping(setup, *pack(setup), parameters.profile, step, parameters.integrator)

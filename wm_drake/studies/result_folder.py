@@ -52,7 +52,7 @@ _NOT_WRITTEN = {
 
 
 @dataclass(frozen=True)
-class Run:
+class CommandRun:
     """The run of a command, as far as its result folder is concerned.
 
     Attributes:
@@ -72,7 +72,7 @@ class Run:
     options: Mapping[str, Any] = field(default_factory=dict)
 
 
-def check_folder(out: Path, run: Run) -> None:
+def check_folder(out: Path, run: CommandRun) -> None:
     """Raise an InputError if a run must not write to a folder: the one rule for all commands."""
     check_is_folder(out)
     earlier = _earlier_run(out)
@@ -94,7 +94,7 @@ def check_folder(out: Path, run: Run) -> None:
         )
 
 
-def _what_it_holds(earlier: dict[str, Any], run: Run) -> str:
+def _what_it_holds(earlier: dict[str, Any], run: CommandRun) -> str:
     there, now = earlier["identity"], run.identity
     names = [name for name in {**now, **there} if there.get(name) != now.get(name)]
     if not names:
@@ -119,14 +119,14 @@ def check_is_folder(out: Path) -> None:
         raise _unwritable(out, OSError(code, os.strerror(code)))
 
 
-def check_folders(out: Path, run: Run) -> None:
+def check_folders(out: Path, run: CommandRun) -> None:
     """Raise an InputError if a run must not write to its folder or to that of `--figures`."""
     check_folder(out, run)
     if (of_figures := FIGURES.get()) is not None:
         check_folder(of_figures, _run_of_figures(of_figures, out, run))
 
 
-def prepare_folder(out: Path, run: Run) -> None:
+def prepare_folder(out: Path, run: CommandRun) -> None:
     """Create the folder of a study if it does not exist, so that its ledger can be opened there.
 
     Raises:
@@ -140,7 +140,7 @@ def prepare_folder(out: Path, run: Run) -> None:
 
 
 @contextmanager
-def result_folder(out: Path, run: Run, kept: str = "") -> Iterator[Path]:
+def result_folder(out: Path, run: CommandRun, kept: str = "") -> Iterator[Path]:
     """Yield a temporary folder for results and, with `--figures`, write the pictures of its pages.
 
     Args, Raises: as `one_folder`.
@@ -161,15 +161,15 @@ def result_folder(out: Path, run: Run, kept: str = "") -> Iterator[Path]:
         write_figures(figures, drawn)
 
 
-def _run_of_figures(folder: Path, out: Path, run: Run) -> Run:
+def _run_of_figures(folder: Path, out: Path, run: CommandRun) -> CommandRun:
     """Return the run that writes pictures; raise an InputError if their folder is that of `out`."""
     if folder.resolve() == out.resolve():
         raise input_error("must be another folder than --out", where="--figures")
-    return Run(f"{run.command} --figures", run.overwrite, run.identity)
+    return CommandRun(f"{run.command} --figures", run.overwrite, run.identity)
 
 
 @contextmanager
-def one_folder(out: Path, run: Run, kept: str = "") -> Iterator[Path]:
+def one_folder(out: Path, run: CommandRun, kept: str = "") -> Iterator[Path]:
     """Yield a temporary folder beside `out`, and move its files to `out` if the block succeeds.
 
     If the block fails, `out` keeps its earlier files. If it succeeds, the files of the earlier run
@@ -204,7 +204,7 @@ def one_folder(out: Path, run: Run, kept: str = "") -> Iterator[Path]:
         os.close(lock)
 
 
-def _move(partial: Path, out: Path, run: Run) -> None:
+def _move(partial: Path, out: Path, run: CommandRun) -> None:
     """Move new results to a folder and remove those of the earlier run.
 
     `run.json` names the files of both runs until all is done, so a run that is killed here leaves a
@@ -228,7 +228,7 @@ def _move(partial: Path, out: Path, run: Run) -> None:
         _write_run_file(partial, out, run, new)
 
 
-def _write_run_file(partial: Path, out: Path, run: Run, files: list[str]) -> None:
+def _write_run_file(partial: Path, out: Path, run: CommandRun, files: list[str]) -> None:
     content = {
         "format": FORMAT,
         "command": run.command,
@@ -268,7 +268,7 @@ def _earlier_run(out: Path) -> dict[str, Any] | None:
     return dict(content)
 
 
-def _check_has_no_other_files(out: Path, run: Run) -> None:
+def _check_has_no_other_files(out: Path, run: CommandRun) -> None:
     """Raise an InputError for a folder without `run.json` that holds visible files.
 
     The ledger of an unfinished study is allowed for a command that has one, since the ledger itself

@@ -27,7 +27,7 @@ from wm_drake.studies.result_folder import (
     FIGURES,
     LEDGER,
     RUN_FILE,
-    Run,
+    CommandRun,
     check_folders,
     check_is_folder,
     prepare_folder,
@@ -73,7 +73,7 @@ class LedgerOptions(RunOptions):
     resume: bool = option(False, "Continue an unfinished study in the same folder.")
 
 
-class BatchOptions(LedgerOptions):
+class ClusterOptions(LedgerOptions):
     """Options of the driver for studies that run cases by `Executor.simulate`."""
 
     cluster: str | None = option(
@@ -174,7 +174,7 @@ def options_of_driver(study: Study) -> type[RunOptions]:
     """Return the model of the options that the driver has for a study."""
     if not study.has_runs:
         return RunOptions
-    return BatchOptions if study.has_cluster else LedgerOptions
+    return ClusterOptions if study.has_cluster else LedgerOptions
 
 
 def execute(order: Order) -> tuple[Result, Facts, tuple[str, ...]]:
@@ -196,7 +196,7 @@ def execute(order: Order) -> tuple[Result, Facts, tuple[str, ...]]:
     for text in about_machines:
         say(f"warning: {text}", err=True)
     task = study.begin(options, *machines)
-    run = Run(
+    run = CommandRun(
         study.folder_owner,
         order.run.overwrite,
         _identity(study, machine, task.identity) if study.has_runs and machine else {},
@@ -259,7 +259,7 @@ def _stepping(machine: "Machine | None") -> tuple[float, str]:
     return checked_step(machine.parameters, None), checked_integrator(machine.parameters, None)
 
 
-def _written(result: Result, facts: Facts, out: Path | None, run: Run) -> tuple[str, ...]:
+def _written(result: Result, facts: Facts, out: Path | None, run: CommandRun) -> tuple[str, ...]:
     if out is None:
         return ()
     with result_folder(out, run, RUNS_KEPT if run.identity else "") as folder:
@@ -314,7 +314,7 @@ def _figures_in(folder: Path | None) -> Iterator[None]:
 
 
 @contextmanager
-def _executor(order: Order, run: Run) -> Iterator[Executor]:
+def _executor(order: Order, run: CommandRun) -> Iterator[Executor]:
     """Yield what runs the cases of a study, with an open ledger if the study has runs.
 
     Raises:
@@ -329,7 +329,7 @@ def _executor(order: Order, run: Run) -> Iterator[Executor]:
             return
         with ExitStack() as stack:
             client = None
-            if isinstance(chosen, BatchOptions) and chosen.cluster is not None:
+            if isinstance(chosen, ClusterOptions) and chosen.cluster is not None:
                 from wm_drake.batch.cluster import cluster_client
 
                 client = stack.enter_context(cluster_client(chosen.cluster))
@@ -347,7 +347,7 @@ def _executor(order: Order, run: Run) -> Iterator[Executor]:
 
 
 @contextmanager
-def _ledger(chosen: LedgerOptions, run: Run) -> "Iterator[Ledger]":
+def _ledger(chosen: LedgerOptions, run: CommandRun) -> "Iterator[Ledger]":
     """Open the ledger of a study in its folder, or in a temporary one if nothing is written.
 
     If no run finished and no result was written, this function removes what it created: the ledger,

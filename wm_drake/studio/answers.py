@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from wm_drake.batch.runs import Runner, RunResult, TubMotion
+from wm_drake.batch.runs import Runner, RunResult, ShownMotion
 from wm_drake.batch.work_items import BatchKey, Preparation, WorkItem
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.errors import InputError, Problem
@@ -26,8 +26,7 @@ from wm_drake.model.scene import Gap
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.plausibility import unusual_numbers
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Unit
-from wm_drake.report.formatting import plain, shape_name
+from wm_drake.report.formatting import MM_PER_M, MS_PER_S, RPM_PER_RAD_S, plain, shape_name
 from wm_drake.simulation.band import band_warnings, pass_band
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.displacements import local_maxima, replay_samples
@@ -39,7 +38,7 @@ from wm_drake.studies.inputs import friction_warnings
 from wm_drake.studies.spin.figures import ORBIT_REVOLUTIONS, have_one_orbit, orbit_window
 from wm_drake.studio.machines import OpenMachine, is_same
 from wm_drake.studio.parts import words_of
-from wm_drake.studio.state import State
+from wm_drake.studio.state import PageState
 
 FIRST = ("amplitudes", "gap", "extremes", "mounts")
 """Measures that the page shows first, in this order."""
@@ -53,12 +52,8 @@ LANES = WIDTH - 1
 BINS = 350
 """Number of time bins of a force; each is drawn from its smallest to its largest value."""
 
-_MM, _RPM = Unit("m", "mm"), Unit("rad/s", "rpm")
-MM_PER_M, RPM_PER_RAD_S = _MM.from_si(1.0), _RPM.from_si(1.0)
-MS_PER_S = 1e3
-"""Times are sent in whole milliseconds, displacements in whole micrometres."""
-
 MICRO = 1e6
+"""Displacements are sent in whole micrometres, times in whole milliseconds."""
 
 
 def shown_measures() -> tuple[str, ...]:
@@ -79,7 +74,7 @@ def runner_of(machine: OpenMachine) -> Runner:
     return Runner(machine.parameters, shown_measures(), histories={0})
 
 
-def picture(machine: OpenMachine, runner: Runner, state: State) -> dict[str, Any]:
+def picture(machine: OpenMachine, runner: Runner, state: PageState) -> dict[str, Any]:
     """Run what a page has chosen and return the motion, and the gap with each load."""
     with machine.lock:
         case = machine.case(state)
@@ -94,7 +89,7 @@ def picture(machine: OpenMachine, runner: Runner, state: State) -> dict[str, Any
         setup = items[0].numbers.setup
         profile, period = batch_key.profile, batch_key.period
         warnings = [
-            *(Problem("", "profile.band", text) for text in band_warnings(profile, period)),
+            *(Problem("", "profile.band", text) for text in band_warnings(profile)),
             *unusual_numbers(setup.parameters, state.values),
             *unusual_springs(setup),
             *(Problem("", "damper_types", text) for text in friction_warnings(setup.parameters)),
@@ -123,7 +118,7 @@ def picture(machine: OpenMachine, runner: Runner, state: State) -> dict[str, Any
 
 
 def numbers(
-    machine: OpenMachine, runner: Runner, state: State, keys: Sequence[str] = ()
+    machine: OpenMachine, runner: Runner, state: PageState, keys: Sequence[str] = ()
 ) -> dict[str, Any]:
     """Run what a page has chosen and return measures, forces and arrows.
 
@@ -141,13 +136,13 @@ def numbers(
 
 
 def arrows(
-    machine: OpenMachine, runner: Runner, state: State, keys: Sequence[str]
+    machine: OpenMachine, runner: Runner, state: PageState, keys: Sequence[str]
 ) -> list[dict[str, Any]]:
     """Return the arrow of each of up to `LANES` numbers, without the answer itself."""
     return _arrows(machine, *_run_turned(machine, runner, state, keys))
 
 
-def influential_keys(machine: OpenMachine, state: State) -> list[str]:
+def influential_keys(machine: OpenMachine, state: PageState) -> list[str]:
     """Return the numbers that can change a run of a state: not the cabinet, no other load."""
     prefix = f"loads.{state.load}." if not state.masses else "no load of the machine"
     with machine.lock:
@@ -163,7 +158,7 @@ def influential_keys(machine: OpenMachine, state: State) -> list[str]:
 
 
 def _run_turned(
-    machine: OpenMachine, runner: Runner, state: State, keys: Sequence[str]
+    machine: OpenMachine, runner: Runner, state: PageState, keys: Sequence[str]
 ) -> tuple[list[tuple[str, float, Case]], dict[int, RunResult]]:
     """Run a case and its turned cases side by side; return these and the results by number."""
     with machine.lock:
@@ -313,7 +308,7 @@ def _motion(run: RunResult, setup: Setup) -> dict[str, Any]:
     }
 
 
-def _envelopes(motion: TubMotion) -> list[dict[str, Any]]:
+def _envelopes(motion: ShownMotion) -> list[dict[str, Any]]:
     """Return the corners of the upper and lower envelope of each sensor: straight lines between.
 
     They are `measures.envelopes`, which are lines from peak to peak, without the samples between.
@@ -333,7 +328,7 @@ def _envelopes(motion: TubMotion) -> list[dict[str, Any]]:
     return corners
 
 
-def _orbits(motion: TubMotion, setup: Setup) -> list[dict[str, Any]]:
+def _orbits(motion: ShownMotion, setup: Setup) -> list[dict[str, Any]]:
     """Return the paths of the drum axis around the largest amplitude, at the sensors' depths."""
     depths = [point[1] for point in setup.sensor_points.values()]
     front, rear = float(min(depths)), float(max(depths))

@@ -21,7 +21,7 @@ from wm_drake.studies.study import STUDIES
 from wm_drake.studio.forms import arguments
 from wm_drake.studio.machines import Machines, OpenMachine
 from wm_drake.studio.saving import chosen, write_machine
-from wm_drake.studio.state import State
+from wm_drake.studio.state import PageState
 
 MOST_RUNNING = 4
 """Largest number of studies that run at a time."""
@@ -53,7 +53,7 @@ class Jobs:
         self,
         machines: Machines,
         machine: OpenMachine,
-        state: State,
+        state: PageState,
         study: str,
         options: dict[str, str],
     ) -> str:

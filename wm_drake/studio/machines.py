@@ -25,7 +25,7 @@ from wm_drake.parameters import (
     source_of,
     with_values,
 )
-from wm_drake.parameters.elements import Table
+from wm_drake.parameters.elements import CurveTable
 from wm_drake.parameters.keys import AllowedRange, allowed_range, is_index
 from wm_drake.parameters.plausibility import UsualRange, usual_range
 from wm_drake.parameters.units import Unit
@@ -34,7 +34,7 @@ from wm_drake.simulation.cases import Case, case_of
 from wm_drake.simulation.mounts import mount_names
 from wm_drake.simulation.steps import checked_integrator, checked_step
 from wm_drake.studio.parts import CALCULATION, PART_ORDER, part_and_group, places_of
-from wm_drake.studio.state import DESCRIBED, State
+from wm_drake.studio.state import DESCRIBED, PageState
 from wm_drake.studio.turns import SharedValues
 
 GIVEN = "given"
@@ -241,7 +241,7 @@ def with_curves(parameters: MachineParameters) -> Iterator[tuple[str, Any, Unit]
     curves = set()
     for key, value, unit in quantities(parameters):
         curve = key.rpartition(".")[0]
-        if not isinstance(value, tuple) or not isinstance(value_at(parameters, curve), Table):
+        if not isinstance(value, tuple) or not isinstance(value_at(parameters, curve), CurveTable):
             yield key, value, unit
         elif curve not in curves:
             curves.add(curve)
@@ -383,7 +383,7 @@ class OpenMachine:
         given = {key: self._value(key, text) for key, text in values.items()}
         return with_values(with_sdf_values(self.machine.plant, parameters, given), given)
 
-    def _value(self, key: str, text: str) -> str | float | Table:
+    def _value(self, key: str, text: str) -> str | float | CurveTable:
         """Return what a text sets: itself, the number of an entry, or a scaled curve."""
         slider = self.sliders.get(key)
         if slider is None or not (slider.is_entry or slider.number.is_table):
@@ -393,7 +393,7 @@ class OpenMachine:
             raise input_error(f"{text} is out of range; allowed is >= 0", key=key)
         return slider.number.at(value)
 
-    def case(self, state: State) -> Case:
+    def case(self, state: PageState) -> Case:
         """Return the case that a page has chosen.
 
         Raises:
@@ -409,7 +409,7 @@ class OpenMachine:
         check_length(case)
         return case
 
-    def shown_values(self, case: Case, state: State) -> dict[str, float]:
+    def shown_values(self, case: Case, state: PageState) -> dict[str, float]:
         """Return the moved numbers of a case in their display units, by key path."""
         assert case.parameters is not None  # a page's case has parameters of its own
         return {
@@ -418,7 +418,7 @@ class OpenMachine:
             if key in self.sliders
         }
 
-    def measured(self, state: State) -> list[dict[str, object]]:
+    def measured(self, state: PageState) -> list[dict[str, object]]:
         """Return what was measured of the machine with a load: source and amplitudes [mm]."""
         if state.masses:
             return []

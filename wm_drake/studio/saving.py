@@ -11,7 +11,7 @@ from wm_drake.parameters import MachineParameters, load_machine, machine_path, s
 from wm_drake.parameters.files import extended_files, machine_changes, yaml_text
 from wm_drake.report.provenance import now
 from wm_drake.studio.machines import Machines, OpenMachine
-from wm_drake.studio.state import DESCRIBED, State
+from wm_drake.studio.state import DESCRIBED, PageState
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,63}")
 
@@ -24,7 +24,7 @@ class ExistsAlreadyError(InputError):
 
 
 def save_machine(
-    machines: Machines, machine: OpenMachine, state: State, name: str, overwrite: bool
+    machines: Machines, machine: OpenMachine, state: PageState, name: str, overwrite: bool
 ) -> Path:
     """Write what a page has chosen as a machine file into the folder of the machines.
 
@@ -57,7 +57,7 @@ def save_machine(
     return path
 
 
-def chosen(machine: OpenMachine, state: State) -> MachineParameters:
+def chosen(machine: OpenMachine, state: PageState) -> MachineParameters:
     """Return the machine that a page has chosen: numbers, described load, gasket in or out."""
     parameters = machine.moved(state.values)
     sources = dict(parameters.sources)

@@ -37,7 +37,7 @@ from wm_drake.studio.guard import Guard
 from wm_drake.studio.jobs import Jobs
 from wm_drake.studio.machines import Machines, OpenMachine
 from wm_drake.studio.saving import ExistsAlreadyError, save_machine
-from wm_drake.studio.state import State, Text
+from wm_drake.studio.state import PageState, Text
 from wm_drake.studio.turns import OvertakenError, Turns
 
 STATIC = Path(__file__).parent / "static"
@@ -61,7 +61,7 @@ class RunRequest(_Body):
     """A run of what a page has chosen; `page` names the page."""
 
     page: Text
-    state: State
+    state: PageState
 
 
 class NumbersRequest(RunRequest):
@@ -73,7 +73,7 @@ class NumbersRequest(RunRequest):
 class SaveRequest(_Body):
     """A machine to save."""
 
-    state: State
+    state: PageState
     name: Text
     overwrite: bool = False
 
@@ -81,7 +81,7 @@ class SaveRequest(_Body):
 class StudyRequest(_Body):
     """A study to start."""
 
-    state: State
+    state: PageState
     study: Text
     options: Annotated[dict[Text, Text], Field(max_length=8)] = {}
 
@@ -110,7 +110,7 @@ class Studio:
             gc.freeze()
         return machine, *self._runners[machine]
 
-    def picture(self, state: State) -> dict[str, Any]:
+    def picture(self, state: PageState) -> dict[str, Any]:
         """Return the first part of the answer to a page, with the time that it took."""
         begin = time.perf_counter(), time.thread_time()
         machine, runner, _ = self.opened(state.machine)
@@ -118,12 +118,12 @@ class Studio:
         passed = time.perf_counter() - begin[0], time.thread_time() - begin[1]
         return drawn | {"server_s": {"wall": passed[0], "cpu": passed[1]}}
 
-    def numbers(self, state: State, keys: list[str]) -> dict[str, Any]:
+    def numbers(self, state: PageState, keys: list[str]) -> dict[str, Any]:
         """Return the second part of the answer to a page."""
         machine, _, runner = self.opened(state.machine)
         return numbers(machine, runner, state, keys)
 
-    async def ranking(self, state: State) -> list[dict[str, Any]]:
+    async def ranking(self, state: PageState) -> list[dict[str, Any]]:
         """Return the arrows of all numbers that influence a run; pages share the work."""
         key = state.model_dump_json()
         task = self._rankings.get(key)
@@ -134,7 +134,7 @@ class Studio:
                 del self._rankings[next(iter(self._rankings))]
         return await asyncio.shield(task)
 
-    async def _rank(self, key: str, state: State) -> list[dict[str, Any]]:
+    async def _rank(self, key: str, state: PageState) -> list[dict[str, Any]]:
         take = partial(self.turns.take, f"ranking {key}", background=True)
         machine, _, runner = await take(lambda: self.opened(state.machine))
         keys = await take(partial(influential_keys, machine, state))

@@ -14,7 +14,7 @@ DESCRIBED = "described"
 """Name of a load of which the user gave the masses on the page."""
 
 
-class Mass(BaseModel):
+class DescribedMass(BaseModel):
     """A point mass of a described load, with the keys and units of a machine file."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -24,7 +24,7 @@ class Mass(BaseModel):
     phase: Text
 
 
-class State(BaseModel):
+class PageState(BaseModel):
     """What a page has chosen; all that a permanent link holds.
 
     Attributes:
@@ -39,7 +39,7 @@ class State(BaseModel):
     machine: Text
     values: Annotated[dict[Text, Text], Field(max_length=1000)] = {}
     load: Text
-    masses: Annotated[tuple[Mass, ...], Field(max_length=20)] = ()
+    masses: Annotated[tuple[DescribedMass, ...], Field(max_length=20)] = ()
     gasket: bool = True
 
     def described_load(self) -> Load:

@@ -13,11 +13,11 @@ from wm_drake.model.build import build_machine
 from wm_drake.parameters import load_machine
 from wm_drake.parameters.files import yaml_text
 from wm_drake.parameters.free import Measured, load_free
-from wm_drake.studies.calibrate.computed import Evaluation, Runner
+from wm_drake.studies.calibrate.computed import Evaluation, PointRunner
 from wm_drake.studies.calibrate.parameter_map import parameter_map_of
 from wm_drake.studies.calibrate.prediction import predict
 from wm_drake.studies.calibrate.solutions import Solution, distinct, solved_machine
-from wm_drake.studies.calibrate.study import Plan, calibrate, identity_of
+from wm_drake.studies.calibrate.study import SearchPlan, calibrate, identity_of
 from wm_drake.studies.calibrate.tables import (
     amplitude_rows,
     prediction_table,
@@ -224,7 +224,9 @@ def test_point_whose_step_is_too_long_is_nan_and_the_first_start_is_refused(shor
         open_ledger(tmp_path / "ledger.sqlite", {}) as ledger,
         pytest.raises(InputError, match="is too long for the tub"),
     ):
-        calibrate(Runner(short, ledger), load_free(path), targets, Plan(starts=1, iterations=1))
+        calibrate(
+            PointRunner(short, ledger), load_free(path), targets, SearchPlan(starts=1, iterations=1)
+        )
 
 
 def test_point_that_only_the_gasket_holds_is_nan_for_loads_without_it(short, tmp_path):
@@ -274,7 +276,7 @@ def test_expected_preload_is_prior_not_data(short, tmp_path):
     targets = Targets((("middle", True),), ("Xr",) * 6, np.full((1, 6), 0.01), np.ones((1, 6)))
     with open_ledger(tmp_path / "ledger.sqlite", {"study": "test"}) as ledger:
         (found,) = calibrate(
-            Runner(short, ledger), free, targets, Plan(starts=1, iterations=1)
+            PointRunner(short, ledger), free, targets, SearchPlan(starts=1, iterations=1)
         ).ended
     assert found.posterior.slopes.shape == (6, 3)
     parameter_map = parameter_map_of(short, free)
@@ -345,7 +347,10 @@ def test_search_keeps_a_limit_that_the_cost_alone_does_not(short, tmp_path):
     for number, limits in enumerate(({}, {"Xr": 0.03})):
         with open_ledger(tmp_path / f"{number}.sqlite", {"study": "test"}) as ledger:
             (found,) = calibrate(
-                Runner(short, ledger), free, targets.limited(limits), Plan(starts=1, iterations=20)
+                PointRunner(short, ledger),
+                free,
+                targets.limited(limits),
+                SearchPlan(starts=1, iterations=20),
             ).ended
         errors.append(abs(found.errors[0, place]))
     assert errors[0] > 0.05
@@ -371,11 +376,11 @@ def recovered(short, tmp_path_factory):
     truth = parameter_map.expected + np.array([-0.7, 0.6, 0.9]) * parameter_map.deviation
     targets, plan = (
         planted(short, parameter_map, truth),
-        Plan(starts=2, seed=4, iterations=12, deviation=0.002, resolution=0.0),
+        SearchPlan(starts=2, seed=4, iterations=12, deviation=0.002, resolution=0.0),
     )
     with open_ledger(folder / "ledger.sqlite", identity_of(short, free, targets, plan)) as ledger:
-        calibration = calibrate(Runner(short, ledger), free, targets, plan)
-        predictions = predict(Runner(short, ledger), free, calibration, [["middle"]])
+        calibration = calibrate(PointRunner(short, ledger), free, targets, plan)
+        predictions = predict(PointRunner(short, ledger), free, calibration, [["middle"]])
         ledger.mark_finished()
     return truth, free, targets, plan, calibration, predictions, folder
 
@@ -404,7 +409,7 @@ def test_start_values_of_the_free_file_are_not_used_for_predictions(short, recov
     assert np.array_equal(parameter_map_of(short, started).start, truth)
     identity = identity_of(short, started, targets, plan)
     with open_ledger(tmp_path / "ledger.sqlite", identity) as ledger:
-        (again,) = predict(Runner(short, ledger), started, calibration, [["middle"]])
+        (again,) = predict(PointRunner(short, ledger), started, calibration, [["middle"]])
     assert np.array_equal(again.amplitude, predictions[0].amplitude)
 
 
@@ -429,10 +434,10 @@ def test_interrupted_calibration_continues_where_it_stopped(short, tmp_path, rec
 
     path = tmp_path / "ledger.sqlite"
     with pytest.raises(KeyboardInterrupt), open_ledger(path, identity) as ledger:
-        calibrate(Runner(short, ledger, report=stop), free, targets, plan)
+        calibrate(PointRunner(short, ledger, report=stop), free, targets, plan)
     with open_ledger(path, identity, resume=True) as ledger:
         assert len(ledger) > 5
-        resumed = calibrate(Runner(short, ledger, workers=1), free, targets, plan)
+        resumed = calibrate(PointRunner(short, ledger, workers=1), free, targets, plan)
     assert quantity_table(resumed).equals(
         quantity_table(calibration)
     )  # also: any number of workers

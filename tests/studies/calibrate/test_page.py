@@ -12,7 +12,7 @@ from wm_drake.studies.calibrate.page import CalibrateResult, certainty, drawn_pa
 from wm_drake.studies.calibrate.parameter_map import parameter_map_of
 from wm_drake.studies.calibrate.prediction import Prediction
 from wm_drake.studies.calibrate.solutions import Solution
-from wm_drake.studies.calibrate.study import Calibration, Plan
+from wm_drake.studies.calibrate.study import Calibration, SearchPlan
 from wm_drake.studies.calibrate.targets import Targets
 from wm_drake.studies.fitting.posterior import Posterior
 from wm_drake.studies.machine_show.description import natural_modes
@@ -47,7 +47,9 @@ def calibration(machine, tmp_path_factory):
     mirrored = Posterior(-coordinates, slopes, 18)
     other = replace(best, start=1, data_cost=21.0, posterior=mirrored, evaluations=77)
     bad = replace(best, start=2, amplitude=2.0 * computed, data_cost=2000.0, evaluations=55)
-    return Calibration(parameter_map, targets, Plan(starts=3), (best, other), (best, other, bad))
+    return Calibration(
+        parameter_map, targets, SearchPlan(starts=3), (best, other), (best, other, bad)
+    )
 
 
 @pytest.fixture(scope="module")

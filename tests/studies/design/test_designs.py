@@ -11,7 +11,7 @@ from pages import data_of, drawings
 
 from wm_drake.errors import InputError
 from wm_drake.parameters import load_machine
-from wm_drake.parameters.designs import DESIGNS, DesignTask, load_design
+from wm_drake.parameters.designs import DESIGNS, DesignFile, load_design
 from wm_drake.parameters.tolerances import Tolerances
 from wm_drake.simulation.cases import Case, case_of
 from wm_drake.studies.design.page import design_answer
@@ -43,7 +43,7 @@ def task_of(**changes):
         "variables": {"k": {"keys": (SPRING,), "low": "50 %", "high": "150 %"}},
         "objectives": ({"quantity": "Dx"}, {"quantity": "Fx"}),
     }
-    return DesignTask.model_validate(tree | changes)
+    return DesignFile.model_validate(tree | changes)
 
 
 def designs_of(machine, task):

@@ -5,7 +5,7 @@ import pytest
 
 pytest.importorskip("pymoo")
 
-from wm_drake.studies.design.search import Problem, SearchSettings, hypervolume, search_front
+from wm_drake.studies.design.search import DesignProblem, SearchSettings, hypervolume, search_front
 from wm_drake.studies.design.surrogate import search_with_surfaces
 
 
@@ -26,7 +26,7 @@ def zdt2(x):
     ids=["ZDT1", "ZDT2"],
 )
 def test_front_of_zdt(problem, front):
-    found = search_front(Problem(problem, np.full(6, 0.5), 2), SearchSettings(6400, seed=1))
+    found = search_front(DesignProblem(problem, np.full(6, 0.5), 2), SearchSettings(6400, seed=1))
     f = found.objectives
     above = f[:, 1] - front(f[:, 0])
     assert above.min() >= -1e-12
@@ -46,7 +46,7 @@ def test_search_evaluates_exactly_as_many_designs_as_wanted():
         asked.append(len(x))
         return zdt1(x)
 
-    found = search_front(Problem(counted, np.full(6, 0.5), 2), SearchSettings(100, 64))
+    found = search_front(DesignProblem(counted, np.full(6, 0.5), 2), SearchSettings(100, 64))
     assert (asked, found.evaluations) == ([64, 36], 100)
     assert found.history[-1][0] == 100
 
@@ -57,7 +57,7 @@ def circle(x):
 
 
 def test_constrained_front():
-    found = search_front(Problem(circle, np.ones(2), 2, 1), SearchSettings(4000))
+    found = search_front(DesignProblem(circle, np.ones(2), 2, 1), SearchSettings(4000))
     radius = np.hypot(*found.objectives.T)
     assert radius.min() >= 0.8 - 1e-12
     assert np.quantile(radius, 0.9) == pytest.approx(0.8, abs=0.01)
@@ -73,7 +73,9 @@ def test_three_objectives_on_a_sphere():
         f = [np.cos(a) * np.cos(b), np.cos(a) * np.sin(b), np.sin(a)]
         return r[:, None] * np.column_stack(f), np.empty((len(x), 0))
 
-    found = search_front(Problem(dtlz2, np.full(5, 0.3), 3), SearchSettings(4000, population=60))
+    found = search_front(
+        DesignProblem(dtlz2, np.full(5, 0.3), 3), SearchSettings(4000, population=60)
+    )
     assert np.linalg.norm(found.objectives, axis=1) == pytest.approx(1.0, abs=0.05)
 
 
@@ -90,7 +92,7 @@ def test_best_damper_of_two_masses():
         size = np.abs(inner / ((1.0 - ratio**2) * inner - mu * ratio**2 * (f**2 + s)))
         return size.max(axis=1, keepdims=True), np.empty((len(x), 0))
 
-    found = search_front(Problem(response, np.array([0.1, 0.9]), 1), SearchSettings(4000))
+    found = search_front(DesignProblem(response, np.array([0.1, 0.9]), 1), SearchSettings(4000))
     (x,) = found.designs[:1]
     assert 0.7 + 0.6 * x[0] == pytest.approx(1.0 / 1.1, rel=0.01)
     assert 0.02 + 0.4 * x[1] == pytest.approx(np.sqrt(3.0 * mu / (8.0 * 1.1)), rel=0.03)
@@ -99,7 +101,9 @@ def test_best_damper_of_two_masses():
 
 def test_same_seed_gives_the_same_front_and_another_not():
     fronts = [
-        search_front(Problem(zdt1, np.full(3, 0.5), 2), SearchSettings(320, seed=seed)).objectives
+        search_front(
+            DesignProblem(zdt1, np.full(3, 0.5), 2), SearchSettings(320, seed=seed)
+        ).objectives
         for seed in (0, 0, 1)
     ]
     assert np.array_equal(fronts[0], fronts[1])
@@ -112,7 +116,7 @@ def test_designs_that_cannot_run_are_not_on_the_front(search):
         f, g = zdt1(x)
         return np.where(x[:, :1] < 0.5, np.nan, f), g
 
-    found = search(Problem(half, np.full(3, 0.9), 2), SearchSettings(64, population=32))
+    found = search(DesignProblem(half, np.full(3, 0.9), 2), SearchSettings(64, population=32))
     assert len(found.designs)
     assert (found.designs[:, 0] >= 0.5).all()
 
@@ -128,7 +132,7 @@ def test_hypervolume_of_known_points():
     ("problem", "size", "constraints"), [(zdt1, 6, 0), (circle, 2, 1)], ids=["ZDT1", "circle"]
 )
 def test_surfaces_need_fewer_designs(problem, size, constraints):
-    whole = Problem(problem, np.full(size, 0.9), 2, constraints)
+    whole = DesignProblem(problem, np.full(size, 0.9), 2, constraints)
     genetic = search_front(whole, SearchSettings(256, 32, seed=1))
     found = search_with_surfaces(whole, SearchSettings(96, 32, seed=1))
     # both scale with the same first population, so that hypervolumes can be compared
@@ -142,7 +146,7 @@ def test_surfaces_need_fewer_designs(problem, size, constraints):
 
 
 def test_surfaces_find_the_front_of_zdt1_again_with_the_same_seed():
-    arguments = Problem(zdt1, np.full(6, 0.9), 2), SearchSettings(112, 32, seed=2)
+    arguments = DesignProblem(zdt1, np.full(6, 0.9), 2), SearchSettings(112, 32, seed=2)
     found, again = (search_with_surfaces(*arguments) for _ in range(2))
     above = found.objectives[:, 1] - (1.0 - np.sqrt(found.objectives[:, 0]))
     assert above.min() >= -1e-12

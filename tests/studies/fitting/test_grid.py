@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from wm_drake.studies.fitting.grid import grid_search
-from wm_drake.studies.fitting.problem import Problem, Residuals, Unknown
+from wm_drake.studies.fitting.problem import CostProblem, Residuals, Unknown
 
 LOWER, UPPER = np.array([0.0, -1.0]), np.array([4.0, 7.0])
 
 
-class FunctionProblem(Problem):
+class FunctionProblem(CostProblem):
     """A problem whose cost at a point (2,) is that of a function."""
 
     unknowns = tuple(Unknown(name, *ends) for name, *ends in zip("xy", LOWER, UPPER, strict=True))

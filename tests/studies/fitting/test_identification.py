@@ -14,7 +14,7 @@ from wm_drake.studies.fitting.methods import METHODS, identify
 from wm_drake.studies.fitting.problem import FitProblem, Measurement, Unknown, point_by_point
 from wm_drake.studies.fitting.surfaces import (
     QuadraticSurface,
-    Region,
+    SurfaceRegion,
     response_surface,
     surface_design,
 )
@@ -112,7 +112,7 @@ def test_points_of_a_region_keep_to_the_ranges_and_fill_it():
         design = surface_design(p)
         for _ in range(50):
             axes = np.linalg.qr(rng.normal(size=(p, p)))[0] * rng.uniform(0.01, 0.5, p)
-            region = Region(
+            region = SurfaceRegion(
                 rng.uniform(0.0, 1.0, p).round(), 0.0, axes
             )  # its centre is a corner of the ranges
             points = region.designed(design)
@@ -298,9 +298,9 @@ def test_a_quadratic_is_its_own_surface(p):
     assert len(design) >= p + p * (p + 1) // 2
     surface = QuadraticSurface(design, value(design), float(value(np.zeros((1, p)))[0]))
     assert surface.hessian == pytest.approx(hessian, abs=1e-9)
-    assert surface.least_place(Region(np.full(p, 0.5), 0.0, 0.1 * np.eye(p))) == pytest.approx(
-        least, abs=1e-4
-    )
+    assert surface.least_place(
+        SurfaceRegion(np.full(p, 0.5), 0.0, 0.1 * np.eye(p))
+    ) == pytest.approx(least, abs=1e-4)
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from wm_drake.studies.spin.comparison import (
     steady_window,
 )
 from wm_drake.studies.spin.comparison_page import effect_amplitudes, effect_summary
-from wm_drake.studies.spin.study import CaseResult, Comparison, SpinRuns
+from wm_drake.studies.spin.study import CaseResult, ComparedCases, SpinRuns
 
 SENSORS = ["Xr", "Yr", "Zr", "Xf", "Yf", "Zf"]
 
@@ -60,10 +60,10 @@ def result(parameters, gasket, transient, steady, comparison):
     table = xr.Dataset({"amplitude": sizes, "critical_speed": sizes})
     measures = Measures(table, None, None, None, has_cabinet=False)
     results = (CaseResult(case, record, measures, 0.0),)
-    return SpinRuns(parameters, "compiled", 0.0025, results, comparison)
+    return SpinRuns(parameters, "compiled", results, comparison)
 
 
-@pytest.mark.parametrize("comparison", [Comparison.AS_MEASURED, Comparison.NONE])
+@pytest.mark.parametrize("comparison", [ComparedCases.AS_MEASURED, ComparedCases.NONE])
 def test_differences_are_those_of_equation_1(reference, comparison):
     effect = effect_table(
         result(reference, False, 0.020, 0.0050, comparison),
@@ -79,7 +79,7 @@ def test_differences_are_those_of_equation_1(reference, comparison):
         "differ by up to 4.0 %"
     ) in text
     shown = effect_amplitudes(effect)
-    if comparison is Comparison.NONE:
+    if comparison is ComparedCases.NONE:
         assert table["experiment_percent"].isna().all()
         assert "experiment" not in text
         assert len(shown.groups[0].rows) == 3
@@ -93,7 +93,7 @@ def test_differences_are_those_of_equation_1(reference, comparison):
 def test_of_several_machines_each_row_names_its_machine(reference):
     other = reference.model_copy(update={"name": "other"})
     variants = [
-        Variant("", result(machine, gasket, size, 0.005, Comparison.NONE))
+        Variant("", result(machine, gasket, size, 0.005, ComparedCases.NONE))
         for machine in (reference, other)
         for gasket, size in ((True, 0.03), (False, 0.02))
     ]

@@ -17,7 +17,7 @@ from wm_drake.parameters.tolerances import (
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.measures.responses import Response
-from wm_drake.studies.tolerance.study import Settings, limits_of, run_tolerances
+from wm_drake.studies.tolerance.study import ToleranceSettings, limits_of, run_tolerances
 from wm_drake.studies.tolerance.variables import uncertain_machine
 from wm_drake.studies.tolerance.words import in_percent, rare_sentences, summary
 
@@ -184,7 +184,7 @@ EXACT = stats.norm.cdf(-0.03 / np.hypot(0.01, 0.002))
 
 
 def test_study_finds_the_probability_of_contact(study):
-    result = study(Settings(2048, 256, 0))
+    result = study(ToleranceSettings(2048, 256, 0))
     contact = result.contact
     assert contact.method == "crude count"
     assert contact.lower < EXACT < contact.upper
@@ -196,7 +196,7 @@ def test_study_finds_the_probability_of_contact(study):
 
 
 def test_rare_contact_is_found_by_subset_simulation(study):
-    result = study(Settings(256, 0, 1000))
+    result = study(ToleranceSettings(256, 0, 1000))
     assert result.contact.method == "subset simulation"
     assert result.contact.lower < EXACT < result.contact.upper
     assert result.contact.rare.evaluations < 5000
@@ -207,7 +207,7 @@ def test_rare_contact_is_found_by_subset_simulation(study):
 
 
 def test_words_claim_no_more_than_the_samples_support(study):
-    result = study(Settings(16, 0, 100), shift=1.0)
+    result = study(ToleranceSettings(16, 0, 100), shift=1.0)
     assert (result.contact.method, result.contact.estimate) == ("crude count", 0.0)
     assert result.contact.upper == pytest.approx(1.0 - 0.05 ** (1 / 16))
     words = " ".join(summary(result))
@@ -218,7 +218,9 @@ def test_words_claim_no_more_than_the_samples_support(study):
 
 
 def test_correlated_quantities_have_no_sobol_indices(study):
-    result = study(Settings(64, 64, 0), {"quantities": ("k", "f"), "matrix": ((1, 0.5), (0.5, 1))})
+    result = study(
+        ToleranceSettings(64, 64, 0), {"quantities": ("k", "f"), "matrix": ((1, 0.5), (0.5, 1))}
+    )
     assert not result.indices
     assert "correlated" in result.refused
     assert "Shapley effects" in result.refused
@@ -231,7 +233,7 @@ def test_correlated_quantities_have_no_sobol_indices(study):
 )
 def test_verdict_of_a_limit(study, limit, allowed, word):
     wanted = Limit(quantity="gap", at_least=limit, allowed_share=allowed)
-    (verdict,) = study(Settings(512, 0, 0), limits=[wanted]).verdicts
+    (verdict,) = study(ToleranceSettings(512, 0, 0), limits=[wanted]).verdicts
     assert verdict.word == word
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import ForceElementIndex, RevoluteJoint, SpatialInertia
+from pydrake.multibody.tree import RevoluteJoint, SpatialInertia
 from pydrake.systems.framework import Context
 
 from wm_drake.compiler.matrices import about_centre, inverse
@@ -27,7 +27,7 @@ from wm_drake.engines.compiled.mechanics import (
 )
 from wm_drake.engines.compiled.tubes import TUBES as TUBES_NUMBERS
 from wm_drake.errors import InputError, input_error
-from wm_drake.model.bodies import DRUM, with_load
+from wm_drake.model.bodies import DRUM, axis_pose, drawn_frame, drawn_pose, moved_to, with_load
 from wm_drake.model.machine import Setup
 from wm_drake.model.state_layout import CABINET, CARRIER
 from wm_drake.parameters import Load, SpinProfile
@@ -189,13 +189,15 @@ def pack_tubes(setup: Setup, name: str) -> FloatArray:
         )
     outer_inertia, inner_inertia = (
         plant.CalcSpatialInertia(
-            context, body.body_frame(), [part.index() for part in plant.GetBodiesWeldedTo(body)]
+            context,
+            drawn_frame(plant, body),
+            [part.index() for part in plant.GetBodiesWeldedTo(body)],
         )
         for body in (joint.parent_body(), joint.child_body())
     )
     # inertia of the inner tube in the frame of the outer one, at extension 0
     frames = joint.frame_on_parent(), joint.frame_on_child()
-    X_OI = frames[0].GetFixedPoseInBodyFrame() @ frames[1].GetFixedPoseInBodyFrame().inverse()
+    X_OI = drawn_pose(plant, frames[0]) @ frames[1].GetFixedPoseInBodyFrame().inverse()
     inner_inertia = inner_inertia.ReExpress(X_OI.rotation()).Shift(-X_OI.translation())
     m, s = inner_inertia.get_mass(), _moment(inner_inertia)
     a = setup.telescopes[name].axis
@@ -221,7 +223,7 @@ def pack_rigid(setup: Setup, name: str) -> FloatArray:
     plant, context = setup.machine.plant, setup.plant_context
     body = plant.GetBodyByName(name)
     group = [other.index() for other in plant.GetBodiesWeldedTo(body)]
-    inertia = plant.CalcSpatialInertia(context, body.body_frame(), group)
+    inertia = plant.CalcSpatialInertia(context, drawn_frame(plant, body), group)
     q, moment, six = 1.0 / inertia.get_mass(), _moment(inertia), _six(_matrix(inertia))
     central = about_centre(tuple(six), tuple(moment), q)
     return TUB.pack(inverse_mass=q, moment=moment, inertia=six, inverse_inertia=inverse(central))
@@ -259,7 +261,8 @@ class DrawnBodies:
 
     def _read(self, plant: MultibodyPlant, context: Context, joint: RevoluteJoint) -> None:
         tub = plant.GetBodyByName(CARRIER if plant.HasBodyNamed(CARRIER) else "tub")
-        X_TF = plant.CalcRelativeTransform(context, tub.body_frame(), joint.frame_on_parent())
+        frame = drawn_frame(plant, tub)  # T
+        X_TF = plant.CalcRelativeTransform(context, frame, joint.frame_on_parent())
         axis, origin = X_TF.rotation() @ joint.revolute_axis(), X_TF.translation()
         drum = plant.GetBodyByName(DRUM)
         groups = (
@@ -267,13 +270,14 @@ class DrawnBodies:
             for body in (tub, joint.child_body())
         )
         of_tub, self._welded_to_drum = (
-            plant.CalcSpatialInertia(context, tub.body_frame(), group).Shift(origin)
+            plant.CalcSpatialInertia(context, frame, group).Shift(origin)
             if group
             else SpatialInertia.Zero()
             for group in groups
         )
-        self._drum = drum.CalcSpatialInertiaInBodyFrame(context)
-        X_TD = plant.CalcRelativeTransform(context, tub.body_frame(), drum.body_frame())
+        X_BD = axis_pose(plant)
+        self._drum = moved_to(drum.CalcSpatialInertiaInBodyFrame(context), X_BD)
+        X_TD = plant.CalcRelativeTransform(context, frame, drum.body_frame()) @ X_BD
         self._R_TD = X_TD.rotation()
         self._p_DoO_T = np.asarray(origin - X_TD.translation())
         self._tub_mass = of_tub.get_mass()
@@ -319,7 +323,7 @@ def drum_joint(plant: MultibodyPlant, name: str) -> RevoluteJoint:
     """Return the joint that the drive turns.
 
     Raises:
-        InputError: the plant has a joint or a force that the compiled engine does not represent.
+        InputError: the plant has a joint that the compiled engine does not represent.
     """
     joint = plant.GetJointByName(name)
     if not isinstance(joint, RevoluteJoint):
@@ -333,9 +337,6 @@ def drum_joint(plant: MultibodyPlant, name: str) -> RevoluteJoint:
         raise _not_represented(
             f"joint '{name}' has the tub as its child, not as its parent", "drive.joint"
         )
-    if plant.num_force_elements() > 1:  # the first is gravity
-        force = plant.get_force_element(ForceElementIndex(1))
-        raise _not_represented(f"force element {type(force).__name__} of the SDF", "model")
     return joint
 
 

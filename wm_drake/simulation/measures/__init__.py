@@ -7,7 +7,7 @@ family. A package of a user adds measures with `wm_drake.register_measure`.
 
 from wm_drake.simulation.measures.kind import Measure, Variable, each_run
 from wm_drake.simulation.measures.record import Measures, measure
-from wm_drake.simulation.measures.registry import MEASURES, register_measure
+from wm_drake.simulation.measures.registry import MEASURES, measure_named, register_measure
 from wm_drake.simulation.measures.run import Run
 
 __all__ = [
@@ -18,5 +18,6 @@ __all__ = [
     "Variable",
     "each_run",
     "measure",
+    "measure_named",
     "register_measure",
 ]

@@ -16,7 +16,7 @@ from wm_drake.simulation.drive import DriveMeasures, drive_measures
 from wm_drake.simulation.feet import FootLoads, foot_loads
 from wm_drake.simulation.measures.as_json import labelled_values
 from wm_drake.simulation.measures.kind import Measure
-from wm_drake.simulation.measures.registry import MEASURES
+from wm_drake.simulation.measures.registry import MEASURES, measure_named
 from wm_drake.simulation.measures.run import FeetLoaded, Need, Run
 from wm_drake.simulation.mount_forces import speed_ranges
 from wm_drake.simulation.mount_histories import sum_mounts_history
@@ -70,6 +70,9 @@ class Measures:
     def to_dataframe(self) -> "pd.DataFrame":
         """Return a row for each number: measure, what it is of, value, unit for reading.
 
+        Numbers that the record does not give are left out: the gap without the scene of `measure`,
+        forces of feet without a cabinet.
+
         Example:
             >>> import wm_drake as wm
             >>> table = wm.measure(wm.simulate("reference", "middle")).to_dataframe()
@@ -84,6 +87,7 @@ class Measures:
             for variable in measure.variables
             if variable.name in self.table
             for labels, value in labelled_values(self.table, variable)
+            if value is not None
         ]
         return pd.DataFrame(rows, columns=["measure", "of", "value", "unit"])
 
@@ -94,7 +98,10 @@ class Measures:
 
     def _repr_html_(self) -> str:
         """Return the table for a notebook."""
-        return str(self.to_dataframe().to_html(index=False, max_rows=60))
+        table = str(self.to_dataframe().to_html(index=False, max_rows=60))
+        if self.smallest_gap is None:
+            table += "<p>The smallest gap needs wm.measure(record, wm.Scene(parameters)).</p>"
+        return table
 
     @property
     def values(self) -> list[FloatArray]:
@@ -124,8 +131,8 @@ def measure(
     Args:
         record: Record of a run, from `wm_drake.simulation.runs.simulate`.
         scene: Shapes of the machine. If None, the smallest gap is not computed.
-        measures: Names of measures, keys of `wm_drake.simulation.measures.MEASURES`; None for those
-            that every run of `spin` has.
+        measures: Names of measures or of their variables, in
+            `wm_drake.simulation.measures.MEASURES`; None for those that every run of `spin` has.
 
     Raises:
         InputError: there is no such measure.
@@ -141,7 +148,7 @@ def measure(
     if measures is None:
         chosen = [measure for measure in MEASURES.values() if measure.is_in_spin]
     else:
-        chosen = [MEASURES.find(name, key="measures") for name in measures]
+        chosen = list(dict.fromkeys(measure_named(name, key="measures") for name in measures))
     variables: dict[str, Any] = {}
     for one in chosen:
         values = one.evaluate([run]) if run.has(one) else [None] * len(one.variables)

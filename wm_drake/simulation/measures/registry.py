@@ -33,6 +33,20 @@ def tabulated() -> list[Variable]:
     return [one for measure in shown for one in measure.variables if one.json is not None]
 
 
+def measure_named(name: str, key: str = "") -> Measure:
+    """Return the measure of a name: its own, or that of one of its variables, as responses have.
+
+    Args:
+        key: Key path for messages.
+
+    Raises:
+        InputError: there is no such measure.
+    """
+    owners = (one for one in MEASURES.values() if name in one.names)
+    owner = None if name in MEASURES else next(owners, None)
+    return owner or MEASURES.find(name, key=key)
+
+
 def register_measure(measure: Measure) -> Measure:
     """Add a measure to those that every study, page and command knows, and return it.
 

@@ -240,7 +240,7 @@ def pays_from(speeds: FloatArray, free: FloatArray, held: FloatArray) -> float:
 
 
 @dataclass(frozen=True)
-class Trials:
+class BalancerTrials:
     """Runs of loads with free and with locked balls.
 
     Attributes:
@@ -369,7 +369,7 @@ class Trials:
 
 
 def released(speeds: Sequence[float], free: xr.Dataset, held: xr.Dataset) -> xr.Dataset:
-    """Return releases, as of `Trials.releases`.
+    """Return releases, as of `BalancerTrials.releases`.
 
     Args:
         speeds: Speeds of the releases. [rad/s]
@@ -411,11 +411,11 @@ def lock_below(loads: xr.Dataset) -> float:
     return float(speeds.max()) if len(speeds) else np.nan
 
 
-def numbers_of(trials: Trials, loads: xr.Dataset, plain: xr.Dataset) -> xr.Dataset:
+def numbers_of(trials: BalancerTrials, loads: xr.Dataset, plain: xr.Dataset) -> xr.Dataset:
     """Return the run-up, what the balls can do, and the machine without rings, as single numbers.
 
     Args:
-        loads, plain: As of `Trials.loads` and `Trials.plain`.
+        loads, plain: As of `BalancerTrials.loads` and `BalancerTrials.plain`.
 
     Returns:
         `rate` [rad/s^2], `highest_speed`, `picked_up_from`, `lock_below` [rad/s], `capacity`

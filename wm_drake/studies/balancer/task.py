@@ -17,7 +17,7 @@ from wm_drake.studies.balancer.study import (
     PLACE,
     RATE,
     WINDOW,
-    Trials,
+    BalancerTrials,
     base_of,
     numbers_of,
     with_factors,
@@ -54,7 +54,7 @@ class BalancerTask(Task):
         self.ball_masses = _values(options.ball_mass, PART, "--ball-mass")
         self.dampings = _values(options.damping, PART, "--damping")
         self.rate = _values(options.rate, RATE.unit, "--rate")[0]
-        self.high = max(parameters.profile.speed)
+        self.high = parameters.profile.highest_speed
         if options.high is not None:
             self.high = _values(options.high, SPEED.unit, "--to")[0]
         if self.high < 4.0 * WINDOW * (1.0 - 1e-9):  # 100 rpm, in rad/s, is rounded
@@ -79,7 +79,7 @@ class BalancerTask(Task):
 
     def run(self, executor: Executor) -> Answer:
         """Run loads, rings and releases."""
-        trials = Trials(self.machine, executor, self.high, self.rate, self.radius)
+        trials = BalancerTrials(self.machine, executor, self.high, self.rate, self.radius)
         loads = trials.loads(self.masses, self.places)
         base = base_of(loads)
         rings = trials.rings(base, self.ball_masses, self.dampings)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wm_drake.batch import simulate_many
-from wm_drake.batch.ledger import Ledger, Result, key_of
+from wm_drake.batch.ledger import Ledger, LedgerEntry, key_of
 from wm_drake.errors import InputError
 from wm_drake.model.machine import Machine, Setup
 from wm_drake.parameters.types import FloatArray
@@ -77,7 +77,9 @@ class Evaluation:
             rows = new[begin : begin + AT_ONCE]
             computed = self._computed(points[rows])
             results = {
-                keys[i]: Result({kind: array[row] for kind, array in computed._asdict().items()})
+                keys[i]: LedgerEntry(
+                    {kind: array[row] for kind, array in computed._asdict().items()}
+                )
                 for row, i in enumerate(rows)
             }
             ledger.put_all(results)
@@ -167,7 +169,7 @@ class Evaluation:
 
 
 @dataclass(frozen=True)
-class Runner:
+class PointRunner:
     """Machine, ledger and threads with which points are evaluated.
 
     Attributes:

@@ -32,7 +32,7 @@ from wm_drake.studies.calibrate.tables import (
 from wm_drake.studies.machine_show.description import Modes, natural_modes
 from wm_drake.studies.spin import tables
 from wm_drake.studies.spin.figures import envelopes_figure
-from wm_drake.studies.spin.study import Comparison, SpinRuns, band_text, run_spin
+from wm_drake.studies.spin.study import ComparedCases, SpinRuns, band_text, run_spin
 from wm_drake.studies.study import Facts, Result
 
 
@@ -136,7 +136,7 @@ def drawn_page(
         modes: Titles and natural modes of that machine, for each state that is shown.
         facts: How the result was computed.
     """
-    best = replace(best, comparison=Comparison.ALL)  # the targets were named
+    best = replace(best, comparison=ComparedCases.ALL)  # the targets were named
     table = tables.amplitude_table(best)
     return SectionedPage(
         f"Calibration of machine {best.parameters.name}",

@@ -19,7 +19,7 @@ COMPONENTS = {"x": 0, "y": 1, "z": 2}
 
 
 @dataclass(frozen=True)
-class Value:
+class FreeValue:
     """A value of the machine that depends on free quantities.
 
     Attributes:
@@ -105,7 +105,7 @@ class ParameterMap:
     expected: FloatArray
     deviation: FloatArray
     start: FloatArray
-    values: tuple[Value, ...]
+    values: tuple[FreeValue, ...]
     preload: tuple[float, float] | None
     elongation: tuple[float, float] | None
     relations: tuple[KnownRatio, ...]
@@ -212,7 +212,7 @@ def _known_ratios(free: FreeFile) -> Iterator[KnownRatio]:
         )
 
 
-def _value(key: str, known: Mapping[str, tuple[Any, Unit]], free: FreeFile) -> Value:
+def _value(key: str, known: Mapping[str, tuple[Any, Unit]], free: FreeFile) -> FreeValue:
     name, _, last = key.rpartition(".")
     component = None
     if key not in known and last in COMPONENTS and name in known:
@@ -235,7 +235,7 @@ def _value(key: str, known: Mapping[str, tuple[Any, Unit]], free: FreeFile) -> V
     constant = sum(
         (entry.value.values[0] * factors(entry) for entry in entering.values()), np.zeros(size)
     )
-    return Value(
+    return FreeValue(
         shape_key,
         component,
         np.array([factors(quantity) for quantity in free.quantities.values()]),

@@ -13,15 +13,15 @@ import numpy as np
 from wm_drake.errors import check_known, input_error
 from wm_drake.parameters.free import FreeFile
 from wm_drake.parameters.types import FloatArray
-from wm_drake.studies.calibrate.computed import Evaluation, Runner
+from wm_drake.studies.calibrate.computed import Evaluation, PointRunner
 from wm_drake.studies.calibrate.response_targets import ResponseTarget
 from wm_drake.studies.calibrate.solutions import Solution
-from wm_drake.studies.calibrate.study import Calibration, Plan, calibrate
+from wm_drake.studies.calibrate.study import Calibration, SearchPlan, calibrate
 from wm_drake.studies.calibrate.targets import AMPLITUDE, Targets
 
 
 @dataclass(frozen=True)
-class Kind:
+class KindErrors:
     """Errors of the values of one kind in a prediction; each is a fraction.
 
     Attributes:
@@ -72,12 +72,12 @@ class Prediction:
         """Fraction of the held-out values that the intervals contain."""
         return float(np.mean(np.concatenate([kind.is_covered for kind in self.kinds()])))
 
-    def kinds(self) -> tuple[Kind, ...]:
+    def kinds(self) -> tuple[KindErrors, ...]:
         """Return the errors of each kind of held-out values, amplitudes first."""
         targets, cases = self.with_all.targets, self.cases
         measured = targets.amplitude
         predicted, lower, upper = self.amplitude
-        amplitudes = Kind(
+        amplitudes = KindErrors(
             AMPLITUDE,
             (self.with_all.amplitude / measured - 1.0)[cases].ravel(),
             (predicted / measured - 1.0)[cases].ravel(),
@@ -88,7 +88,7 @@ class Prediction:
         others = map(self._kind, names)
         return amplitudes, *(kind for kind in others if kind.predicted.size)
 
-    def _kind(self, name: str) -> Kind:
+    def _kind(self, name: str) -> KindErrors:
         """Return the errors of the responses of one kind."""
         targets, others = self.with_all.targets.responses, self.without.targets.responses
         held = [
@@ -101,7 +101,7 @@ class Prediction:
 
         predicted, lower, upper = self.responses
         covered = [bool(lower[k] <= targets[k].value <= upper[k]) for k in held]
-        return Kind(
+        return KindErrors(
             name,
             errors(self.with_all.responses),
             errors(predicted),
@@ -115,11 +115,11 @@ LEVEL = 0.95
 
 
 def predict(
-    runner: Runner,
+    runner: PointRunner,
     free: FreeFile,
     calibration: Calibration,
     held_out: Sequence[Sequence[str]],
-    plan: Plan | None = None,
+    plan: SearchPlan | None = None,
 ) -> list[Prediction]:
     """Repeat a calibration once for each group of held-out loads.
 

@@ -9,7 +9,7 @@ from wm_drake.batch.remembered import model_version, sources_version
 from wm_drake.model.machine import Machine
 from wm_drake.parameters.free import FreeFile
 from wm_drake.parameters.types import FloatArray
-from wm_drake.studies.calibrate.computed import Evaluation, Runner
+from wm_drake.studies.calibrate.computed import Evaluation, PointRunner
 from wm_drake.studies.calibrate.parameter_map import ParameterMap, parameter_map_of
 from wm_drake.studies.calibrate.solutions import Solution, distinct
 from wm_drake.studies.calibrate.targets import Targets
@@ -45,7 +45,7 @@ ITERATIONS = 60
 
 
 @dataclass(frozen=True)
-class Plan:
+class SearchPlan:
     """Settings of the search.
 
     Attributes:
@@ -88,12 +88,14 @@ class Calibration:
 
     parameter_map: ParameterMap
     targets: Targets
-    plan: Plan
+    plan: SearchPlan
     solutions: tuple[Solution, ...]
     ended: tuple[Solution, ...]
 
 
-def identity_of(machine: Machine, free: FreeFile, targets: Targets, plan: Plan) -> dict[str, str]:
+def identity_of(
+    machine: Machine, free: FreeFile, targets: Targets, plan: SearchPlan
+) -> dict[str, str]:
     """Return the texts that identify a calibration in its ledger."""
     return {
         "study": "calibration",
@@ -108,7 +110,9 @@ def identity_of(machine: Machine, free: FreeFile, targets: Targets, plan: Plan) 
     }
 
 
-def calibrate(runner: Runner, free: FreeFile, targets: Targets, plan: Plan) -> Calibration:
+def calibrate(
+    runner: PointRunner, free: FreeFile, targets: Targets, plan: SearchPlan
+) -> Calibration:
     """Search for machines with the measured amplitudes.
 
     Each evaluation is stored in the ledger before it is used. A search that is started again takes
@@ -140,7 +144,7 @@ def calibrate(runner: Runner, free: FreeFile, targets: Targets, plan: Plan) -> C
     return Calibration(parameter_map, targets, plan, tuple(distinct(ended)), tuple(ended))
 
 
-def calibration_problem(values: Evaluation, plan: Plan) -> PriorProblem:
+def calibration_problem(values: Evaluation, plan: SearchPlan) -> PriorProblem:
     """Return the problem of the free quantities of an evaluation.
 
     The first `targets.count` residuals are those of the data. Those of values that have a limit

@@ -14,7 +14,7 @@ from wm_drake.parameters import MachineParameters, located
 from wm_drake.parameters.free import load_free
 from wm_drake.parameters.measured import measured_amplitudes, measured_responses
 from wm_drake.parameters.units import plain_number
-from wm_drake.studies.calibrate.computed import Runner
+from wm_drake.studies.calibrate.computed import PointRunner
 from wm_drake.studies.calibrate.options import CalibrateOptions
 from wm_drake.studies.calibrate.page import CalibrateResult
 from wm_drake.studies.calibrate.parameter_map import parameter_map_of
@@ -22,7 +22,7 @@ from wm_drake.studies.calibrate.prediction import check_held_out, predict
 from wm_drake.studies.calibrate.response_targets import with_deviations
 from wm_drake.studies.calibrate.study import (
     RELATIVE_DEVIATION,
-    Plan,
+    SearchPlan,
     calibrate,
 )
 from wm_drake.studies.calibrate.targets import AMPLITUDE, Targets, targets_of
@@ -50,7 +50,9 @@ class CalibrateTask(Task):
         # the calibrated machine names the targets as its measurements
         self.machine = build_machine(measured) if options.targets else machine
         resolution = 1e-3 * options.resolution
-        self.plan = Plan(options.starts, options.seed, options.iterations, amplitude, resolution)
+        self.plan = SearchPlan(
+            options.starts, options.seed, options.iterations, amplitude, resolution
+        )
         self.free = load_free(existing_file(options.free, "--free"))
         check_held_out(self.targets, self.held_out)
         try:
@@ -71,7 +73,7 @@ class CalibrateTask(Task):
     def run(self, executor: Executor) -> CalibrateResult:
         """Calibrate, and predict the held-out loads."""
         assert executor.ledger is not None  # the study is declared with runs
-        runner = Runner(self.machine, executor.ledger, executor.workers)
+        runner = PointRunner(self.machine, executor.ledger, executor.workers)
         with _searches(executor, runner, self.plan.starts) as shown:
             calibration = calibrate(shown, self.free, self.targets, self.plan)
         with _searches(executor, runner, len(self.held_out) * self.plan.starts) as shown:
@@ -80,7 +82,7 @@ class CalibrateTask(Task):
 
 
 @contextmanager
-def _searches(executor: Executor, runner: Runner, searches: int) -> Iterator[Runner]:
+def _searches(executor: Executor, runner: PointRunner, searches: int) -> Iterator[PointRunner]:
     """Yield the runner with a progress bar of searches, machines and the least cost."""
     with executor.progress(searches, "searches") as bar:
         ended, last = 0, (0, 0)

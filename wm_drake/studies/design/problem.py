@@ -1,15 +1,15 @@
 """Designs of a machine as points of the unit cube, and their objectives and constraints."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from wm_drake.errors import InputError, Problem, input_error
 from wm_drake.parameters import MachineParameters, Variation, quantities, variation_of, with_values
-from wm_drake.parameters.designs import Constraint, DesignTask, Objective
+from wm_drake.parameters.designs import Constraint, DesignFile, Objective
 from wm_drake.parameters.tolerances import fraction
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
@@ -17,10 +17,8 @@ from wm_drake.parameters.variation import value_at
 from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.cases import Case, load_of
 from wm_drake.simulation.measures.responses import Response, chosen_responses
+from wm_drake.studies.executor import RunCases
 from wm_drake.studies.tolerance.variables import UncertainMachine
-
-Run: TypeAlias = Callable[[Iterable[Case]], xr.Dataset]
-"""Function that runs cases and returns their table."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +60,7 @@ class Range:
 
 
 @dataclass(frozen=True)
-class Options:
+class OptionVariable:
     """A choice among options.
 
     Attributes:
@@ -91,7 +89,7 @@ class Options:
 
 
 @dataclass(frozen=True)
-class Goal:
+class DesignGoal:
     """An objective or a constraint with what it is computed from.
 
     Attributes:
@@ -151,15 +149,15 @@ class MachineDesigns:
     """
 
     parameters: MachineParameters
-    dimensions: tuple[Range | Options, ...]
-    objectives: tuple[Goal, ...]
-    constraints: tuple[Goal, ...]
+    dimensions: tuple[Range | OptionVariable, ...]
+    objectives: tuple[DesignGoal, ...]
+    constraints: tuple[DesignGoal, ...]
     cases: tuple[Case, ...]
     scattered: Callable[[MachineParameters], UncertainMachine] | None = None
     scores: FloatArray | None = None
 
     @property
-    def goals(self) -> tuple[Goal, ...]:
+    def goals(self) -> tuple[DesignGoal, ...]:
         """Objectives, then constraints."""
         return (*self.objectives, *self.constraints)
 
@@ -210,7 +208,7 @@ class MachineDesigns:
             return self.runs_of(parameters, name)
         return self.scattered(parameters).cases(np.zeros((1, self.scores.shape[1])))
 
-    def evaluate(self, designs: FloatArray, run: Run) -> tuple[FloatArray, FloatArray]:
+    def evaluate(self, designs: FloatArray, run: RunCases) -> tuple[FloatArray, FloatArray]:
         """Return values of all objectives, then of all constraints, in units for reading.
 
         Args:
@@ -225,7 +223,7 @@ class MachineDesigns:
         )
         return columns[:, : len(self.objectives)], columns[:, len(self.objectives) :]
 
-    def scenario_values(self, designs: FloatArray, run: Run) -> list[FloatArray]:
+    def scenario_values(self, designs: FloatArray, run: RunCases) -> list[FloatArray]:
         """Return the values of each goal by design and scenario, in units for reading.
 
         Args:
@@ -253,7 +251,7 @@ class MachineDesigns:
             by_goal.append(np.where(failed, np.nan, values).reshape(len(designs), -1))
         return by_goal
 
-    def costs(self, designs: FloatArray, run: Run) -> tuple[FloatArray, FloatArray]:
+    def costs(self, designs: FloatArray, run: RunCases) -> tuple[FloatArray, FloatArray]:
         """Return what the search makes small, and constraints that are met at 0 and below."""
         objectives, constraints = self.evaluate(designs, run)
         f = [g.cost(column) for g, column in zip(self.objectives, objectives.T, strict=True)]
@@ -263,7 +261,7 @@ class MachineDesigns:
 
 def machine_designs(
     parameters: MachineParameters,
-    task: DesignTask,
+    task: DesignFile,
     cases: Sequence[Case],
     scattered: Callable[[MachineParameters], UncertainMachine] | None = None,
     scores: FloatArray | None = None,
@@ -281,7 +279,7 @@ def machine_designs(
         InputError: the machine does not have a key or a response, or a bound is wrong.
     """
     dimensions, problems = _dimensions(parameters, task)
-    goals: dict[str, list[Goal]] = {"objectives": [], "constraints": []}
+    goals: dict[str, list[DesignGoal]] = {"objectives": [], "constraints": []}
     known = {key: (value, unit) for key, value, unit in quantities(parameters)}
     for kind, listed in goals.items():
         for place, given in enumerate(getattr(task, kind)):
@@ -303,10 +301,10 @@ def machine_designs(
 
 
 def _dimensions(
-    parameters: MachineParameters, task: DesignTask
-) -> tuple[list[Range | Options], list[Problem]]:
+    parameters: MachineParameters, task: DesignFile
+) -> tuple[list[Range | OptionVariable], list[Problem]]:
     """Return the variables and choices of a file, and what is wrong with them."""
-    dimensions, problems = list[Range | Options](), list[Problem]()
+    dimensions, problems = list[Range | OptionVariable](), list[Problem]()
     for name, given in task.variables.items():
         texts = {"low": given.low, "high": given.high}
         try:
@@ -317,7 +315,7 @@ def _dimensions(
         except InputError as error:
             problems += [Problem(f"variable {name}", p.key, p.message) for p in error.problems]
     for name, choice in task.choices.items():
-        dimensions.append(Options(name, choice.options))
+        dimensions.append(OptionVariable(name, choice.options))
         for option, values in choice.options.items():
             try:
                 with_values(parameters, values)
@@ -332,7 +330,7 @@ def _goal(
     case: Case,
     given: Objective | Constraint,
     known: dict[str, tuple[Any, Unit]],
-) -> Goal:
+) -> DesignGoal:
     limit_text = None if isinstance(given, Objective) else given.text
     response, unit = None, Unit("", "")
     if given.quantity in known:
@@ -350,4 +348,4 @@ def _goal(
         limit = float("nan") if limit_text is None else unit.from_si(unit.number(limit_text))
     except ValueError as error:
         raise input_error(str(error)) from None
-    return Goal(given, response, unit, limit)
+    return DesignGoal(given, response, unit, limit)

@@ -11,7 +11,7 @@ from scipy import stats
 from wm_drake.errors import WmDrakeError, input_error
 from wm_drake.parameters.types import FloatArray
 
-Evaluate: TypeAlias = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+EvaluateDesigns: TypeAlias = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 """Function of designs (n, d) in [0, 1] with objectives (n, m), which are to be small, and
 constraints (n, k), which are met at 0 and below. NaN marks a design that cannot be evaluated."""
 
@@ -66,7 +66,7 @@ def hypervolume(objectives: FloatArray, first: FloatArray) -> float:
 
 
 @dataclass(frozen=True)
-class Problem:
+class DesignProblem:
     """What a search makes small.
 
     Attributes:
@@ -75,7 +75,7 @@ class Problem:
         objectives, constraints: Their numbers.
     """
 
-    evaluate: Evaluate
+    evaluate: EvaluateDesigns
     start: FloatArray
     objectives: int
     constraints: int = 0
@@ -110,7 +110,7 @@ class SearchSettings:
             )
 
 
-def search_front(problem: Problem, settings: SearchSettings) -> SearchResult:
+def search_front(problem: DesignProblem, settings: SearchSettings) -> SearchResult:
     """Return the Pareto front of a problem.
 
     With up to two objectives the search is NSGA-II, with more NSGA-III. The first population is the
@@ -167,7 +167,7 @@ def first_population(start: FloatArray, settings: SearchSettings) -> FloatArray:
 
 
 def minimized(
-    problem: Problem,
+    problem: DesignProblem,
     points: FloatArray,
     until: tuple[str, int],
     settings: SearchSettings,

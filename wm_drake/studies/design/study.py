@@ -16,9 +16,10 @@ from wm_drake.report.quantity import TIME, Quantity
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.displacements import envelopes
 from wm_drake.simulation.records import Record, sample_period
-from wm_drake.studies.design.problem import Goal, MachineDesigns, Run
-from wm_drake.studies.design.search import Problem, SearchSettings, search_front
+from wm_drake.studies.design.problem import DesignGoal, MachineDesigns
+from wm_drake.studies.design.search import DesignProblem, SearchSettings, search_front
 from wm_drake.studies.design.surrogate import search_with_surfaces
+from wm_drake.studies.executor import RunCases
 from wm_drake.studies.tolerance.distributions import base_samples
 from wm_drake.studies.tolerance.shares import CONFIDENCE, Percentile, percentile_of
 
@@ -35,7 +36,7 @@ ENVELOPE = Quantity("largest envelope", Unit("m", "mm"))
 
 
 def run_designs(
-    designs: MachineDesigns, run: Run, settings: SearchSettings, search: str = "genetic"
+    designs: MachineDesigns, run: RunCases, settings: SearchSettings, search: str = "genetic"
 ) -> xr.Dataset:
     """Search the Pareto front of the designs of a machine.
 
@@ -49,7 +50,7 @@ def run_designs(
         machine itself, moved into the bounds, as `nominal_Dx`. Attribute `chosen`: numbers of
         chosen designs by name: best Dx, ..., compromise.
     """
-    problem = Problem(
+    problem = DesignProblem(
         lambda x: designs.costs(x, run),
         designs.nominal(),
         len(designs.objectives),
@@ -80,7 +81,7 @@ def run_designs(
     )
 
 
-def chosen_designs(goals: tuple[Goal, ...], costs: FloatArray) -> dict[str, int]:
+def chosen_designs(goals: tuple[DesignGoal, ...], costs: FloatArray) -> dict[str, int]:
     """Return the number of the best design of each objective, and of a compromise, by name.
 
     The compromise has the smallest distance to the best of all objectives, which are scaled to the
@@ -99,7 +100,7 @@ def chosen_designs(goals: tuple[Goal, ...], costs: FloatArray) -> dict[str, int]
     return chosen
 
 
-def _values(goal: Goal, cost: FloatArray) -> FloatArray:
+def _values(goal: DesignGoal, cost: FloatArray) -> FloatArray:
     """Return SI values of a goal from what the search made small."""
     signed = cost if goal.is_small_better else -cost
     return goal.quantity.to_si(signed if np.isnan(goal.limit) else signed + goal.limit)
@@ -112,7 +113,7 @@ OTHER_SEED = 1_000_003
 """Added to the seed of the search for the fresh samples."""
 
 
-def promises(designs: MachineDesigns, front: xr.Dataset, run: Run, seed: int) -> xr.Dataset:
+def promises(designs: MachineDesigns, front: xr.Dataset, run: RunCases, seed: int) -> xr.Dataset:
     """Return what the chosen designs of a robust front promise, and keep on fresh samples.
 
     Returns:
@@ -140,7 +141,7 @@ def promises(designs: MachineDesigns, front: xr.Dataset, run: Run, seed: int) ->
     return data
 
 
-def _promise(goal: Goal, pairs: Sequence[tuple[Percentile, Percentile]]) -> dict[str, Any]:
+def _promise(goal: DesignGoal, pairs: Sequence[tuple[Percentile, Percentile]]) -> dict[str, Any]:
     """Return the variables of a goal in the dataset of promises.
 
     Args:
@@ -167,7 +168,7 @@ def _promise(goal: Goal, pairs: Sequence[tuple[Percentile, Percentile]]) -> dict
     }
 
 
-def _is_kept(goal: Goal, promised: Percentile, fresh: Percentile) -> bool | None:
+def _is_kept(goal: DesignGoal, promised: Percentile, fresh: Percentile) -> bool | None:
     """Return whether a fresh value is not worse than the worse end of the promised interval.
 
     It is None for the worst of the samples.
@@ -179,7 +180,7 @@ def _is_kept(goal: Goal, promised: Percentile, fresh: Percentile) -> bool | None
     return bool(fresh.value >= promised.lower)
 
 
-def summary_of(goal: Goal, values: FloatArray) -> Percentile:
+def summary_of(goal: DesignGoal, values: FloatArray) -> Percentile:
     """Return the value of a goal over samples of one design, with its 95 % interval.
 
     A run that failed has NaN, and so has then the value.

@@ -14,7 +14,7 @@ from scipy.interpolate import RBFInterpolator
 
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.design.search import (
-    Problem,
+    DesignProblem,
     SearchResult,
     SearchSettings,
     first_population,
@@ -35,7 +35,7 @@ SAME = 1e-3
 """Distance below which two designs count as the same. [length of the unit cube]"""
 
 
-def search_with_surfaces(problem: Problem, settings: SearchSettings) -> SearchResult:
+def search_with_surfaces(problem: DesignProblem, settings: SearchSettings) -> SearchResult:
     """Return the Pareto front of a problem, as `search_front` does."""
     known, evaluations = _Known(problem), settings.evaluations
     known.add(first_population(problem.start, settings))
@@ -60,7 +60,7 @@ class _Known:
         first: Objectives of the first population.
     """
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: DesignProblem) -> None:
         """Begin without designs."""
         self.problem = problem
         self.x: FloatArray = np.empty((0, len(problem.start)))

@@ -2,18 +2,15 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TypeAlias
 
 import numpy as np
 from scipy.stats import t as student
 
-from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.types import FloatArray, IndexArray
 from wm_drake.studies.fitting.fit import Direction, Estimate, Fit, SearchLog, TestError
 from wm_drake.studies.fitting.problem import FitProblem, rmse
 from wm_drake.studies.fitting.profile import Profile
 from wm_drake.studies.fitting.search import descended
-
-IndexArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
 
 CONFIDENCE = 0.95
 

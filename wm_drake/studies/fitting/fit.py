@@ -8,13 +8,13 @@ import numpy as np
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.fitting.problem import FitProblem
 
-Verdict: TypeAlias = Literal["good", "fair", "poor"]
+FitVerdict: TypeAlias = Literal["good", "fair", "poor"]
 
 GOOD, FAIR = 0.05, 0.15
 """Largest lack of fit of a good and of a fair fit, as a part of the measured values."""
 
 
-def verdict_of(missed: float) -> Verdict:
+def verdict_of(missed: float) -> FitVerdict:
     """Return the verdict on a model that misses a part of the measured values."""
     if missed <= GOOD:
         return "good"

@@ -2,7 +2,7 @@
 
 No problem depends on an engine: its model is any function of the unknowns. It is evaluated at many
 points at once, so that it can run them side by side; `point_by_point` makes it from a function of
-one point. Searches, intervals and profiles use the interface `Problem` only.
+one point. Searches, intervals and profiles use the interface `CostProblem` only.
 """
 
 from abc import ABC, abstractmethod
@@ -17,7 +17,7 @@ from wm_drake.errors import input_error
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 
-Evaluate: TypeAlias = Callable[[FloatArray], FloatArray]
+EvaluatePoints: TypeAlias = Callable[[FloatArray], FloatArray]
 """Points (k, p), in SI -> computed values (k, n), those of all measurements in a row.
 
 A row of NaN means that the model fails at the point."""
@@ -91,7 +91,7 @@ class Residuals(NamedTuple):
     smooth: FloatArray
 
 
-class Problem(ABC):
+class CostProblem(ABC):
     """Problem of finding the unknowns with the least cost.
 
     A search moves in coordinates. The coordinate of an unknown (or of its logarithm) goes from 0 at
@@ -145,7 +145,7 @@ class Problem(ABC):
             self._logarithmic, np.exp(np.where(self._logarithmic, straight, 0.0)), straight
         )
 
-    def restricted(self, free: Sequence[int] | np.ndarray, held: FloatArray) -> "Problem":
+    def restricted(self, free: Sequence[int] | np.ndarray, held: FloatArray) -> "CostProblem":
         """Return the problem of some unknowns with all others held.
 
         Args:
@@ -178,10 +178,10 @@ class Problem(ABC):
 
 
 @dataclass(frozen=True, eq=False)
-class _Restricted(Problem):
-    """Problem of some unknowns of another one; see `Problem.restricted`."""
+class _Restricted(CostProblem):
+    """Problem of some unknowns of another one; see `CostProblem.restricted`."""
 
-    whole: Problem
+    whole: CostProblem
     free: np.ndarray
     held: FloatArray
 
@@ -202,7 +202,7 @@ class _Restricted(Problem):
 
 
 @dataclass(frozen=True, eq=False)
-class PriorProblem(Problem):
+class PriorProblem(CostProblem):
     """Problem of residuals in standard deviations, and of unknowns that all have a prior.
 
     The cost is half the sum of the squares of residuals and coordinates: the negative logarithm of
@@ -264,7 +264,7 @@ class Measurement:
 
 
 @dataclass(frozen=True, eq=False)
-class FitProblem(Problem):
+class FitProblem(CostProblem):
     """Problem of finding the unknowns with which the model is nearest to the measurements.
 
     Without unknowns the model is only evaluated.
@@ -274,7 +274,7 @@ class FitProblem(Problem):
 
     unknowns: tuple[Unknown, ...]
     measurements: tuple[Measurement, ...]
-    evaluate: Evaluate
+    evaluate: EvaluatePoints
 
     def __post_init__(self) -> None:
         """Check that there are data, and that unknowns have different names.
@@ -314,7 +314,7 @@ class FitProblem(Problem):
         return rmse(residuals)
 
 
-def point_by_point(model: Callable[[FloatArray], Sequence[FloatArray]]) -> Evaluate:
+def point_by_point(model: Callable[[FloatArray], Sequence[FloatArray]]) -> EvaluatePoints:
     """Return a model of many points from one of a point (p,): an array per measurement."""
     return lambda points: np.array([np.concatenate(model(point)) for point in points])
 

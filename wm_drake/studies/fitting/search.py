@@ -10,13 +10,13 @@ from scipy.stats import qmc
 
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.fitting.fit import SearchLog
-from wm_drake.studies.fitting.problem import FitProblem, Problem, Residuals, rmse
+from wm_drake.studies.fitting.problem import CostProblem, FitProblem, Residuals, rmse
 
 SAME_END = 1e-3
 """Searches whose costs differ by less than this part have the same end."""
 
 
-AnyProblem = TypeVar("AnyProblem", bound=Problem)
+AnyProblem = TypeVar("AnyProblem", bound=CostProblem)
 
 
 @dataclass(frozen=True)

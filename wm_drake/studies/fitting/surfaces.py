@@ -79,7 +79,7 @@ def response_surface(
 
 
 @dataclass(frozen=True, eq=False)
-class Region:
+class SurfaceRegion:
     """Region where a surface is fitted: centre + axes x, each |x| <= 1, within the ranges.
 
     Attributes:
@@ -118,11 +118,11 @@ class Region:
         """Return the places of points, the inverse of `points`."""
         return np.asarray(np.linalg.solve(self.axes, (points - self.centre).T).T)
 
-    def moved(self, centre: FloatArray, value: float) -> "Region":
+    def moved(self, centre: FloatArray, value: float) -> "SurfaceRegion":
         """Return the region about another centre."""
-        return Region(centre, value, self.axes)
+        return SurfaceRegion(centre, value, self.axes)
 
-    def reshaped(self, hessian: FloatArray, factor: float) -> "Region":
+    def reshaped(self, hessian: FloatArray, factor: float) -> "SurfaceRegion":
         """Return a region larger by a factor, with axes along which a surface bends more alike.
 
         Args:
@@ -134,22 +134,24 @@ class Region:
         stretch = np.clip(np.sqrt(np.exp(np.mean(np.log(bend))) / bend), 1.0 / STRETCH, STRETCH)
         perpendicular, lengths, _ = np.linalg.svd(factor * (self.axes @ directions) * stretch)
         lengths = np.minimum(lengths, WIDEST)
-        return Region(
+        return SurfaceRegion(
             self.centre, self.value, perpendicular * np.maximum(lengths, lengths.max() / SLENDEREST)
         )
 
 
-def _first_region(search: Search[FitProblem], seed: int, screened: int) -> Region:
+def _first_region(search: Search[FitProblem], seed: int, screened: int) -> SurfaceRegion:
     """Return the whole ranges, about the best of the problem's start and scattered points."""
     p = len(search.problem.unknowns)
     begins = np.concatenate([search.problem.start[None], scattered(p, screened, seed)])
     values = np.square(search.costs(begins))
     search.round_done()
     best = int(np.argmin(values))
-    return Region(begins[best], float(values[best]), WIDEST * np.eye(p))
+    return SurfaceRegion(begins[best], float(values[best]), WIDEST * np.eye(p))
 
 
-def _round(search: Search[FitProblem], region: Region, design: FloatArray) -> tuple[Region, bool]:
+def _round(
+    search: Search[FitProblem], region: SurfaceRegion, design: FloatArray
+) -> tuple[SurfaceRegion, bool]:
     """Return the region after a round, and whether the search ends."""
     points = region.designed(design)
     places, values = region.places(points), np.square(search.costs(points))
@@ -220,7 +222,7 @@ class QuadraticSurface:
         """Return the rise of the surface from its centre to a place (p,)."""
         return float((self.gradient + 0.5 * self.hessian @ place) @ place)
 
-    def least_place(self, region: Region) -> FloatArray:
+    def least_place(self, region: SurfaceRegion) -> FloatArray:
         """Return the least place of a region, searched from its centre and two opposite corners."""
         size = max(
             float(np.max(np.abs(self.hessian))), float(np.max(np.abs(self.gradient))), 1e-300

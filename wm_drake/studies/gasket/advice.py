@@ -12,7 +12,7 @@ from wm_drake.report.formatting import MISSING, listed, percent
 from wm_drake.report.table import Column, Group, Row, Table, table_of
 from wm_drake.simulation.measures.responses import GAP
 from wm_drake.studies.doe.coding import LEVELS
-from wm_drake.studies.gasket.proposal import MOST_LOSS, Change, Compared, Proposal
+from wm_drake.studies.gasket.proposal import MOST_LOSS, Compared, Proposal, ProposedChange
 from wm_drake.studies.gasket.screening import Screening, Words
 from wm_drake.studies.gasket.tables import digits
 
@@ -133,7 +133,7 @@ MOST_COSTS = 3
 """Largest number of costs that are named."""
 
 
-def _change_text(change: Change, words: Words) -> str:
+def _change_text(change: ProposedChange, words: Words) -> str:
     nominal = next(iter(change.factor.nominal.values()))
     if change.text.endswith("%"):
         return f"{words.factor(change.factor.name)} {change.text} of its table"

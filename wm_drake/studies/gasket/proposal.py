@@ -19,7 +19,7 @@ import numpy as np
 import pandas as pd
 
 from wm_drake.parameters import GASKET_FACTORS, FactorLevels, MachineParameters, load_factors
-from wm_drake.parameters.elements import Table
+from wm_drake.parameters.elements import CurveTable
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.variation import number_at
 from wm_drake.report.formatting import significant
@@ -158,7 +158,7 @@ def _with_few_changes(aim: Aim, places: FloatArray, least_gain: float) -> FloatA
 
 
 @dataclass(frozen=True)
-class Change:
+class ProposedChange:
     """Change of one factor.
 
     Attributes:
@@ -176,12 +176,12 @@ class Change:
         known, keys = load_factors(GASKET_FACTORS).get(self.factor.name), self.factor.settings[1]
         if known and set(known.keys) == set(keys):
             return {self.factor.name: self.text}
-        if any(isinstance(value, Table) for value in keys.values()) or len(keys) > 1:
+        if any(isinstance(value, CurveTable) for value in keys.values()) or len(keys) > 1:
             return {}
         return dict.fromkeys(keys, self.text)
 
 
-def change_of(machine: MachineParameters, factor: FactorLevels, place: float) -> Change:
+def change_of(machine: MachineParameters, factor: FactorLevels, place: float) -> ProposedChange:
     """Return the change of a factor to a place, rounded to what a person would write.
 
     Args:
@@ -189,7 +189,7 @@ def change_of(machine: MachineParameters, factor: FactorLevels, place: float) ->
     """
     key, numbers = next(iter(factor.numbers.items()))
     number, value = number_at(machine, key), float(np.interp(place, (-1.0, 0.0, 1.0), numbers))
-    if isinstance(number.original, Table):
+    if isinstance(number.original, CurveTable):
         assert number.nominal
         percent = round(100.0 * value / number.unit.from_si(number.nominal))
         value = 0.01 * percent * number.unit.from_si(number.nominal)
@@ -197,7 +197,7 @@ def change_of(machine: MachineParameters, factor: FactorLevels, place: float) ->
     else:
         text = f"{significant(value, 3)} {number.unit.shown}".replace("−", "-")
         value = float(f"{value:.3g}")
-    return Change(factor, text, float(np.interp(value, numbers, (-1.0, 0.0, 1.0))))
+    return ProposedChange(factor, text, float(np.interp(value, numbers, (-1.0, 0.0, 1.0))))
 
 
 @dataclass(frozen=True)
@@ -212,7 +212,7 @@ class Proposal:
         command: Command that runs the setting; "" if there is none.
     """
 
-    changes: tuple[Change, ...]
+    changes: tuple[ProposedChange, ...]
     check: Check
     studied: tuple[str, ...]
     is_machine: bool
@@ -278,7 +278,9 @@ ZERO = "level 0"
 """Name of the setting without any change."""
 
 
-def settings_of(changes: tuple[Change, ...], factors: tuple[FactorLevels, ...]) -> list[Setting]:
+def settings_of(
+    changes: tuple[ProposedChange, ...], factors: tuple[FactorLevels, ...]
+) -> list[Setting]:
     """Return level 0 and the setting of the changes, if there are any."""
     zero = Setting(ZERO, (0.0,) * len(factors))
     if not changes:
@@ -293,9 +295,9 @@ def is_level_zero(machine: MachineParameters, factors: tuple[FactorLevels, ...])
     for factor in factors:
         for key, value in factor.settings[1].items():
             original = number_at(machine, key).original
-            if isinstance(original, Table) != isinstance(value, Table):
+            if isinstance(original, CurveTable) != isinstance(value, CurveTable):
                 return False
-            middle = value.nominal_stiffness if isinstance(value, Table) else value
+            middle = value.nominal_stiffness if isinstance(value, CurveTable) else value
             if not np.isclose(middle, number_at(machine, key).nominal or 0.0, rtol=1e-6):
                 return False
     return True

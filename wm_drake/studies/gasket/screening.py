@@ -40,7 +40,7 @@ Label: TypeAlias = tuple[str, str]
 """Name of a load and name of a response."""
 
 
-Goal: TypeAlias = Literal["smaller", "larger", ""]
+Improvement: TypeAlias = Literal["smaller", "larger", ""]
 """Which change of a response is an improvement; "" if neither is."""
 
 
@@ -58,7 +58,7 @@ class Meaning:
     title: str
     about: str = ""
     kind: str = ""
-    goal: Goal = "smaller"
+    goal: Improvement = "smaller"
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class Responses:
     slack: dict[tuple[int, str], list[str]] = field(default_factory=dict)
 
 
-Evaluate: TypeAlias = Callable[[Design], Responses]
+EvaluateFactors: TypeAlias = Callable[[Design], Responses]
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ class Screening:
         return {label: r2 for label, r2 in predicted.items() if r2 < LEAST_PREDICTED_R2}
 
 
-def run_screening(design: Design, evaluate: Evaluate) -> Screening:
+def run_screening(design: Design, evaluate: EvaluateFactors) -> Screening:
     """Run a design and analyse its responses.
 
     Raises:

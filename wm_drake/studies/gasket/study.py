@@ -4,7 +4,7 @@ It computes the effects of stiffness and damping of the gasket on the displaceme
 the forces and moments of the gasket.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TypeAlias
@@ -18,13 +18,11 @@ from wm_drake.parameters.units import Unit
 from wm_drake.simulation.cases import Case, load_of
 from wm_drake.simulation.measures.responses import Response, chosen_responses, measures_of
 from wm_drake.studies.doe.design import Design
+from wm_drake.studies.executor import RunCases
 from wm_drake.studies.gasket.screening import Label, Meaning, Responses
 
 LOADS = ("middle", "counter")
 """Loads of [B] section 4."""
-
-Run: TypeAlias = Callable[[Iterable[Case]], xr.Dataset]
-"""Function that runs cases and returns their table, as `simulate_many` does."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +69,7 @@ class GasketTrials:
             load = load_of(case, self.parameters, changed)
             yield Case(f"{case.name}, {name}", load, case.profile, parameters=changed)
 
-    def responses(self, design: Design, run: Run) -> Responses:
+    def responses(self, design: Design, run: RunCases) -> Responses:
         """Run all trials and return their responses."""
         table = run(self.cases(design))
         return as_responses(table, [case.name for case in self.loads], self.chosen)

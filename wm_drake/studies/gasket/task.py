@@ -26,14 +26,14 @@ from wm_drake.parameters import (
 from wm_drake.simulation.cases import Case, is_as_measured
 from wm_drake.studies.doe.coding import MODELS
 from wm_drake.studies.doe.design import DESIGNS, Design, make_design, read_design
-from wm_drake.studies.executor import Executor
+from wm_drake.studies.executor import Executor, RunCases
 from wm_drake.studies.gasket.options import GasketOptions
 from wm_drake.studies.gasket.page import GasketResult
 from wm_drake.studies.gasket.proposal import (
     Aim,
-    Change,
     Compared,
     Proposal,
+    ProposedChange,
     best_places,
     change_of,
     is_level_zero,
@@ -45,7 +45,7 @@ from wm_drake.studies.gasket.screening import (
     published_for,
     run_screening,
 )
-from wm_drake.studies.gasket.study import GasketTrials, Run, run_level_zero
+from wm_drake.studies.gasket.study import GasketTrials, run_level_zero
 from wm_drake.studies.gasket.surface import Check, Setting, run_check, surfaces
 from wm_drake.studies.inputs import existing_file, pairs_of, selected_cases
 from wm_drake.studies.run import machine_text
@@ -129,7 +129,7 @@ class GasketTask(Task):
         proposal = self._proposal(Aim(screening, models), partial(run, what="proposal"))
         return GasketResult(screening, trials, Compared(self.published, zero, check, proposal))
 
-    def _proposal(self, aim: Aim, run: Run) -> Proposal:
+    def _proposal(self, aim: Aim, run: RunCases) -> Proposal:
         """Choose a setting on the fitted models, and run it and level 0 with all loads."""
         factors, parameters = self.verified.factors, self.parameters
         places = best_places(aim) or (0.0,) * len(factors)
@@ -144,7 +144,7 @@ class GasketTask(Task):
             self._command(changes),
         )
 
-    def _command(self, changes: Sequence[Change]) -> str:
+    def _command(self, changes: Sequence[ProposedChange]) -> str:
         """Return the command that runs changes; "" if there is none."""
         options = self.options
         sets = [f"{name}={text}" for c in changes for name, text in c.sets.items()]

@@ -3,7 +3,7 @@
 from wm_drake.studies.study import Options, Study, imported, option
 
 
-class CurvesOptions(Options):
+class GasketCurvesOptions(Options):
     """Options of the curves of a gasket."""
 
     file: str = option(
@@ -33,8 +33,8 @@ class CurvesOptions(Options):
 GASKET_CURVES = Study(
     "curves",
     "Compute the six curves of a gasket from its drawing, for a machine file.",
-    CurvesOptions,
-    imported("wm_drake.studies.gasket_curves.task:CurvesTask"),
+    GasketCurvesOptions,
+    imported("wm_drake.studies.gasket_curves.task:GasketCurvesTask"),
     quick={"points": 2, "elements": 6, "around": 3, "radial": "4 mm", "axial": "8 mm"},
     has_runs=False,
     group="gasket",

@@ -14,7 +14,7 @@ from wm_drake.report import figure as fig
 from wm_drake.report.formatting import significant
 from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.quantity import Quantity, text_of
-from wm_drake.solid.curves import AXIAL, RADIAL, TILT, TWIST, Curve, Point
+from wm_drake.solid.curves import AXIAL, RADIAL, TILT, TWIST, Curve, CurvePoint
 from wm_drake.solid.mesh import Ring, axes_at
 from wm_drake.solid.touching import Faces
 from wm_drake.studies.answer import Answer, Part, Plot
@@ -344,7 +344,7 @@ def rings_figure(curves: dict[str, Curve]) -> fig.Figure:
     return fig.Figure(panels=fig.in_grid(panels, 2), height=210.0)
 
 
-def _outline(ring: Ring, point: Point, column: int) -> FloatArray:
+def _outline(ring: Ring, point: CurvePoint, column: int) -> FloatArray:
     """Return the closed outline of the wall in a cut: x and y of its nodes. (n, 2) [m]"""
     places = (ring.positions + point.u)[ring.grid[:, column]][..., :2]
     return np.concatenate([places[:, 0], places[-1], places[::-1, 2], places[0][::-1]])

@@ -16,7 +16,7 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Share, Unit
 from wm_drake.report.formatting import percent
 from wm_drake.report.quantity import HIDDEN, Quantity
-from wm_drake.solid.curves import AXIAL, MOTIONS, RADIAL, TILT, TWIST, Curve, Mesh, Motion
+from wm_drake.solid.curves import AXIAL, MOTIONS, RADIAL, TILT, TWIST, Curve, Mesh, RimMotion
 from wm_drake.solid.deformed import Deformed
 from wm_drake.studies.inputs import quantities_of
 from wm_drake.studies.rig.units import units_of
@@ -155,7 +155,7 @@ def with_gasket(
     )
 
 
-AXES: dict[str, tuple[Motion, str]] = {
+AXES: dict[str, tuple[RimMotion, str]] = {
     "x": (RADIAL, ""),
     "y": (AXIAL, ""),
     "z": (RADIAL, ""),

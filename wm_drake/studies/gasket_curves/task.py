@@ -10,7 +10,7 @@ from wm_drake.solid.deformed import deformed, wrinkles
 from wm_drake.solid.touching import Faces
 from wm_drake.studies.answer import Answer
 from wm_drake.studies.executor import Executor
-from wm_drake.studies.gasket_curves.options import CurvesOptions
+from wm_drake.studies.gasket_curves.options import GasketCurvesOptions
 from wm_drake.studies.gasket_curves.page import curves_answer
 from wm_drake.studies.gasket_curves.study import (
     FREQUENCY,
@@ -28,10 +28,10 @@ from wm_drake.studies.gasket_curves.study import (
 from wm_drake.studies.study import Task
 
 
-class CurvesTask(Task):
+class GasketCurvesTask(Task):
     """The curves with checked options."""
 
-    def __init__(self, options: CurvesOptions, machine: Machine) -> None:
+    def __init__(self, options: GasketCurvesOptions, machine: Machine) -> None:
         """Read the drawing and the ranges, and mesh the gasket."""
         self.options, self.machine = options, machine.parameters
         check_gasket(self.machine)

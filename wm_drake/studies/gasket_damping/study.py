@@ -55,7 +55,7 @@ NOISE = 1e-4
 UNITS = (Unit("N*s/m", "N*s/mm"), Unit("N*m*s/rad", "N*mm*s/deg"))
 """SI units and printed units of C_L and C_T."""
 
-Measured: TypeAlias = Mapping[str, xr.DataArray]
+MeasuredDisplacements: TypeAlias = Mapping[str, xr.DataArray]
 """Displacements (time, sensor), sampled every 5 ms, by load. [m]"""
 
 
@@ -80,8 +80,8 @@ class Comparison:
         truth: True damping of a virtual experiment; None for a measurement. [N s/m, N m s/rad]
     """
 
-    measured: Measured
-    computed: Measured
+    measured: MeasuredDisplacements
+    computed: MeasuredDisplacements
     truth: FloatArray | None
 
     @property
@@ -140,7 +140,7 @@ def planted_damping(parameters: MachineParameters, linear: str, torsional: str) 
     return np.array([changed.gasket.damping_x, changed.gasket.rotational_damping_x])
 
 
-def damping_problem(machine: Machine, measured: Measured) -> FitProblem:
+def damping_problem(machine: Machine, measured: MeasuredDisplacements) -> FitProblem:
     """Return the problem of C_L and C_T: a curve for each load and sensor, its smooth envelope. [m]
 
     Raises:
@@ -264,7 +264,9 @@ def envelopes_of(displacement: xr.DataArray) -> xr.DataArray:
     a small peak appears.
     """
     whole = smooth_envelope(xr.Dataset({"displacement": displacement}))
-    return whole.sel(time=slice(WINDOW[0] - 1e-9, WINDOW[1] + 1e-9))
+    first, last = np.rint(np.array(WINDOW) / OUTPUT_PERIOD)
+    compared = OUTPUT_PERIOD * np.arange(first, last + 1)  # runs may have closer samples
+    return whole.sel(time=compared, method="nearest")
 
 
 def run_up_of(parameters: MachineParameters) -> SpinProfile:

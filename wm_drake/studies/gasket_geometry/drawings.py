@@ -22,7 +22,7 @@ REPEATED = Quantity("times that the folds of the drawing are repeated", decimals
 
 
 @dataclass(frozen=True)
-class Factor:
+class DrawingFactor:
     """A number of the drawing that varies.
 
     Attributes:
@@ -50,7 +50,7 @@ class Factor:
         return self.middle + coded * self.half
 
 
-def factors_of(drawing: GasketDrawing, folds: Sequence[int] = (1,)) -> tuple[Factor, ...]:
+def factors_of(drawing: GasketDrawing, folds: Sequence[int] = (1,)) -> tuple[DrawingFactor, ...]:
     """Return the factors of a drawing.
 
     Args:
@@ -62,7 +62,7 @@ def factors_of(drawing: GasketDrawing, folds: Sequence[int] = (1,)) -> tuple[Fac
     numbers = sorted(set(folds))
     if not numbers or not 1 <= numbers[0] <= numbers[-1] <= MOST_FOLDS:
         raise input_error(f"allowed are numbers from 1 to {MOST_FOLDS}", where="--folds")
-    repeated: tuple[Factor, ...] = ()
+    repeated: tuple[DrawingFactor, ...] = ()
     if len(numbers) > 1:
         ends = numbers[0], numbers[-1]
         middle, half, values = (
@@ -70,16 +70,16 @@ def factors_of(drawing: GasketDrawing, folds: Sequence[int] = (1,)) -> tuple[Fac
             0.5 * (ends[1] - ends[0]),
             tuple(map(float, numbers)),
         )
-        repeated = (Factor(FOLDS, REPEATED, middle, half, values),)
+        repeated = (DrawingFactor(FOLDS, REPEATED, middle, half, values),)
     if drawing.rubber.shore_a is None:
         raise input_error(
             "needs shore_a: the hardness is a factor of this study", key="rubber.shore_a"
         )
     return (
-        Factor("thickness", _part("wall thickness"), 1.0, 0.15),
-        Factor("depth", _part("depth of folds"), 1.0, 0.12),
-        Factor("fillet", _part("radius of folds"), 0.92, 0.08),
-        Factor("hardness", HARDNESS, drawing.rubber.shore_a, 6.0),
+        DrawingFactor("thickness", _part("wall thickness"), 1.0, 0.15),
+        DrawingFactor("depth", _part("depth of folds"), 1.0, 0.12),
+        DrawingFactor("fillet", _part("radius of folds"), 0.92, 0.08),
+        DrawingFactor("hardness", HARDNESS, drawing.rubber.shore_a, 6.0),
         *repeated,
     )
 
@@ -122,19 +122,19 @@ def with_folds(drawing: GasketDrawing, times: int) -> GasketDrawing:
         raise input_error(message, key="meridian") from None
 
 
-def values_at(factors: Sequence[Factor], levels: FloatArray) -> dict[str, float]:
+def values_at(factors: Sequence[DrawingFactor], levels: FloatArray) -> dict[str, float]:
     """Return the values of factors by name, at levels from -1 to 1. (factors,)"""
     return {f.name: f.value(float(level)) for f, level in zip(factors, levels, strict=True)}
 
 
-def text_at(factors: Sequence[Factor], levels: FloatArray) -> str:
+def text_at(factors: Sequence[DrawingFactor], levels: FloatArray) -> str:
     """Return the values of factors at levels from -1 to 1 as text."""
     values = values_at(factors, levels)
     return ", ".join(f"{f.name} {f.quantity.text(values[f.name])}" for f in factors)
 
 
 def changed(
-    drawing: GasketDrawing, factors: tuple[Factor, ...], coded: FloatArray
+    drawing: GasketDrawing, factors: tuple[DrawingFactor, ...], coded: FloatArray
 ) -> GasketDrawing:
     """Return a drawing at levels of the factors.
 

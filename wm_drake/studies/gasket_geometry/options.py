@@ -5,7 +5,7 @@ from pathlib import Path
 from wm_drake.studies.study import LOADS, PROFILE, SEED, Options, Study, imported, option
 
 
-class GeometryOptions(Options):
+class GasketGeometryOptions(Options):
     """Options of the study of drawings of a gasket."""
 
     file: str = option(
@@ -45,8 +45,8 @@ class GeometryOptions(Options):
 GASKET_GEOMETRY = Study(
     "gasket-geometry",
     "Vary the drawing of a gasket: wall, folds, hardness; find the largest gap.",
-    GeometryOptions,
-    imported("wm_drake.studies.gasket_geometry.task:GeometryTask"),
+    GasketGeometryOptions,
+    imported("wm_drake.studies.gasket_geometry.task:GasketGeometryTask"),
     quick={
         "drawings": 6,
         "fresh": 2,

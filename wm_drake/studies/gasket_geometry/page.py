@@ -13,7 +13,7 @@ from wm_drake.report.figure import MEASURED, OURS, Axis, Figure, Line, Panel, Po
 from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.quantity import shown, text_of
 from wm_drake.studies.answer import Answer, Part, Plot
-from wm_drake.studies.gasket_geometry.drawings import Factor
+from wm_drake.studies.gasket_geometry.drawings import DrawingFactor
 from wm_drake.studies.gasket_geometry.study import GAP, RESPONSES
 
 METHOD = (
@@ -28,7 +28,7 @@ METHOD = (
 
 
 def geometry_answer(
-    factors: Sequence[Factor],
+    factors: Sequence[DrawingFactor],
     drawings: xr.Dataset,
     surfaces: xr.Dataset,
     conditions: xr.Dataset,
@@ -115,7 +115,10 @@ def drawing_tree(drawing: GasketDrawing) -> dict[str, Any]:
 
 
 def summary(
-    factors: Sequence[Factor], drawings: xr.Dataset, surfaces: xr.Dataset, conditions: xr.Dataset
+    factors: Sequence[DrawingFactor],
+    drawings: xr.Dataset,
+    surfaces: xr.Dataset,
+    conditions: xr.Dataset,
 ) -> str:
     """Return the result in a few sentences."""
     best, proposed = drawings.isel(drawing=int(conditions.best)), drawings.isel(drawing=-1)
@@ -138,7 +141,9 @@ def _limits_text(conditions: xr.Dataset) -> str:
     )
 
 
-def _over_factors(factors: Sequence[Factor], drawings: xr.Dataset, surfaces: xr.Dataset) -> Plot:
+def _over_factors(
+    factors: Sequence[DrawingFactor], drawings: xr.Dataset, surfaces: xr.Dataset
+) -> Plot:
     panels = []
     for factor in factors:
         x = factor.quantity.values(factor.value(surfaces["level"].values))

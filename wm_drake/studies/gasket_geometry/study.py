@@ -16,7 +16,7 @@ from wm_drake.report.quantity import Quantity
 from wm_drake.solid.curves import MOTIONS, Gasket, Mesh
 from wm_drake.solid.deformed import deformed
 from wm_drake.studies.gasket_curves.study import GasketStiffness, stiffness_of
-from wm_drake.studies.gasket_geometry.drawings import Factor
+from wm_drake.studies.gasket_geometry.drawings import DrawingFactor
 from wm_drake.studies.inputs import pairs_of
 
 MEASURES = ("amplitudes", "gap", "extremes")
@@ -50,7 +50,7 @@ ERROR = Quantity("error on fresh, of the range", Share(), 1)
 
 
 @dataclass(frozen=True)
-class Computed:
+class ComputedDrawing:
     """What the curves of a drawing give: stiffness, and the largest stretch at their ends."""
 
     stiffness: GasketStiffness
@@ -181,7 +181,7 @@ def computed_curves(
 
 
 def drawings_data(
-    factors: Sequence[Factor],
+    factors: Sequence[DrawingFactor],
     levels: FloatArray,
     responses: Mapping[str, FloatArray],
     surfaces: Mapping[str, Surface],

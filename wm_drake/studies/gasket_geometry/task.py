@@ -29,7 +29,7 @@ from wm_drake.studies.gasket_curves.study import (
     with_gasket,
 )
 from wm_drake.studies.gasket_geometry import drawings
-from wm_drake.studies.gasket_geometry.options import GeometryOptions
+from wm_drake.studies.gasket_geometry.options import GasketGeometryOptions
 from wm_drake.studies.gasket_geometry.page import geometry_answer
 from wm_drake.studies.gasket_geometry.study import (
     CANDIDATES,
@@ -37,7 +37,7 @@ from wm_drake.studies.gasket_geometry.study import (
     MEASURES,
     POINTS,
     RESPONSES,
-    Computed,
+    ComputedDrawing,
     Surface,
     computed_curves,
     conditions_data,
@@ -53,10 +53,10 @@ from wm_drake.studies.study import Task
 FREQUENCY = Unit("Hz", "Hz")
 
 
-class GeometryTask(Task):
+class GasketGeometryTask(Task):
     """The study with checked options."""
 
-    def __init__(self, options: GeometryOptions, machine: Machine) -> None:
+    def __init__(self, options: GasketGeometryOptions, machine: Machine) -> None:
         """Read the drawing, make the design, and check that each of its drawings can be built."""
         from scipy.stats.qmc import LatinHypercube
 
@@ -143,7 +143,7 @@ class GeometryTask(Task):
 
     def _all_computed(
         self, executor: Executor, levels: FloatArray, progress: Callable[[int], None]
-    ) -> list[Computed]:
+    ) -> list[ComputedDrawing]:
         """Return what the curves of drawings give, from the ledger where it has them.
 
         Raises:
@@ -176,14 +176,14 @@ class GeometryTask(Task):
         return [self._kept(ledger.get(key).values) for key in keys]
 
     @staticmethod
-    def _kept(values: Mapping[str, Any]) -> Computed:
+    def _kept(values: Mapping[str, Any]) -> ComputedDrawing:
         """Return what the ledger has of a drawing."""
         tables = {motion.name: _table(motion.rotates, values[motion.name]) for motion in MOTIONS}
         stiffness = GasketStiffness(tables, float(values["coupling"]))
-        return Computed(stiffness, float(values["stretch"]))
+        return ComputedDrawing(stiffness, float(values["stretch"]))
 
     def _responses(
-        self, executor: Executor, levels: FloatArray, computed: Sequence[Computed]
+        self, executor: Executor, levels: FloatArray, computed: Sequence[ComputedDrawing]
     ) -> dict[str, FloatArray]:
         """Return the responses of drawings in SI: stiffness, then worst of all loads. (n,)"""
         machines = [

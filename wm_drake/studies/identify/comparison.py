@@ -77,7 +77,7 @@ class LawResult(FittedLaw):
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class LawComparison:
     """Rival laws on the same tests.
 
     Attributes:
@@ -276,7 +276,7 @@ def compare_laws(
     *,
     seed: int = 0,
     progress: Callable[[str, float], None] = lambda law, fraction: None,
-) -> Comparison:
+) -> LawComparison:
     """Fit rival laws to the same tests and predict others.
 
     Args:
@@ -295,7 +295,7 @@ def compare_laws(
     best = min(fits.values(), key=lambda fit: fit.rmse)
     independent = _independent_samples(best)
     results = tuple(_result(models[law], fit, tests, independent) for law, fit in fits.items())
-    return Comparison(results, tests.fitted, tests.predicted)
+    return LawComparison(results, tests.fitted, tests.predicted)
 
 
 def fit_law(

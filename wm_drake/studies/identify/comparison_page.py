@@ -12,10 +12,10 @@ from wm_drake.report.page import Picture, Section, SectionedPage, picture
 from wm_drake.report.table import Column, Group, Row, Table, line, table_of
 from wm_drake.report.terminal import Printed
 from wm_drake.studies.fitting.page import estimates_frame, values_table
-from wm_drake.studies.identify.comparison import Comparison, FittedLaw
+from wm_drake.studies.identify.comparison import FittedLaw, LawComparison
 from wm_drake.studies.identify.figures import evenly_chosen, motion_text, rival_loops_figure
 from wm_drake.studies.identify.judgement import per_cent
-from wm_drake.studies.identify.page import IdentifiedResult, frequency_of, motion_sentences
+from wm_drake.studies.identify.page import IdentifyResult, frequency_of, motion_sentences
 from wm_drake.studies.rig.units import units_of
 from wm_drake.studies.study import Facts
 
@@ -69,7 +69,7 @@ def _counted(count: int, word: str) -> str:
     return f"{count} {word}{'' if count == 1 else 's'}"
 
 
-def laws_table(comparison: Comparison) -> pd.DataFrame:
+def laws_table(comparison: LawComparison) -> pd.DataFrame:
     """Return the measures of each law, with units in the column names."""
     unit = comparison.unit.replace(" ", "")
     return pd.DataFrame(
@@ -93,7 +93,7 @@ def laws_table(comparison: Comparison) -> pd.DataFrame:
     )
 
 
-def parameters_by_law(comparison: Comparison) -> pd.DataFrame:
+def parameters_by_law(comparison: LawComparison) -> pd.DataFrame:
     """Return value, interval and bounds of each unknown of each law, for reading."""
     parts = []
     for r in comparison.results:
@@ -103,7 +103,7 @@ def parameters_by_law(comparison: Comparison) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)
 
 
-def errors_by_law(comparison: Comparison) -> pd.DataFrame:
+def errors_by_law(comparison: LawComparison) -> pd.DataFrame:
     """Return the RMSE of each test, one column a law; a column says which tests were predicted."""
     units = units_of(comparison.motions[0].loop.rotates)
     rows = []
@@ -122,7 +122,7 @@ def errors_by_law(comparison: Comparison) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def loops_by_law(comparison: Comparison) -> pd.DataFrame:
+def loops_by_law(comparison: LawComparison) -> pd.DataFrame:
     """Return the measured force and that of each law at every sample. [SI]"""
     parts = [
         pd.DataFrame(
@@ -139,7 +139,7 @@ def loops_by_law(comparison: Comparison) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)
 
 
-def laws_shown(comparison: Comparison) -> Table:
+def laws_shown(comparison: LawComparison) -> Table:
     """Return the measures of each law for reading, from the best to the worst law."""
     unit, in_heads = comparison.unit, comparison.unit.replace(" ", "")
     columns = {
@@ -171,7 +171,7 @@ def laws_shown(comparison: Comparison) -> Table:
     return table_of(frame[list(columns)], caption, columns, kinds)
 
 
-def _estimates(comparison: Comparison) -> Table:
+def _estimates(comparison: LawComparison) -> Table:
     tables = {r.law: values_table(r.fit, r.model.fixed_numbers) for r in comparison.order}
     groups = tuple(
         Group(law, tuple(Row((group.heading, *group.rows[0].cells)) for group in table.groups))
@@ -182,7 +182,7 @@ def _estimates(comparison: Comparison) -> Table:
     return Table(caption, ("law", *columns), groups, 6)
 
 
-def _errors(comparison: Comparison) -> Table:
+def _errors(comparison: LawComparison) -> Table:
     groups = tuple(
         line(
             tested.measured.loop.name,
@@ -199,7 +199,7 @@ def _errors(comparison: Comparison) -> Table:
     return Table(caption, ("file", "motion", "test", *laws), groups, text_columns=3)
 
 
-def _pictures(comparison: Comparison, kind: str, what: str) -> tuple[Picture, ...]:
+def _pictures(comparison: LawComparison, kind: str, what: str) -> tuple[Picture, ...]:
     every = [tested for tested in comparison.tested if tested.kind == kind]
     if not every:
         return ()
@@ -221,7 +221,7 @@ def _pictures(comparison: Comparison, kind: str, what: str) -> tuple[Picture, ..
     )
 
 
-def _warnings(comparison: Comparison, missing: Sequence[str]) -> list[str]:
+def _warnings(comparison: LawComparison, missing: Sequence[str]) -> list[str]:
     supported = comparison.supported
     warnings = [*supported.judgement.hints, *missing]
     if supported.judgement.verdict == "poor":
@@ -229,7 +229,7 @@ def _warnings(comparison: Comparison, missing: Sequence[str]) -> list[str]:
     return [*warnings, *bounds_sentences(comparison)]
 
 
-def bounds_sentences(comparison: Comparison) -> list[str]:
+def bounds_sentences(comparison: LawComparison) -> list[str]:
     """Return a sentence for each value at a bound of its search."""
     return [
         f"{r.law}: the value of {e.name} is at its {e.at_bound} bound; wider --bounds may fit "
@@ -241,10 +241,10 @@ def bounds_sentences(comparison: Comparison) -> list[str]:
 
 
 @dataclass(frozen=True)
-class IdentifyComparisonResult(IdentifiedResult):
+class IdentifyComparisonResult(IdentifyResult):
     """Several laws that were fitted to the same tests."""
 
-    comparison: Comparison
+    comparison: LawComparison
     page = comparison_page
 
     @property

@@ -10,24 +10,19 @@ from wm_drake.report.terminal import say
 from wm_drake.rigs.measured import MeasuredMotion, inertia_share, measured_motion, without_inertia
 from wm_drake.studies.components import Target, existing_files
 from wm_drake.studies.fitting.methods import METHODS
-from wm_drake.studies.identify.models import (
-    Given,
-    fields_of_law,
-    unit_of_field,
-    units_of_fields,
-)
-from wm_drake.studies.identify.options import FitOptions
+from wm_drake.studies.identify.models import Given, fields_of_law, unit_of_field, units_of_fields
+from wm_drake.studies.identify.options import IdentifyOptions
 from wm_drake.studies.inputs import LOOP_WORDS, channels_of, pairs_of, quantities_of
 
 
-def loops_of(files: Sequence[Path], options: FitOptions) -> list[MeasuredLoop]:
+def loops_of(files: Sequence[Path], options: IdentifyOptions) -> list[MeasuredLoop]:
     """Return the loops of files."""
     channels = channels_of(options.channels, LOOP_WORDS)
     return read_loops(existing_files(files), units_of(options.units), channels)
 
 
 def motions_of(
-    files: Sequence[Path], options: FitOptions, *, rotates: bool, driven_mass: float = 0.0
+    files: Sequence[Path], options: IdentifyOptions, *, rotates: bool, driven_mass: float = 0.0
 ) -> list[MeasuredMotion]:
     """Return the loops of files with the motion of each, sorted by motion.
 
@@ -80,7 +75,7 @@ def units_of(text: str | None) -> tuple[str, str, str] | None:
     return (parts[0], parts[1], parts[2])
 
 
-def given_by_law(text: str, axis: str, options: FitOptions) -> dict[str, Given]:
+def given_by_law(text: str, axis: str, options: IdentifyOptions) -> dict[str, Given]:
     """Return what the user gives for each law: of several laws, the numbers of its own fields.
 
     Args:

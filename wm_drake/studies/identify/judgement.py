@@ -9,7 +9,7 @@ from scipy.stats import f as fisher
 
 from wm_drake.parameters.types import FloatArray
 from wm_drake.rigs.measured import HarmonicMotion, MeasuredMotion
-from wm_drake.studies.fitting.fit import FAIR, Fit, Verdict, verdict_of
+from wm_drake.studies.fitting.fit import FAIR, Fit, FitVerdict, verdict_of
 from wm_drake.studies.fitting.problem import rmse
 
 CHANCE = 0.01
@@ -106,7 +106,7 @@ class Judgement:
         return self._part("noise")
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> FitVerdict:
         """Whether the law fits the loops."""
         return verdict_of(self.missed)
 

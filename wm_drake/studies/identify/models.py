@@ -14,7 +14,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from wm_drake.errors import check_known, input_error
 from wm_drake.parameters import DAMPER_LAWS, DamperType, ForceTable, TorqueTable
-from wm_drake.parameters.damper_laws import DamperLaw, DamperNumbers, Kind, Search
+from wm_drake.parameters.damper_laws import DamperLaw, DamperNumbers, NumberKind, SearchRange
 from wm_drake.parameters.elements import BushingType, RubberBushingType
 from wm_drake.parameters.keys import unit_of
 from wm_drake.parameters.problems import problems_of
@@ -62,7 +62,7 @@ MAGNITUDES = 30.0
 
 
 @dataclass(frozen=True)
-class Scale:
+class LoopScale:
     """Orders of magnitude of measured loops: largest force, steepest loop, speeds, strokes."""
 
     force: float
@@ -71,7 +71,7 @@ class Scale:
     fastest: float
     stroke: float
 
-    def bounds(self, search: Search) -> tuple[float, float, bool]:
+    def bounds(self, search: SearchRange) -> tuple[float, float, bool]:
         """Return lower and upper default bound, and whether the order of magnitude is unknown.
 
         Args:
@@ -90,7 +90,7 @@ class Scale:
         }[search]
 
 
-def scale_of(motions: Sequence[MeasuredMotion], arm: float = 0.0) -> Scale:
+def scale_of(motions: Sequence[MeasuredMotion], arm: float = 0.0) -> LoopScale:
     """Return the scale of measured loops; with the arm of a jig [m], of angles and moments."""
     force, stiffness, damping, speeds, strokes = [], [], [], [], []
     for measured in motions:
@@ -102,13 +102,13 @@ def scale_of(motions: Sequence[MeasuredMotion], arm: float = 0.0) -> Scale:
         damping.append(size / speed)
         speeds.append(speed)
         strokes.append(stroke)
-    return Scale(max(force), max(stiffness), max(damping), max(speeds), max(strokes))
+    return LoopScale(max(force), max(stiffness), max(damping), max(speeds), max(strokes))
 
 
 def unknowns_of(
-    searches: Mapping[str, Search],
+    searches: Mapping[str, SearchRange],
     units: Mapping[str, Unit],
-    scale: Scale,
+    scale: LoopScale,
     bounds: Mapping[str, tuple[float, float]],
     fixed: Mapping[str, float],
 ) -> tuple[Unknown, ...]:
@@ -153,7 +153,7 @@ class MonotoneCurve:
     """
 
     def __init__(
-        self, name: str, scale: Scale, knots: int, *, about: bool = False, is_odd: bool = False
+        self, name: str, scale: LoopScale, knots: int, *, about: bool = False, is_odd: bool = False
     ) -> None:
         """Space the knots of each side equally up to the stroke.
 
@@ -405,7 +405,7 @@ def _check_fixed(base: BushingType, fixed: Mapping[str, float]) -> None:
         raise input_error(problem.message, where="--fix", key=problem.key) from None
 
 
-def _bushing_kinds(axis: str) -> dict[str, Kind]:
+def _bushing_kinds(axis: str) -> dict[str, NumberKind]:
     """Return the fields of a bushing along or about an axis with their kinds."""
     prefix, letter = ("rotational_" if axis.startswith("about") else ""), axis[-1]
     k = AXES.index(axis)

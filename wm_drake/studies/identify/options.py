@@ -12,7 +12,7 @@ UNITS: Any = option(
 )
 
 
-class FitOptions(ComponentOptions):
+class IdentifyOptions(ComponentOptions):
     """Options of a fit to measured loops."""
 
     files: tuple[Path, ...] = option(
@@ -46,7 +46,7 @@ class FitOptions(ComponentOptions):
     seed: int = option(0, "Of the search.", ge=0)
 
 
-class DamperFitOptions(FitOptions):
+class IdentifyDamperOptions(IdentifyOptions):
     """Options of a fit of a damper."""
 
     law: str | None = option(None, "{laws}; the component's by default. Several: mstv,stv.", "LAWS")
@@ -62,7 +62,7 @@ class DamperFitOptions(FitOptions):
     )
 
 
-class AxisFitOptions(FitOptions):
+class IdentifyAxisOptions(IdentifyOptions):
     """Options of a fit of one axis, or of quasi-static tests of several."""
 
     axis: str | None = option(None, AXIS, "AXIS")
@@ -80,7 +80,7 @@ class AxisFitOptions(FitOptions):
     arm: str | None = ARM
 
 
-class Table2Options(Options):
+class IdentifyTable2Options(Options):
     """Options of [C] Table 2."""
 
     files: tuple[Path, ...] = option(
@@ -110,17 +110,17 @@ IDENTIFY = (
                 "Identify a friction damper; a curve of its law is found as a monotone table. "
                 "Several laws are fitted to the same files and compared. Forces of inertia of "
                 "masses at the driven end are printed and taken out of the measured ones.",
-                DamperFitOptions,
+                IdentifyDamperOptions,
             ),
-            ("bushing", "One axis of a six-component bushing.", AxisFitOptions),
-            ("gasket", "One axis of the gasket.", AxisFitOptions),
+            ("bushing", "One axis of a six-component bushing.", IdentifyAxisOptions),
+            ("gasket", "One axis of the gasket.", IdentifyAxisOptions),
         )
     ),
     Study(
         "table2",
         "Fit k1 and c1 of the Coulomb model to each test alone, beside [C] Table 2.",
-        Table2Options,
-        imported("wm_drake.studies.identify.table2:Table2Task"),
+        IdentifyTable2Options,
+        imported("wm_drake.studies.identify.table2:IdentifyTable2Task"),
         has_runs=False,
         group="identify",
         has_machine=False,

@@ -41,7 +41,7 @@ METHOD = (
 )
 
 
-def identify_page(result: "FitResult", facts: Facts) -> str:
+def identify_page(result: "IdentifyFitResult", facts: Facts) -> str:
     """Return the page as text of one self-contained HTML file."""
     fit, motions, judgement = result.fit, result.motions, result.judgement
     loops = tuple(
@@ -210,7 +210,7 @@ def _summary(fit: Fit, motions: Sequence[MeasuredMotion], judgement: Judgement) 
 
 
 @dataclass(frozen=True)
-class IdentifiedResult(Result):
+class IdentifyResult(Result):
     """Result with identified numbers. CSV files have all digits, but for the samples of loops."""
 
     component: FittedComponent
@@ -254,7 +254,7 @@ class IdentifiedResult(Result):
 
 
 @dataclass(frozen=True)
-class FitResult(IdentifiedResult):
+class IdentifyFitResult(IdentifyResult):
     """Fit of one law."""
 
     model: ComponentModel

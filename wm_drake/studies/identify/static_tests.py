@@ -21,14 +21,8 @@ from wm_drake.studies.components import axes_of, target_of
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.identify.fragment import Destination, table_entry, written_fragment
 from wm_drake.studies.identify.inputs import loops_of
-from wm_drake.studies.identify.options import AxisFitOptions, DamperFitOptions
-from wm_drake.studies.identify.static import (
-    NOMINAL,
-    SPONGE,
-    StaticCurve,
-    field_of,
-    static_curve,
-)
+from wm_drake.studies.identify.options import IdentifyAxisOptions, IdentifyDamperOptions
+from wm_drake.studies.identify.static import NOMINAL, SPONGE, StaticCurve, field_of, static_curve
 from wm_drake.studies.inputs import pairs_of
 from wm_drake.studies.rig.figures import loop_panel
 from wm_drake.studies.rig.units import units_of
@@ -36,7 +30,7 @@ from wm_drake.studies.study import Facts, Result, Task
 
 
 @dataclass(frozen=True)
-class StaticResult(Result):
+class IdentifyStaticResult(Result):
     """Curves of quasi-static tests.
 
     Attributes:
@@ -114,27 +108,27 @@ def _source(curve: StaticCurve) -> str:
     return f"quasi-static test {names}; half width of hysteresis {friction}"
 
 
-class StaticTask(Task):
+class IdentifyStaticTask(Task):
     """Quasi-static tests with checked options."""
 
-    def __init__(self, kind: str, options: AxisFitOptions | DamperFitOptions) -> None:
+    def __init__(self, kind: str, options: IdentifyAxisOptions | IdentifyDamperOptions) -> None:
         """Find the component and read the tests of each axis, or of the sponge of a damper."""
         self.options, self.target = options, target_of(kind, options)
         component = self.target.component
         self.title = kind if component.name == kind else f"{kind} {component.name}"
-        if isinstance(options, AxisFitOptions):
+        if isinstance(options, IdentifyAxisOptions):
             by_axis = _files_by_axis(options.files, options.axis)
         else:
             _check_sponge(component)
             by_axis = {(SPONGE,): list(options.files)}
         self.tests = {axes: _loops(paths, options, axes[0]) for axes, paths in by_axis.items()}
 
-    def run(self, executor: Executor) -> StaticResult:
+    def run(self, executor: Executor) -> IdentifyStaticResult:
         """Compute the curve of each axis."""
         curves = {axes: static_curve(axes[0], loops) for axes, loops in self.tests.items()}
         changes = dict(pairs_of(self.options.sets, "--set"))
         destination = Destination(self.target, executor.out or Path(), changes)
-        return StaticResult(self.title, curves, self.options.knots, destination)
+        return IdentifyStaticResult(self.title, curves, self.options.knots, destination)
 
 
 def _check_sponge(damper: Component) -> None:
@@ -167,7 +161,7 @@ def _files_by_axis(files: Sequence[Path], axis: str | None) -> dict[tuple[str, .
 
 
 def _loops(
-    paths: Sequence[Path], options: AxisFitOptions | DamperFitOptions, axis: str
+    paths: Sequence[Path], options: IdentifyAxisOptions | IdentifyDamperOptions, axis: str
 ) -> list[MeasuredLoop]:
     loops = loops_of(paths, options)
     if loops[0].rotates != axis.startswith("about"):

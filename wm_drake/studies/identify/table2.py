@@ -33,7 +33,7 @@ from wm_drake.studies.fitting.methods import least_squares
 from wm_drake.studies.identify.figures import LAW_COLOURS
 from wm_drake.studies.identify.inputs import units_of
 from wm_drake.studies.identify.models import Given, damper_model
-from wm_drake.studies.identify.options import Table2Options
+from wm_drake.studies.identify.options import IdentifyTable2Options
 from wm_drake.studies.identify.problem import fit_problem
 from wm_drake.studies.inputs import quantities_of
 from wm_drake.studies.rig.figures import loop_panel
@@ -246,7 +246,7 @@ AMPLITUDE = 1e-3
 
 
 @dataclass(frozen=True)
-class Table2Result(Result):
+class IdentifyTable2Result(Result):
     """Fits of the Coulomb model beside the printed ones, and the trend of the peak force.
 
     Attributes:
@@ -297,10 +297,10 @@ class Table2Result(Result):
         ).html()
 
 
-class Table2Task(Task):
+class IdentifyTable2Task(Task):
     """The fits with checked options."""
 
-    def __init__(self, options: Table2Options) -> None:
+    def __init__(self, options: IdentifyTable2Options) -> None:
         """Read the tests."""
         self.damper = _damper(options.friction_force)
         if units_of(options.units) and not options.files:
@@ -318,13 +318,13 @@ class Table2Task(Task):
     def _number(self, name: str) -> float:
         return float(getattr(self.damper, name))
 
-    def run(self, executor: Executor) -> Table2Result:
+    def run(self, executor: Executor) -> IdentifyTable2Result:
         """Fit each test, and compute the trend."""
         numbers = self._number("friction_force"), self._number("slider_damping")
         with executor.progress(len(self.motions), "fits") as progress:
             fits = coulomb_fits(self.motions, *numbers, progress)
         trend = frequency_trend(self.damper, FREQUENCIES, AMPLITUDE)
-        return Table2Result(fits, trend, self.source)
+        return IdentifyTable2Result(fits, trend, self.source)
 
 
 def _damper(friction_force: str | None) -> DamperNumbers:

@@ -15,17 +15,21 @@ from wm_drake.studies.identify.comparison_page import IdentifyComparisonResult
 from wm_drake.studies.identify.fragment import FittedComponent
 from wm_drake.studies.identify.inputs import given_by_law, kept_fields, motions_of
 from wm_drake.studies.identify.models import ComponentModel, TestedAxis, bushing_model, damper_model
-from wm_drake.studies.identify.options import AxisFitOptions, DamperFitOptions, FitOptions
-from wm_drake.studies.identify.page import FitResult
-from wm_drake.studies.identify.static_tests import StaticTask
+from wm_drake.studies.identify.options import (
+    IdentifyAxisOptions,
+    IdentifyDamperOptions,
+    IdentifyOptions,
+)
+from wm_drake.studies.identify.page import IdentifyFitResult
+from wm_drake.studies.identify.static_tests import IdentifyStaticTask
 from wm_drake.studies.inputs import pairs_of, quantities_of
 from wm_drake.studies.study import Result, Task
 
 
-class FitTask(Task):
+class IdentifyTask(Task):
     """Fit of one law to measured loops, or of several with a comparison."""
 
-    options: FitOptions
+    options: IdentifyOptions
     component: FittedComponent
     models: Mapping[str, ComponentModel]
     motions: list[MeasuredMotion]
@@ -56,7 +60,7 @@ class FitTask(Task):
                     seed=options.seed,
                     progress=lambda fraction, least: bar(fraction),
                 )
-            return FitResult(component, model, fit, self.motions)
+            return IdentifyFitResult(component, model, fit, self.motions)
         with executor.fractions(names) as bars:
             comparison = compare_laws(
                 self.models,
@@ -68,10 +72,10 @@ class FitTask(Task):
         return IdentifyComparisonResult(component, comparison)
 
 
-class DamperFitTask(FitTask):
+class IdentifyDamperTask(IdentifyTask):
     """Fit of a friction damper."""
 
-    def __init__(self, options: DamperFitOptions) -> None:
+    def __init__(self, options: IdentifyDamperOptions) -> None:
         """Find the damper and read its loops."""
         self.options = options
         target = target_of("damper", options)
@@ -93,10 +97,10 @@ class DamperFitTask(FitTask):
         self._read_validation(driven)
 
 
-class AxisFitTask(FitTask):
+class IdentifyAxisTask(IdentifyTask):
     """Fit of one axis of a bushing or of the gasket."""
 
-    def __init__(self, kind: str, options: AxisFitOptions) -> None:
+    def __init__(self, kind: str, options: IdentifyAxisOptions) -> None:
         """Find the component and read its loops."""
         self.options = options
         target = target_of(kind, options)
@@ -133,5 +137,5 @@ def _copies(model: ComponentModel, axes: tuple[str, ...]) -> dict[str, str]:
 def task_of(kind: str, options: Any) -> Task:
     """Return the task of a command `identify`: quasi-static tests, or a fit to loops."""
     if options.static:
-        return StaticTask(kind, options)
-    return DamperFitTask(options) if kind == "damper" else AxisFitTask(kind, options)
+        return IdentifyStaticTask(kind, options)
+    return IdentifyDamperTask(options) if kind == "damper" else IdentifyAxisTask(kind, options)

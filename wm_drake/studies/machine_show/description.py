@@ -10,7 +10,7 @@ from wm_drake.compiler.vectors import rotation_from_rpy
 from wm_drake.elements.spin_profile import drum_motion
 from wm_drake.elements.state_map import BEARING_WORDS
 from wm_drake.engines.compiled.step_check import fastest_motions
-from wm_drake.model.bodies import oscillating_bodies
+from wm_drake.model.bodies import DRUM, drawn_frame, drawn_pose, oscillating_bodies
 from wm_drake.model.build import AnyMachine, machine_of
 from wm_drake.model.equilibrium import tensions_at
 from wm_drake.model.machine import Setup
@@ -188,12 +188,13 @@ INTEGRATORS = {
 
 
 def _numerics(parameters: MachineParameters) -> dict[str, Any]:
-    band = pass_band(parameters.profile, parameters.output_period)
+    period = parameters.profile.sample_period(parameters.output_period)
+    band = pass_band(parameters.profile, period)
     both_ways = "forwards and backwards, so that no phase is shifted"
     return {
         "integrator": INTEGRATORS[parameters.integrator],
         "step_s": parameters.step,
-        "output_period_s": parameters.output_period,
+        "output_period_s": period,
         "displacement_filter": f"Butterworth band-pass of order {FILTER_ORDER}, {both_ways}; ends "
         f"mirrored over {PADDING_PERIODS / band[0]:g} s",
         "displacement_band_hz": list(band),
@@ -224,12 +225,13 @@ def _sag(setup: Setup, bodies: dict[str, Any]) -> float:
 
 def _bodies(setup: Setup) -> dict[str, Any]:
     plant, context = setup.machine.plant, setup.plant_context
-    tub = plant.GetBodyByName("tub").body_frame()
-    described = {}
-    moving = oscillating_bodies(setup.machine.plant)
-    groups = {part.name(): "drum" if part.name() == "drum" else "tub" for part in moving}
+    tub, described = drawn_frame(plant, plant.GetBodyByName("tub")), {}
+    moving = oscillating_bodies(plant)
+    of_drum = {part.name() for part in plant.GetBodiesWeldedTo(plant.GetBodyByName(DRUM))}
+    groups = {part.name(): "drum" if part.name() in of_drum else "tub" for part in moving}
     # in a compliant bearing, describe the drum relative to its carrier, which is T in the SDF
-    carriers = {"drum": plant.GetBodyByName(CARRIER).body_frame()} if setup.bearing else {}
+    carrier = plant.GetBodyByName(CARRIER).body_frame() if setup.bearing else tub
+    carriers = dict.fromkeys(of_drum, carrier)
     tubes = [
         body
         for damper in setup.parameters.telescopic_dampers.values()
@@ -255,7 +257,7 @@ def _bodies(setup: Setup) -> dict[str, Any]:
 
 def _drum_axis(setup: Setup) -> dict[str, Any]:
     joint = setup.machine.plant.GetJointByName(setup.parameters.drive.joint)
-    X_TF = joint.frame_on_parent().CalcPoseInBodyFrame(setup.plant_context)
+    X_TF = drawn_pose(setup.machine.plant, joint.frame_on_parent())
     axis = X_TF.rotation() @ joint.revolute_axis()
     _, start_angle = drum_motion(setup.parameters.profile, np.zeros(1))
     return {

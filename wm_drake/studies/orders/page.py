@@ -100,11 +100,18 @@ def summary(result: Orders) -> str:
     rpm = RPM_PER_RAD_S * float(result.orders.speed.values[time])
     count = len(result.signals.names)
     return (
-        f"The largest component of {count} signal{'s' if count > 1 else ''} is order "
-        f"{result.orders.order.values[order]:g} of {result.signals.names[signal]}: "
+        f"The largest component of {count} signal{'s' if count > 1 else ''} is "
+        f"{order_text(float(result.orders.order.values[order]))} of "
+        f"{result.signals.names[signal]}: "
         f"{number(float(values[time, order, signal]), 2)} {result.signals.unit} at "
         f"{number(rpm, 0)} rpm."
     )
+
+
+def order_text(order: float) -> str:
+    """Return an order of a map in words: a whole one within the width of a line, 1/8."""
+    whole = round(order)
+    return f"order {whole}" if abs(order - whole) <= 1.0 / REVOLUTIONS else f"order {order:.2f}"
 
 
 def _table(result: Orders) -> Table:

@@ -52,7 +52,7 @@ in a million."""
 
 
 @dataclass(frozen=True)
-class Linearised:
+class BalanceLinearisation:
     """Residual of the harmonic balance and its derivatives at a motion.
 
     Attributes:
@@ -138,7 +138,7 @@ class HarmonicBalance:
         residual[0, self.held] += HOLD * moved[self.held]
         return residual
 
-    def linearised(self, coefficients: FloatArray, speed: float) -> Linearised:
+    def linearised(self, coefficients: FloatArray, speed: float) -> BalanceLinearisation:
         """Return the residual and its derivatives."""
         states = self.states(coefficients, speed)
         rates, slopes = self.derivative.with_slopes(states, drum_rate=True)
@@ -146,7 +146,7 @@ class HarmonicBalance:
         residual = self._residual(coefficients, speed, rates)
         factors = self.series.factors(slopes[:, :-1])
         spins = [spin.direction(coefficients[0]) for spin in self.kinematics.spins]
-        return Linearised(
+        return BalanceLinearisation(
             speed, residual, factors, by_speed, np.reshape(spins, (len(spins), self.size))
         )
 
@@ -154,7 +154,7 @@ class HarmonicBalance:
         """Return the derivative of the residual by the coefficients. (2 N + 1, n, 2 N + 1, n)
 
         Args:
-            slopes: Fourier coefficients as in `Linearised`. (4 N + 1, n, n)
+            slopes: Fourier coefficients as in `BalanceLinearisation`. (4 N + 1, n, n)
             speed: Omega. [rad/s]
         """
         size, every = self.series.size * self.size, np.arange(self.size)

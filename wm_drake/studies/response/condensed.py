@@ -20,7 +20,7 @@ from scipy.linalg import LinAlgWarning, lu_factor, lu_solve
 
 from wm_drake.compiler.compilation import long_running
 from wm_drake.parameters.types import FloatArray
-from wm_drake.studies.response.balance import HOLD, HarmonicBalance, Linearised
+from wm_drake.studies.response.balance import HOLD, BalanceLinearisation, HarmonicBalance
 from wm_drake.studies.response.kinematics import Partition
 from wm_drake.studies.response.series import write_derivative
 
@@ -46,7 +46,7 @@ class Corrections:
     """Factors of the linear system at a motion, for corrections and for the tangent."""
 
     def __init__(
-        self, balance: HarmonicBalance, at: Linearised, row: FloatArray, row_speed: float
+        self, balance: HarmonicBalance, at: BalanceLinearisation, row: FloatArray, row_speed: float
     ) -> None:
         """Factor the system.
 

@@ -58,7 +58,7 @@ Progress = Callable[[float], None]
 
 
 @dataclass(frozen=True)
-class Point:
+class BranchPoint:
     """Periodic motion on a branch.
 
     Attributes:
@@ -114,7 +114,7 @@ def follow(
     speeds: FloatArray,
     first: FloatArray,
     progress: Progress = lambda fraction: None,
-) -> list[Point]:
+) -> list[BranchPoint]:
     """Return the periodic motions along the branch through a first one.
 
     Args:
@@ -339,14 +339,14 @@ def _share(
     return share
 
 
-def _point(balance: HarmonicBalance, place: _Place, on_grid: bool, way: float) -> Point:
+def _point(balance: HarmonicBalance, place: _Place, on_grid: bool, way: float) -> BranchPoint:
     # Between the samples of the balance: one of them may be exactly at a reversal of friction, and
     # its steep slope would count for the whole distance to the next.
     phase = balance.series.phase + np.pi / balance.series.samples
     states = balance.states(place.coefficients, place.speed, phase)
     rates, slopes = balance.derivative.with_slopes(states)
     multipliers = floquet_multipliers(slopes, 2.0 * np.pi / abs(place.speed))
-    return Point(
+    return BranchPoint(
         place.speed,
         place.coefficients,
         is_stable(multipliers),

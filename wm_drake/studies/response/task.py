@@ -11,7 +11,7 @@ from wm_drake.studies.inputs import quantities_of, selected_cases
 from wm_drake.studies.response.balance import SAMPLES
 from wm_drake.studies.response.options import ResponseOptions
 from wm_drake.studies.response.page import ResponseResult
-from wm_drake.studies.response.study import RATES_RPM_S, Settings, run_steady_study
+from wm_drake.studies.response.study import RATES_RPM_S, ResponseSettings, run_response_study
 from wm_drake.studies.study import Result, Task
 
 
@@ -33,7 +33,7 @@ class ResponseTask(Task):
         """Return the speeds that the options select. [rad/s]"""
         speed, high = Unit("rad/s", "rpm"), self.options.high
         first = quantities_of(self.options.low, speed, "--from")[0]
-        last = max(self.machine.parameters.profile.speed)
+        last = self.machine.parameters.profile.highest_speed
         if high is not None:
             last = quantities_of(high, speed, "--to")[0]
         if not 0.0 < first < last:
@@ -48,7 +48,7 @@ class ResponseTask(Task):
         """Compute responses, runs over the spin profile, and sweeps."""
         options = self.options
         is_without = options.no_gasket or self.machine.parameters.gasket is None
-        settings = Settings(
+        settings = ResponseSettings(
             self.speeds,
             (False,) if is_without else (True, False),
             options.harmonics,
@@ -57,7 +57,7 @@ class ResponseTask(Task):
             options.workers,
         )
         with executor.fraction("response") as progress:
-            study = run_steady_study(self.machine, self.loads, settings, progress)
+            study = run_response_study(self.machine, self.loads, settings, progress)
         return ResponseResult(study)
 
 

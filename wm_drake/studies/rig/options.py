@@ -20,7 +20,7 @@ class RigOptions(ComponentOptions):
     )
 
 
-class DamperRigOptions(RigOptions):
+class RigDamperOptions(RigOptions):
     """Options of a bench test of a damper."""
 
     sponge_mass: str | None = option(
@@ -32,7 +32,7 @@ class DamperRigOptions(RigOptions):
     jig_mass: str | None = JIG_MASS
 
 
-class AxisRigOptions(RigOptions):
+class RigAxisOptions(RigOptions):
     """Options of a bench test of one axis."""
 
     axis: str = option(..., AXIS, "AXIS")
@@ -55,10 +55,10 @@ RIG = tuple(
             "damper",
             "Test a friction damper along its line; with masses, their effect on the loops is "
             "printed and in masses.csv.",
-            DamperRigOptions,
+            RigDamperOptions,
         ),
-        ("bushing", "One axis of a six-component bushing.", AxisRigOptions),
-        ("gasket", "One axis of the gasket.", AxisRigOptions),
+        ("bushing", "One axis of a six-component bushing.", RigAxisOptions),
+        ("gasket", "One axis of the gasket.", RigAxisOptions),
     )
 )
 """Commands of components."""

@@ -22,7 +22,7 @@ from wm_drake.studies.answer import Answer
 from wm_drake.studies.components import axes_of, mass_of, target_of
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import quantities_of
-from wm_drake.studies.rig.options import AxisRigOptions, DamperRigOptions, RigOptions
+from wm_drake.studies.rig.options import RigAxisOptions, RigDamperOptions, RigOptions
 from wm_drake.studies.rig.page import rig_answer
 from wm_drake.studies.rig.study import (
     FREQUENCY,
@@ -46,15 +46,15 @@ class RigTask(Task):
         """Find the component, put it on the bench, and read its motions."""
         self.component = target_of(kind, options).component
         self.massless: Bench | None = None
-        if isinstance(options, DamperRigOptions):
+        if isinstance(options, RigDamperOptions):
             self._set_damper(options)
         else:
-            assert isinstance(options, AxisRigOptions)
+            assert isinstance(options, RigAxisOptions)
             self._set_axis(kind, options)
         self.motions = _motions(kind, self.bench, options)
         self.kind, self.is_of_a = kind, options.matrix == "A"
 
-    def _set_damper(self, options: DamperRigOptions) -> None:
+    def _set_damper(self, options: RigDamperOptions) -> None:
         sponge = mass_of(options.sponge_mass, "--sponge-mass")
         driven = mass_of(options.outer_mass, "--outer-mass")
         driven += mass_of(options.jig_mass, "--jig-mass")
@@ -67,7 +67,7 @@ class RigTask(Task):
         parts += [f"{DRIVEN_MASS.text(driven)} at the driven end"] if driven else []
         self.title = ", ".join(parts)
 
-    def _set_axis(self, kind: str, options: AxisRigOptions) -> None:
+    def _set_axis(self, kind: str, options: RigAxisOptions) -> None:
         axis, name = axes_of(options.axis)[0], self.component.name
         arm = (
             quantities_of(options.arm, LINEAR.displacement.unit, "--arm")[0] if options.arm else 0.0

@@ -2,19 +2,16 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TypeAlias
 
 import numpy as np
 
-from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.types import BoolArray, FloatArray, IndexArray
 from wm_drake.report import figure as fig
 from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number, shape_name
 from wm_drake.simulation.displacements import axis_motion, envelopes, moment_of_largest_amplitude
 from wm_drake.simulation.outputs import point_positions
 from wm_drake.simulation.records import Record
 from wm_drake.studies.spin.study import CaseResult
-
-BoolArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
 ORBIT_REVOLUTIONS = 6.0
 """Number of drum revolutions that an orbit shows, with the largest amplitude in the middle."""
@@ -206,8 +203,6 @@ def _orbit(
         fig.Points(x[at], z[at], color=fig.MARK, key=keys[2]),
     )
 
-
-IndexArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
 
 COLUMNS = 3
 """Number of panels in a row, one for each of the axes x, y and z."""

@@ -42,7 +42,7 @@ from wm_drake.studies.spin.balance import (
 )
 from wm_drake.studies.spin.figures import revolution_starts
 from wm_drake.studies.spin.floor import floor_section, floor_warnings
-from wm_drake.studies.spin.study import CaseResult, Comparison, SpinRuns, band_text
+from wm_drake.studies.spin.study import CaseResult, ComparedCases, SpinRuns, band_text
 from wm_drake.studies.spin.tables import amplitude_table
 from wm_drake.studies.spin.vibration import vibration_pictures
 from wm_drake.studies.study import Facts, Result
@@ -138,11 +138,11 @@ def spin_page(result: SpinRuns, facts: Facts | None = None) -> str:
     more = tuple(tables.variable_table(result, variable) for variable in tabulated())
     sections = [
         *_case_sections(result, table),
-        Section("gap", "Smallest gaps", gaps, text=VERDICT * bool(gaps)),
+        Section("gap", "Smallest gaps", gaps, text=VERDICT if gaps else ""),
         replace(balance, tables=()),
         Section("floor", "Feet over time", floor.pictures),
         Section(
-            "drive", "Speed and torque", drive.pictures, text=drive.text * bool(drive.pictures)
+            "drive", "Speed and torque", drive.pictures, text=drive.text if drive.pictures else ""
         ),
         Section("amplitudes", "Amplitudes", tables=(tables.comparison(result, table),)),
         Section("speeds", "Critical speeds", tables=(tables.critical_speeds(result),)),
@@ -156,7 +156,7 @@ def spin_page(result: SpinRuns, facts: Facts | None = None) -> str:
         ),
         Section("remaining", "Remaining unbalance", tables=balance.tables),
         replace(floor, pictures=(), is_folded=True),
-        replace(drive, pictures=(), text=drive.text * (not drive.pictures)),
+        replace(drive, pictures=(), text="" if drive.pictures else drive.text),
         Section("springs", "Springs", tables=(tables.smallest_tensions(result),)),
         Section("more", "More measures", tables=more),
     ]
@@ -200,7 +200,8 @@ def summary(result: SpinRuns, table: pd.DataFrame) -> str:
     ended = [case for case in result.results if not case.record.attrs["diverged"]]
     count, diverged = len(result.results), len(result.results) - len(ended)
     cases = "1 case was" if count == 1 else f"{count} cases were"
-    speed = number(RPM_PER_RAD_S * max(max(case.case.profile.speed) for case in result.results), 0)
+    fastest = max(case.case.profile.highest_speed for case in result.results)
+    speed = number(RPM_PER_RAD_S * fastest, 0)
     opening = f"{cases} run with the {result.engine} engine, at drum speeds up to {speed} rpm."
     if not ended:
         return f"{opening} Every run diverged, so there is no result to summarize."
@@ -294,7 +295,7 @@ def _agreement_sentence(result: SpinRuns, cases: list[CaseResult], table: pd.Dat
 def _why_not_compared(result: SpinRuns) -> str:
     if not result.parameters.measured:
         return "The machine file has no measured amplitudes."
-    if result.comparison is Comparison.NONE:
+    if result.comparison is ComparedCases.NONE:
         return (
             "There is no comparison with the measured amplitudes of the machine file, because its "
             "numbers were changed."
@@ -344,7 +345,7 @@ def facts_of_run(result: SpinRuns, made: Facts) -> list[tuple[str, str]]:
     return [
         ("Machine", result.parameters.name),
         ("SDF model", Path(result.parameters.model).name),
-        ("Engine", f"{result.engine}, step {1e3 * result.step:g} ms"),
+        ("Engine", f"{result.engine}, {result.stepping_text}"),
         ("Versions", versions_of(attrs)),
         ("Computing time", "; ".join(times)),
         *replace(made, step=0.0).rows(),  # the line of the engine has the step

@@ -21,7 +21,7 @@ from wm_drake.studies.spin.comparison import (
 from wm_drake.studies.spin.comparison_page import SpinComparisonResult
 from wm_drake.studies.spin.options import SpinOptions
 from wm_drake.studies.spin.page import SpinResult
-from wm_drake.studies.spin.study import Comparison, Files, run_spin
+from wm_drake.studies.spin.study import ComparedCases, Files, run_spin
 from wm_drake.studies.study import Task
 
 LONGEST_FILE_PART = 60
@@ -93,8 +93,8 @@ class SpinTask(Task):
         """Run all cases of all variants."""
         is_one, options = len(self.planned) == 1, self.options
         is_changed = options.sets or options.drive
-        comparison = Comparison.NONE if is_changed else Comparison.AS_MEASURED
-        comparison = Comparison.ALL if options.measured else comparison
+        comparison = ComparedCases.NONE if is_changed else ComparedCases.AS_MEASURED
+        comparison = ComparedCases.ALL if options.measured else comparison
         names = [
             case.name if is_one else f"{planned.name}: {case.name}"
             for planned in self.planned

@@ -170,7 +170,9 @@ def _map(
     return Panel(
         marks=tuple(marks),
         x=Axis(label="time, s", range=(0.0, float(record.time[-1])), has_grid=False),
-        y=Axis(label=f"{dimension}{', Hz' * bool(highest)}", range=(0.0, top), has_grid=False),
+        y=Axis(
+            label=f"{dimension}, Hz" if highest else dimension, range=(0.0, top), has_grid=False
+        ),
         top=figures.speed_axis(record),
     )
 

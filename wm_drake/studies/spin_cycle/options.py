@@ -8,7 +8,7 @@ from wm_drake.studies.study import Options, Study, imported, option
 CASE: Any = option((), "Run only this case. Repeatable.", "NAME")
 
 
-class CycleOptions(Options):
+class SpinCycleDataOptions(Options):
     """Options of all studies of a spin cycle: profile, unbalance cases, and measurements."""
 
     machine: str = option("free_stroke", "Name of a shipped machine, or machine file.", "NAME|FILE")
@@ -40,7 +40,7 @@ class CycleOptions(Options):
     )
 
 
-class SpinCycleOptions(CycleOptions):
+class SpinCycleOptions(SpinCycleDataOptions):
     """Options of the study of a spin cycle."""
 
     engine: str = option(

@@ -8,7 +8,15 @@ import numpy as np
 import pandas as pd
 
 from wm_drake.parameters.unbalance_cases import UnbalanceCase
-from wm_drake.report.formatting import MM_PER_M, number, plain, slack_warning
+from wm_drake.report.formatting import (
+    MM_PER_M,
+    MS_PER_S,
+    gap_size,
+    listed,
+    number,
+    plain,
+    slack_warning,
+)
 from wm_drake.report.page import Picture, Section, SectionedPage, picture
 from wm_drake.report.terminal import Printed
 from wm_drake.simulation.measures.as_json import as_json
@@ -17,11 +25,12 @@ from wm_drake.studies.spin_cycle import tables
 from wm_drake.studies.spin_cycle.figures import bars_figure, heat_map_figure, profile_figure
 from wm_drake.studies.spin_cycle.measured import rms_table
 from wm_drake.studies.spin_cycle.study import (
-    SpinCycleResult,
+    SpinCycleRuns,
     average_errors,
     disagreement,
     largest,
     mean_and_deviation,
+    missing_regions,
     region_errors,
 )
 from wm_drake.studies.study import Facts, Result
@@ -31,10 +40,10 @@ SHOWN_MASSES = ((0.4, 0.0, 0.0), (0.0, 0.4, 0.0), (0.4, 0.4, 180.0))
 
 
 @dataclass(frozen=True)
-class SpinCycleReport(Result):
+class SpinCycleResult(Result):
     """Result of the study, and the engine of its runs."""
 
-    result: SpinCycleResult
+    result: SpinCycleRuns
     engine: str
 
     def tables(self) -> dict[str, pd.DataFrame]:
@@ -73,6 +82,7 @@ class SpinCycleReport(Result):
                 "by_region_mean": mean,
                 "by_region_deviation": deviation,
                 "by_case_average": average_errors(result.displacement, result.measured),
+                "missing_regions": missing_regions(result.displacement, result.measured),
             }
         return plain(shown)
 
@@ -80,6 +90,10 @@ class SpinCycleReport(Result):
         """Return the table of the cases."""
         title = f"Spin cycle of machine '{self.result.parameters.name}'"
         return [tables.cases(self.result).terminal(title)]
+
+    def warnings(self) -> list[str]:
+        """Return a warning of the regions that the errors leave out, if there are any."""
+        return _missing(self.result)
 
     def failures(self) -> list[str]:
         """Return a line for each case that diverged."""
@@ -119,7 +133,13 @@ class SpinCycleReport(Result):
         ).html()
 
 
-def _case_as_json(result: SpinCycleResult, case: UnbalanceCase, diverged: str) -> dict[str, Any]:
+def _missing(result: SpinCycleRuns) -> list[str]:
+    if result.measured is None:
+        return []
+    return tables.missing_warnings(result.displacement, result.measured)
+
+
+def _case_as_json(result: SpinCycleRuns, case: UnbalanceCase, diverged: str) -> dict[str, Any]:
     here = {"case": case.name}
     tension, forces = result.smallest_tension.sel(here), as_json(result.forces.sel(here))
     return {
@@ -138,7 +158,7 @@ def _case_as_json(result: SpinCycleResult, case: UnbalanceCase, diverged: str) -
     }
 
 
-def summary(result: SpinCycleResult, engine: str) -> str:
+def summary(result: SpinCycleRuns, engine: str) -> str:
     """Return one paragraph about displacements, gaps, and errors against a measurement."""
     count = len(result.cases)
     sentences = [
@@ -157,7 +177,7 @@ def summary(result: SpinCycleResult, engine: str) -> str:
         nearest = str(gaps.case.values[int(np.argmin(gaps.values))])
         sentences.append(
             "The smallest gap between tub and housing is "
-            f"{number(MM_PER_M * float(gaps.min()))} mm, in case {nearest} "
+            f"{gap_size(float(gaps.min()))}, in case {nearest} "
             f"({case_description(_case(result, nearest))})."
         )
     apart = float(disagreement(result).max(skipna=True))
@@ -174,10 +194,12 @@ def summary(result: SpinCycleResult, engine: str) -> str:
             number(100.0 * float(value))
             for value in (errors.mean(skipna=True), errors.std(skipna=True))
         )
+        missing = missing_regions(result.displacement, result.measured)
+        without = f" without {listed(list(missing))}" if missing else ""
         sentences.append(
-            f"Compared with the measurement, the average error is {mean} %, with a standard "
-            f"deviation of {deviation} % over the cases. ([A] reports 20.1 % and 4.1 % for its own "
-            "model and machine.)"
+            f"Compared with the measurement{without}, the average error is {mean} %, with a "
+            f"standard deviation of {deviation} % over the cases. ([A] reports 20.1 % and 4.1 % "
+            "for its own model and machine.)"
         )
     return " ".join(sentences)
 
@@ -193,7 +215,7 @@ def case_description(case: UnbalanceCase) -> str:
     return (" and ".join(masses) or "empty drum") + phase
 
 
-def shown_cases(result: SpinCycleResult) -> list[UnbalanceCase]:
+def shown_cases(result: SpinCycleRuns) -> list[UnbalanceCase]:
     """Return the cases that the page shows in detail.
 
     These are the cases of the figures of [A], or the first three if none of them was run, and the
@@ -210,13 +232,14 @@ def shown_cases(result: SpinCycleResult) -> list[UnbalanceCase]:
     return list({case.name: case for case in chosen}.values())
 
 
-def warnings_of(result: SpinCycleResult) -> list[str]:
+def warnings_of(result: SpinCycleRuns) -> list[str]:
     """Return warnings about divergence, overlap, slack springs, integration, imperfections."""
     texts = [
         f"Case {case.name}: {text}. Regions that this run did not complete have no values."
         for case, text in zip(result.cases, result.diverged, strict=True)
         if text
     ]
+    texts += _missing(result)
     gaps = result.smallest_gap
     touching = list(map(str, gaps.case.values[gaps.values <= 0.0]))
     if touching:
@@ -233,7 +256,7 @@ def warnings_of(result: SpinCycleResult) -> list[str]:
         texts.append(
             "In at least one region, the RMS displacements from integrated acceleration differ by "
             f"{number(100 * apart, 1)} % from the direct ones. The motion there is too small for "
-            "the integration, or too fast for a sampling interval of 5 ms."
+            f"the integration, or too fast for a sampling interval of {_sample_period(result)}."
         )
     faults = result.parameters.imperfections
     if faults.residual_imbalance.mass > 0.0:
@@ -255,11 +278,17 @@ def warnings_of(result: SpinCycleResult) -> list[str]:
     return texts
 
 
-def _case(result: SpinCycleResult, name: str) -> UnbalanceCase:
+def _sample_period(result: SpinCycleRuns) -> str:
+    """Return the time between the samples of a run."""
+    period = result.profile.sample_period(result.parameters.output_period)
+    return f"{MS_PER_S * period:g} ms"
+
+
+def _case(result: SpinCycleRuns, name: str) -> UnbalanceCase:
     return next(case for case in result.cases if case.name == name)
 
 
-def _profile_picture(result: SpinCycleResult) -> Picture:
+def _profile_picture(result: SpinCycleRuns) -> Picture:
     names = ", ".join(region.name for region in result.profile.regions)
     return picture(
         profile_figure(result.profile),
@@ -268,7 +297,7 @@ def _profile_picture(result: SpinCycleResult) -> Picture:
     )
 
 
-def _worst_picture(result: SpinCycleResult) -> tuple[Picture, ...]:
+def _worst_picture(result: SpinCycleRuns) -> tuple[Picture, ...]:
     """Return the largest displacements of all cases; nothing if no run completed a region."""
     if largest(result.displacement) is None:
         return ()
@@ -290,7 +319,7 @@ def _worst_picture(result: SpinCycleResult) -> tuple[Picture, ...]:
     return (picture(figure, words, caption),)
 
 
-def _bars(result: SpinCycleResult, case: str, title: str) -> Picture:
+def _bars(result: SpinCycleRuns, case: str, title: str) -> Picture:
     computed, integrated = (v.sel(case=case) for v in (result.displacement, result.integrated))
     measured = result.measured.sel(case=case) if result.measured is not None else None
     if measured is not None and not np.isfinite(measured).any():
@@ -303,7 +332,7 @@ def _bars(result: SpinCycleResult, case: str, title: str) -> Picture:
     return picture(bars_figure(computed, integrated, measured), words, caption)
 
 
-def _facts(result: SpinCycleResult, engine: str, facts: Facts) -> list[tuple[str, str]]:
+def _facts(result: SpinCycleRuns, engine: str, facts: Facts) -> list[tuple[str, str]]:
     sensors = [
         f"{name} (frame {frame})"
         for name, frame in result.parameters.accelerometer_frames().items()
@@ -316,7 +345,7 @@ def _facts(result: SpinCycleResult, engine: str, facts: Facts) -> list[tuple[str
         (
             "Displacement",
             "from the rest position, with a high-pass filter of 0.5 Hz; RMS over all samples of a "
-            "region, one every 5 ms",
+            f"region, one every {_sample_period(result)}",
         ),
         *facts.rows(),
     ]

@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TypeAlias
 
 import numpy as np
 import xarray as xr
@@ -23,10 +22,11 @@ from wm_drake.simulation.measures import MEASURES as KNOWN_MEASURES
 from wm_drake.simulation.measures import measure
 from wm_drake.simulation.mounts import mount_names
 from wm_drake.simulation.vibration import relative_error
+from wm_drake.studies.executor import RunCases
 from wm_drake.studies.inputs import channels_of, existing_file
 from wm_drake.studies.spin.study import run_spin
 from wm_drake.studies.spin_cycle.measured import DIMS, read_accelerations, read_rms
-from wm_drake.studies.spin_cycle.options import CycleOptions
+from wm_drake.studies.spin_cycle.options import SpinCycleDataOptions
 
 FORCES = ("mounts", "cabinet")
 """Measures of the forces on the cabinet."""
@@ -40,12 +40,9 @@ FEET = ("feet", "feet regions")
 DRIVE = ("drive",)
 """Measures of each run of a machine with a motor."""
 
-Evaluate: TypeAlias = Callable[[Iterable[Case]], xr.Dataset]
-"""Function that runs cases and returns their table with `MEASURES`, as `simulate_many` does."""
-
 
 @dataclass(frozen=True)
-class SpinCycleResult:
+class SpinCycleRuns:
     """Results of a spin-cycle study.
 
     Attributes:
@@ -125,8 +122,8 @@ def run_spin_cycle(
     parameters: MachineParameters,
     cases: Sequence[UnbalanceCase],
     profile: SpinProfile,
-    evaluate: Evaluate,
-) -> SpinCycleResult:
+    evaluate: RunCases,
+) -> SpinCycleRuns:
     """Run unbalance cases and label their measures.
 
     Raises:
@@ -148,7 +145,7 @@ def run_spin_cycle(
     diverged = tuple(map(str, table.diverged.values))
     forces = forces_of(parameters, table, labels)
     measured = direct, integrated, gap, tension
-    return SpinCycleResult(parameters, profile, tuple(cases), *measured, diverged, forces)
+    return SpinCycleRuns(parameters, profile, tuple(cases), *measured, diverged, forces)
 
 
 def labels_of(
@@ -162,7 +159,7 @@ def labels_of(
     )
 
 
-def disagreement(result: SpinCycleResult) -> xr.DataArray:
+def disagreement(result: SpinCycleRuns) -> xr.DataArray:
     """Return the relative error (case, region) of the displacements from integrated acceleration.
 
     It is [A] Eq. (9) with norms over all sensors and axes; the reference is the displacement
@@ -191,6 +188,23 @@ def average_errors(computed: xr.DataArray, measured: xr.DataArray) -> xr.DataArr
     """
     single = relative_error(computed.values[..., None], measured.values[..., None])
     return xr.DataArray(single, computed.coords, computed.dims).mean(DIMS[1:], skipna=True)
+
+
+def missing_regions(computed: xr.DataArray, measured: xr.DataArray) -> dict[str, list[str]]:
+    """Return the measured cases whose errors leave a region out, by the name of the region.
+
+    They have no value there that is both computed and measured.
+    """
+    is_measured = measured.notnull()
+    compared = (is_measured & computed.notnull()).any(DIMS[2:])
+    left_out = ~compared & is_measured.any(DIMS[1:])
+    cases = {
+        str(region): [str(case) for case in left_out.case.values[of_region]]
+        for region, of_region in zip(
+            left_out.region.values, left_out.transpose("region", "case").values, strict=True
+        )
+    }
+    return {region: of_region for region, of_region in cases.items() if of_region}
 
 
 def mean_and_deviation(errors: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
@@ -241,7 +255,7 @@ def cases_of_table(path: Path | None, names: Sequence[str] | None) -> list[Unbal
 
 
 def measured_displacements(
-    options: CycleOptions,
+    options: SpinCycleDataOptions,
     parameters: MachineParameters,
     cases: list[UnbalanceCase],
     profile: SpinProfile,
@@ -271,14 +285,14 @@ def measured_displacements(
     return None
 
 
-def compiled_runs(machine: Machine) -> Evaluate:
+def compiled_runs(machine: Machine) -> RunCases:
     """Return a function that runs cases of a built machine with the compiled engine."""
     return partial(simulate_many, machine, measures=measures_of(machine.parameters))
 
 
 def drake_runs(
     parameters: MachineParameters, *, progress: Callable[[int], None] = lambda done: None
-) -> Evaluate:
+) -> RunCases:
     """Return a function that runs cases with the Drake engine in processes, minutes a case."""
 
     def evaluate(cases: Iterable[Case]) -> xr.Dataset:

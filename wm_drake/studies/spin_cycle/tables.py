@@ -11,17 +11,19 @@ from wm_drake.report.formatting import MISSING, MM_PER_M, RPM_PER_RAD_S, number
 from wm_drake.report.table import Column, Columns, Table, line, table_of
 from wm_drake.simulation.feet import MARGINS
 from wm_drake.simulation.measures.as_json import as_json
+from wm_drake.simulation.vibration import MOST_MISSING
 from wm_drake.studies.spin_cycle.study import (
-    SpinCycleResult,
+    SpinCycleRuns,
     average_errors,
     disagreement,
     largest,
     mean_and_deviation,
+    missing_regions,
     region_errors,
 )
 
 
-def case_frame(result: SpinCycleResult) -> pd.DataFrame:
+def case_frame(result: SpinCycleRuns) -> pd.DataFrame:
     """Return one row per case as [A] Table 9, with largest RMS displacement and smallest gap."""
     measured = result.measured
     errors = None if measured is None else average_errors(result.displacement, measured)
@@ -63,7 +65,7 @@ COLUMNS = {
 """Columns of the table of cases."""
 
 
-def cases(result: SpinCycleResult) -> Table:
+def cases(result: SpinCycleRuns) -> Table:
     """Return the cases with their results; a collision or a slack spring is an alarm."""
     table = case_frame(result)
     alarms = (table["smallest_gap_mm"] <= 0.0) | (table["smallest_tension_N"] == 0.0)
@@ -86,7 +88,7 @@ def cases(result: SpinCycleResult) -> Table:
     return table_of(shown, caption, COLUMNS, ["alarm" if alarm else "" for alarm in alarms])
 
 
-def regions(result: SpinCycleResult) -> Table:
+def regions(result: SpinCycleRuns) -> Table:
     """Return limits and results of each region, and its errors if there is a measurement.
 
     One column compares RMS displacements computed directly and by integrating the acceleration.
@@ -130,7 +132,20 @@ def regions(result: SpinCycleResult) -> Table:
     return Table(caption, columns, tuple(groups))
 
 
-def displacements(result: SpinCycleResult, case: str, title: str) -> Table:
+def missing_warnings(computed: xr.DataArray, measured: xr.DataArray) -> list[str]:
+    """Return a warning of the regions that the errors leave out, or none."""
+    missing = missing_regions(computed, measured)
+    if not missing:
+        return []
+    parts = [f"{region} in case {', '.join(cases)}" for region, cases in missing.items()]
+    return [
+        f"The errors leave regions out, which have no measured value or were not completed by the "
+        f"run: {'; '.join(parts)}. A record counts for a region if at most "
+        f"{number(100.0 * MOST_MISSING, 0)} % of it is missing at its end."
+    ]
+
+
+def displacements(result: SpinCycleRuns, case: str, title: str) -> Table:
     """Return the RMS displacements of one case by region (rows), sensor and axis (columns)."""
     values = MM_PER_M * result.displacement.sel(case=case)
     columns = tuple(Column(name, decimals=3) for name in channels(values))
@@ -182,7 +197,7 @@ SHOWN_DRIVE = {
 """Columns on the page."""
 
 
-def drive_frame(result: SpinCycleResult) -> pd.DataFrame | None:
+def drive_frame(result: SpinCycleRuns) -> pd.DataFrame | None:
     """Return a row for each case with the measures of the drive; None without a motor."""
     if "drive_peak_torque" not in result.forces:
         return None
@@ -198,7 +213,7 @@ def drive_frame(result: SpinCycleResult) -> pd.DataFrame | None:
     )
 
 
-def drive_table(result: SpinCycleResult) -> Table | None:
+def drive_table(result: SpinCycleRuns) -> Table | None:
     """Return the measures of the drive of each case; None without a motor."""
     frame = drive_frame(result)
     if frame is None:
@@ -227,7 +242,7 @@ MARGIN_COLUMNS = list(SHOWN_FEET)[1:-1]
 """Columns of loads and margins."""
 
 
-def feet_frame(result: SpinCycleResult) -> pd.DataFrame:
+def feet_frame(result: SpinCycleRuns) -> pd.DataFrame:
     """Return a row for each case and region, and one for the whole run: loads and margins."""
     rows: list[dict[str, Any]] = []
     for case in result.cases:
@@ -237,7 +252,7 @@ def feet_frame(result: SpinCycleResult) -> pd.DataFrame:
     return pd.DataFrame(rows).astype(dict.fromkeys(MARGIN_COLUMNS, float))
 
 
-def floor_table(result: SpinCycleResult) -> Table | None:
+def floor_table(result: SpinCycleRuns) -> Table | None:
     """Return the smallest loads and margins of each case; None without a cabinet."""
     if "turn_margin" not in result.forces:
         return None
@@ -259,7 +274,7 @@ def floor_table(result: SpinCycleResult) -> Table | None:
     return table_of(whole, caption, SHOWN_FEET, kinds)
 
 
-def floor_warnings(result: SpinCycleResult) -> list[str]:
+def floor_warnings(result: SpinCycleRuns) -> list[str]:
     """Return a warning that names the cases in which the cabinet would slide, turn or tip."""
     if "turn_margin" not in result.forces:
         return []

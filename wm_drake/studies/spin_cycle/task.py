@@ -9,7 +9,7 @@ from wm_drake.model.machine import Machine
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import runnable_profile
 from wm_drake.studies.spin_cycle.options import SpinCycleOptions
-from wm_drake.studies.spin_cycle.page import SpinCycleReport
+from wm_drake.studies.spin_cycle.page import SpinCycleResult
 from wm_drake.studies.spin_cycle.study import (
     cases_of_table,
     drake_runs,
@@ -52,4 +52,4 @@ class SpinCycleTask(Task):
             measures = measures_of(parameters)
             evaluate = partial(executor.simulate, self.machine, measures, what="cases")
             result = run_spin_cycle(parameters, self.cases, self.profile, evaluate)
-        return SpinCycleReport(replace(result, measured=self.measured), self.engine)
+        return SpinCycleResult(replace(result, measured=self.measured), self.engine)

@@ -1,10 +1,10 @@
 """Options of the identification from a spin cycle, and its declaration."""
 
-from wm_drake.studies.spin_cycle.options import CycleOptions
+from wm_drake.studies.spin_cycle.options import SpinCycleDataOptions
 from wm_drake.studies.study import Study, imported, option
 
 
-class SpinIdentifyOptions(CycleOptions):
+class SpinIdentifyOptions(SpinCycleDataOptions):
     """Options of the identification from a spin cycle."""
 
     unknown: tuple[str, ...] = option(

@@ -15,6 +15,7 @@ from wm_drake.studies.fitting.fit import Fit, verdict_of
 from wm_drake.studies.fitting.page import estimates_of, fit_parts, search_facts
 from wm_drake.studies.spin_cycle.figures import bars_figure, profile_figure
 from wm_drake.studies.spin_cycle.page import case_description
+from wm_drake.studies.spin_cycle.tables import missing_warnings
 from wm_drake.studies.spin_identify.study import (
     KNOWN,
     RELATIVE_ERROR,
@@ -141,6 +142,7 @@ def judged(identified: xr.Dataset) -> str:
 def warnings_of(fit: Fit, identified: xr.Dataset) -> list[str]:
     """Return a warning for a fit that is not good and for each search that ended at a bound."""
     warnings = [] if _verdict(identified) == "good" else [judged(identified)]
+    warnings += missing_warnings(identified.after, identified.measured)
     return warnings + [
         f"The search for {e.name} ended at its {e.at_bound} bound. Widen the range, or check "
         "whether the model is right."

@@ -3,9 +3,9 @@
 [A] section 4.2 identifies the parameters of its Table 8 in this way.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -26,6 +26,7 @@ from wm_drake.parameters.units import Share, Unit
 from wm_drake.parameters.variation import number_at, range_of
 from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.cases import Case
+from wm_drake.studies.executor import RunCases
 from wm_drake.studies.fitting.fit import Fit
 from wm_drake.studies.fitting.methods import least_squares
 from wm_drake.studies.fitting.problem import FitProblem, Measurement, Progress, Unknown
@@ -61,9 +62,6 @@ TABLE_8 = (
 
 They are the friction about the axis of its bushings and all rotational numbers of the gasket.
 """
-
-Regions: TypeAlias = Callable[[Iterable[Case]], xr.Dataset]
-"""Function that runs cases and returns their table with "regions", as `simulate_many` does."""
 
 
 @dataclass(frozen=True)
@@ -186,7 +184,7 @@ class SpinModel:
     profile: SpinProfile
     cases: tuple[UnbalanceCase, ...]
     sought: tuple[Sought, ...]
-    regions: Regions
+    regions: RunCases
 
     def displacements(self, points: FloatArray) -> FloatArray:
         """Compute the RMS displacements at points.

@@ -9,7 +9,7 @@ from wm_drake.report import figure as fig
 from wm_drake.report.formatting import MM_PER_M
 from wm_drake.studies.tolerance.sensitivity import Index
 from wm_drake.studies.tolerance.shares import band_of
-from wm_drake.studies.tolerance.study import ToleranceResult
+from wm_drake.studies.tolerance.study import ToleranceStudy
 
 MOST_POINTS = 400
 """Largest number of points of a curve."""
@@ -18,7 +18,7 @@ MOST_STEPS = 5
 """Number of heights at which the loads are drawn, so that their names do not overlap."""
 
 
-def distributions_figure(result: ToleranceResult, names: dict[str, str]) -> fig.Figure:
+def distributions_figure(result: ToleranceStudy, names: dict[str, str]) -> fig.Figure:
     """Return the distribution function of each measure with its 95 % band and its limits.
 
     Args:
@@ -33,7 +33,7 @@ def distributions_figure(result: ToleranceResult, names: dict[str, str]) -> fig.
     return fig.Figure(panels=fig.in_grid(panels, 3, share="y"), height=150.0)
 
 
-def _distribution(result: ToleranceResult, name: str) -> list[fig.Mark]:
+def _distribution(result: ToleranceStudy, name: str) -> list[fig.Mark]:
     """Return the distribution function of a measure with its 95 % band and its limits."""
     values = np.sort(result.values[name].dropna().to_numpy())
     kept = np.unique(np.linspace(0, len(values) - 1, MOST_POINTS).astype(int))
@@ -48,7 +48,7 @@ def _distribution(result: ToleranceResult, name: str) -> list[fig.Mark]:
     return marks + [fig.Rule(x, "y", color=fig.MEASURED, width=1.8, dash="dashed") for x in limits]
 
 
-def gap_figure(result: ToleranceResult, name: str, loads: Mapping[str, float]) -> fig.Figure:
+def gap_figure(result: ToleranceStudy, name: str, loads: Mapping[str, float]) -> fig.Figure:
     """Return the distribution of the smallest gap beside the gaps of the loads of the machine.
 
     Args:

@@ -13,7 +13,7 @@ from wm_drake.report.table import Column, Table, line, table_of
 from wm_drake.studies.study import Facts, Result
 from wm_drake.studies.tolerance.figures import distributions_figure, gap_figure, sobol_figure
 from wm_drake.studies.tolerance.shares import PERCENTILES, percentile_of
-from wm_drake.studies.tolerance.study import ToleranceResult
+from wm_drake.studies.tolerance.study import ToleranceStudy
 from wm_drake.studies.tolerance.words import (
     about_loads,
     in_percent,
@@ -34,7 +34,7 @@ MOST_PANELS = 9
 
 
 @dataclass(frozen=True)
-class ToleranceReport(Result):
+class ToleranceResult(Result):
     """Result of the study.
 
     Attributes:
@@ -43,7 +43,7 @@ class ToleranceReport(Result):
         gaps_of_loads: Smallest gap of each load of the machine. [m]
     """
 
-    result: ToleranceResult
+    result: ToleranceStudy
     about: str
     gaps_of_loads: Mapping[str, float] = field(default_factory=dict)
 
@@ -154,17 +154,17 @@ class ToleranceReport(Result):
         return [f"{count} of {self.result.settings.samples} runs failed"] if count else []
 
 
-def facts_of(result: ToleranceResult, gaps: Mapping[str, float]) -> list[tuple[str, str]]:
+def facts_of(result: ToleranceStudy, gaps: Mapping[str, float]) -> list[tuple[str, str]]:
     """Return the facts below the answer.
 
     Args:
         gaps: Smallest gap of each load of the machine. [m]
     """
-    facts = [*in_short(result), ("Loads of the machine", about_loads(gaps))]
+    facts = [*in_short(result), ("Loads of the machine", about_loads(result, gaps))]
     return [(word, text) for word, text in facts if text]
 
 
-def _gap_picture(result: ToleranceResult, gaps: Mapping[str, float]) -> tuple[Picture, ...]:
+def _gap_picture(result: ToleranceStudy, gaps: Mapping[str, float]) -> tuple[Picture, ...]:
     """Return the distribution of the smallest gap beside the loads; nothing without a gap."""
     name = next((str(n) for n in result.values if str(n).startswith("smallest_gap")), "")
     if not name or result.values[name].notna().sum() < 2:
@@ -178,7 +178,7 @@ def _gap_picture(result: ToleranceResult, gaps: Mapping[str, float]) -> tuple[Pi
     return (picture(figure, f"Distribution of the smallest gap. {caption}", caption),)
 
 
-def _distributions(result: ToleranceResult) -> tuple[Picture, ...]:
+def _distributions(result: ToleranceStudy) -> tuple[Picture, ...]:
     titles = {name: ", ".join(text) for name, text in measure_titles(result).items()}
     names = [str(name) for name in result.values if not str(name).startswith("smallest_gap")]
     caption = (
@@ -193,7 +193,7 @@ def _distributions(result: ToleranceResult) -> tuple[Picture, ...]:
     return tuple(pictures)
 
 
-def _sobol_picture(result: ToleranceResult) -> tuple[Picture, ...]:
+def _sobol_picture(result: ToleranceStudy) -> tuple[Picture, ...]:
     """Return the indices of the leading measure; nothing if there are none."""
     key, indices = leading(result)
     if not indices:
@@ -212,7 +212,7 @@ KINDS = {"pass": "ours", "fail": "alarm", "undecided": ""}
 """Style of the row of a limit by its verdict."""
 
 
-def samples_frame(result: ToleranceResult) -> pd.DataFrame:
+def samples_frame(result: ToleranceStudy) -> pd.DataFrame:
     """Return quantities and measures of each sample, and the reason if its run failed."""
     columns: dict[str, Any] = {"sample": range(1, len(result.values) + 1)}
     values = result.machine.joint.values(result.scores)
@@ -223,7 +223,7 @@ def samples_frame(result: ToleranceResult) -> pd.DataFrame:
     return pd.concat([pd.DataFrame(columns), result.values], axis=1).assign(failed=failed)
 
 
-def measures_frame(result: ToleranceResult) -> pd.DataFrame:
+def measures_frame(result: ToleranceStudy) -> pd.DataFrame:
     """Return mean, deviation and percentiles of each measure, with intervals of the percentiles."""
     rows = []
     for name, column in result.values.items():
@@ -249,7 +249,7 @@ MEASURES = {
 """Columns of the table of measures."""
 
 
-def measures_table(result: ToleranceResult, *, is_short: bool = False) -> Table:
+def measures_table(result: ToleranceStudy, *, is_short: bool = False) -> Table:
     """Return the measures with words and unit; the short form has percentiles alone."""
     frame, titles = measures_frame(result), measure_titles(result)
     words = [titles[str(name)] for name in frame["measure"]]
@@ -262,7 +262,7 @@ def measures_table(result: ToleranceResult, *, is_short: bool = False) -> Table:
     return table_of(frame[names], caption, MEASURES)
 
 
-def sobol_frame(result: ToleranceResult) -> pd.DataFrame:
+def sobol_frame(result: ToleranceStudy) -> pd.DataFrame:
     """Return the Sobol indices: one row for each measure and quantity."""
     return pd.DataFrame(
         {"measure": name, "quantity": variable.name, **vars(index)}
@@ -271,7 +271,7 @@ def sobol_frame(result: ToleranceResult) -> pd.DataFrame:
     )
 
 
-def sobol_table(result: ToleranceResult) -> Table:
+def sobol_table(result: ToleranceStudy) -> Table:
     """Return the total Sobol indices, a column for each quantity."""
     names = (quantity_words(variable.name) for variable in result.machine.variables)
     titles = measure_titles(result)
@@ -287,7 +287,7 @@ def sobol_table(result: ToleranceResult) -> Table:
     return Table(caption, ("measure", *columns), tuple(groups))
 
 
-def contact_frame(result: ToleranceResult) -> pd.DataFrame:
+def contact_frame(result: ToleranceStudy) -> pd.DataFrame:
     """Return the share of the samples in which each pair of shapes touches or is nearest."""
     rows, contact = [], result.contact
     if contact:
@@ -299,7 +299,7 @@ def contact_frame(result: ToleranceResult) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=names)
 
 
-def contact_table(result: ToleranceResult) -> Table:
+def contact_table(result: ToleranceStudy) -> Table:
     """Return how often each pair of shapes touches and is nearest."""
     rows = []
     for moving, fixed, share, low, high, count in contact_frame(result).to_numpy().tolist():
@@ -316,7 +316,7 @@ def contact_table(result: ToleranceResult) -> Table:
     return Table(caption, (*header, Column("nearest", "%", 1)), tuple(rows), text_columns=2)
 
 
-def limits_frame(result: ToleranceResult) -> pd.DataFrame:
+def limits_frame(result: ToleranceStudy) -> pd.DataFrame:
     """Return the verdict on each limit."""
     return pd.DataFrame(
         {
@@ -333,7 +333,7 @@ def limits_frame(result: ToleranceResult) -> pd.DataFrame:
     )
 
 
-def limits_table(result: ToleranceResult) -> Table:
+def limits_table(result: ToleranceStudy) -> Table:
     """Return the verdict on each limit with the words of its quantity."""
     titles, rows = measure_titles(result), []
     for v in result.verdicts:
@@ -350,7 +350,7 @@ def limits_table(result: ToleranceResult) -> Table:
     return Table(caption, header, tuple(rows), text_columns=2)
 
 
-def quantities_table(result: ToleranceResult) -> Table:
+def quantities_table(result: ToleranceStudy) -> Table:
     """Return what scatters."""
     rows = (
         line(

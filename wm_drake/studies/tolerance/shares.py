@@ -16,7 +16,7 @@ PERCENTILES = (5, 50, 95)
 
 
 @dataclass(frozen=True)
-class Share:
+class SampleShare:
     """Share of samples with a property.
 
     Attributes:
@@ -36,11 +36,11 @@ class Share:
         return self.count / self.samples
 
 
-def share_of(has_property: NDArray[Any]) -> Share:
+def share_of(has_property: NDArray[Any]) -> SampleShare:
     """Return the share of samples with a property, from whether each one has it. (n,)"""
     count, samples = int(np.sum(has_property)), len(has_property)
     ends = stats.binomtest(count, samples).proportion_ci(CONFIDENCE, method="exact")
-    return Share(count, samples, float(ends.low), float(ends.high))
+    return SampleShare(count, samples, float(ends.low), float(ends.high))
 
 
 def bound_if_none(samples: int) -> float:

@@ -16,10 +16,10 @@ from wm_drake.simulation.measures.responses import GAP, Response
 from wm_drake.studies.tolerance.distributions import base_samples
 from wm_drake.studies.tolerance.rare import RareEvent, subset_simulation
 from wm_drake.studies.tolerance.sensitivity import Index, exchanged, sobol_indices
-from wm_drake.studies.tolerance.shares import Share, bound_if_none, share_of
+from wm_drake.studies.tolerance.shares import SampleShare, bound_if_none, share_of
 from wm_drake.studies.tolerance.variables import UncertainMachine
 
-Run: TypeAlias = Callable[[Iterable[Case], str], xr.Dataset]
+RunSamples: TypeAlias = Callable[[Iterable[Case], str], xr.Dataset]
 """Function that runs cases and returns their table, given a word for what they are."""
 
 RARE = 1e-3
@@ -45,7 +45,7 @@ CORRELATED = (
 
 
 @dataclass(frozen=True)
-class Settings:
+class ToleranceSettings:
     """Numbers of samples.
 
     Attributes:
@@ -103,15 +103,15 @@ class Contact:
     lower: float
     upper: float
     method: str
-    crude: Share
-    pairs: dict[str, Share]
+    crude: SampleShare
+    pairs: dict[str, SampleShare]
     nearest: dict[str, int]
     rare: RareEvent | None
     rare_pairs: dict[str, float]
 
 
 @dataclass(frozen=True)
-class Verdict:
+class LimitVerdict:
     """Judgement of a limit.
 
     Attributes:
@@ -126,12 +126,12 @@ class Verdict:
     key: str
     number: float
     allowed: float
-    broken: Share
+    broken: SampleShare
     word: str
 
 
 @dataclass(frozen=True)
-class ToleranceResult:
+class ToleranceStudy:
     """Result of a tolerance study.
 
     Attributes:
@@ -147,7 +147,7 @@ class ToleranceResult:
     """
 
     machine: UncertainMachine
-    settings: Settings
+    settings: ToleranceSettings
     chosen: tuple[Response, ...]
     scores: FloatArray
     values: pd.DataFrame
@@ -155,7 +155,7 @@ class ToleranceResult:
     contact: Contact | None
     indices: dict[str, list[Index]]
     refused: str
-    verdicts: tuple[Verdict, ...]
+    verdicts: tuple[LimitVerdict, ...]
     runs: int
 
 
@@ -200,10 +200,10 @@ def limits_of(
 def run_tolerances(
     machine: UncertainMachine,
     chosen: tuple[Response, ...],
-    run: Run,
-    settings: Settings,
+    run: RunSamples,
+    settings: ToleranceSettings,
     limits: Sequence[tuple[Limit, Response, float]] = (),
-) -> ToleranceResult:
+) -> ToleranceStudy:
     """Run a tolerance study.
 
     Args:
@@ -216,7 +216,7 @@ def run_tolerances(
     indices, refused, more = trials.indices(a, b, values)
     contact = trials.contact(table)
     rare = contact.rare.evaluations if contact and contact.rare else 0
-    return ToleranceResult(
+    return ToleranceStudy(
         machine,
         settings,
         chosen,
@@ -231,7 +231,7 @@ def run_tolerances(
     )
 
 
-def judged(values: pd.DataFrame, limit: Limit, response: Response, number: float) -> Verdict:
+def judged(values: pd.DataFrame, limit: Limit, response: Response, number: float) -> LimitVerdict:
     """Return the verdict on a limit. A run that failed breaks every limit.
 
     Args:
@@ -242,7 +242,7 @@ def judged(values: pd.DataFrame, limit: Limit, response: Response, number: float
     kept = values_of_limit >= number if limit.at_least is not None else values_of_limit <= number
     broken, allowed = share_of(np.asarray(~kept)), fraction(limit.allowed_share, "allowed_share")
     word = "pass" if broken.upper <= allowed else "fail" if broken.lower > allowed else "undecided"
-    return Verdict(limit, measure_key(response), number, allowed, broken, word)
+    return LimitVerdict(limit, measure_key(response), number, allowed, broken, word)
 
 
 def _failed(table: xr.Dataset) -> dict[int, str]:
@@ -266,8 +266,8 @@ class _Trials:
 
     machine: UncertainMachine
     chosen: tuple[Response, ...]
-    run: Run
-    settings: Settings
+    run: RunSamples
+    settings: ToleranceSettings
 
     def indices(
         self, a: FloatArray, b: FloatArray, values: pd.DataFrame
@@ -345,7 +345,7 @@ class _Trials:
         return np.where(table.diverged.values != "", np.nan, gap)
 
 
-def touching_pairs(table: xr.Dataset) -> dict[str, Share]:
+def touching_pairs(table: xr.Dataset) -> dict[str, SampleShare]:
     """Return the share of runs in which each pair touches, the most frequent first.
 
     Pairs that never touch are left out.

@@ -25,12 +25,12 @@ from wm_drake.studies.inputs import existing_file, problems_of_file, profile_of
 from wm_drake.studies.run import machine_text
 from wm_drake.studies.study import Task
 from wm_drake.studies.tolerance.options import ToleranceOptions
-from wm_drake.studies.tolerance.page import ToleranceReport
+from wm_drake.studies.tolerance.page import ToleranceResult
 from wm_drake.studies.tolerance.study import (
     CONTACTS,
     DEFAULT,
-    Settings,
-    ToleranceResult,
+    ToleranceSettings,
+    ToleranceStudy,
     limits_of,
     run_tolerances,
 )
@@ -45,7 +45,9 @@ class ToleranceTask(Task):
         sensitivity = options.sensitivity
         if sensitivity is None:
             sensitivity = min(512, options.samples)
-        self.settings = Settings(options.samples, sensitivity, options.subset, options.seed)
+        self.settings = ToleranceSettings(
+            options.samples, sensitivity, options.subset, options.seed
+        )
         self.tolerances = load_tolerances(options.file)
         limits: tuple[Limit, ...] = ()
         if options.limits is not None:
@@ -87,12 +89,12 @@ class ToleranceTask(Task):
             "seed": str(self.settings.seed),
         }
 
-    def run(self, executor: Executor) -> ToleranceReport:
+    def run(self, executor: Executor) -> ToleranceResult:
         """Run samples, Sobol indices and rare contact, and the loads of the machine."""
         result = self.sampled(executor)
-        return ToleranceReport(result, self.tolerances.about, self._gaps_of_loads(executor))
+        return ToleranceResult(result, self.tolerances.about, self._gaps_of_loads(executor))
 
-    def sampled(self, executor: Executor) -> ToleranceResult:
+    def sampled(self, executor: Executor) -> ToleranceStudy:
         """Run samples, Sobol indices and rare contact."""
         run = partial(executor.simulate, self.machine, self.measures)
         return run_tolerances(self.uncertain, self.responses, run, self.settings, self.limits)

@@ -2,6 +2,7 @@
 
 import dataclasses
 import itertools
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from wm_drake.errors import InputError, Problem, check_known, input_error, problems_at
+from wm_drake.errors import InputError, InputNotice, Problem, check_known, input_error, problems_at
 from wm_drake.parameters import (
     Change,
     Load,
@@ -24,7 +25,7 @@ from wm_drake.parameters.problems import problems_of
 from wm_drake.parameters.tolerances import LAUNDRY, TRUNCATED, Laundry, Spread, Tolerances
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Share, Unit
-from wm_drake.parameters.variation import change_of, changes_of, owned_twice
+from wm_drake.parameters.variation import change_of, changes_of, number_at, owned_twice
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.tolerance.distributions import (
     Joint,
@@ -60,7 +61,7 @@ _TYPES = {
 
 
 @dataclass(frozen=True)
-class Variable:
+class UncertainVariable:
     """An uncertain quantity: a variation with a distribution.
 
     Attributes:
@@ -85,6 +86,11 @@ class Variable:
         """Whether it is a quantity of the laundry."""
         return not self.variation.numbers
 
+    @property
+    def is_of_load(self) -> bool:
+        """Whether it is the laundry or a number of a load, which no tolerance of a part limits."""
+        return all(key.startswith("loads.") for key in self.variation.keys)
+
 
 @dataclass(frozen=True)
 class UncertainMachine:
@@ -98,12 +104,20 @@ class UncertainMachine:
     """
 
     parameters: MachineParameters
-    variables: tuple[Variable, ...]
+    variables: tuple[UncertainVariable, ...]
     joint: Joint
     case: Case
     _known: dict[tuple[float, ...], MachineParameters] = dataclasses.field(
         default_factory=dict, init=False, repr=False, compare=False
     )
+
+    def laundry_masses(self, scores: FloatArray) -> tuple[float, float] | None:
+        """Return the smallest and largest mass of the laundry of samples [kg]; None without it."""
+        names = [variable.name for variable in self.variables]
+        if f"{LAUNDRY}.mass" not in names:
+            return None
+        masses = self.joint.values(scores)[:, names.index(f"{LAUNDRY}.mass")]
+        return float(masses.min()), float(masses.max())
 
     def cases(self, scores: FloatArray, first: int = 1) -> list[Case]:
         """Return the case of each sample.
@@ -214,14 +228,15 @@ def uncertain_machine(
         InputError: the machine does not have a key, a distribution is wrong, or the correlations
             name an unknown quantity.
     """
-    variables: list[Variable] = []
+    variables: list[UncertainVariable] = []
     groups = {name: quantity.keys for name, quantity in tolerances.quantities.items()}
     problems = owned_twice(groups, "quantity")
     for name, quantity in tolerances.quantities.items():
         try:
             parameters, draws = _groups(parameters, name, quantity.keys, quantity.draws)
             for draw, keys in draws.items():
-                variables.append(_variable(parameters, draw, keys, quantity, quantity.about))
+                if kept := _that_scatter(parameters, draw, keys, quantity):
+                    variables.append(_variable(parameters, draw, kept, quantity, quantity.about))
         except InputError as error:
             problems += [Problem(f"quantity {name}", p.key, p.message) for p in error.problems]
     if tolerances.laundry is not None:
@@ -257,6 +272,25 @@ def _groups(
     return parameters, groups
 
 
+def _that_scatter(
+    parameters: MachineParameters, name: str, keys: tuple[str, ...], spread: Spread
+) -> tuple[str, ...]:
+    """Return the keys of a quantity without those of which it gives percents of 0, with a notice.
+
+    A machine without this damping or stiffness has nothing there that scatters.
+    """
+    kept = []
+    for key in keys:
+        number = number_at(parameters, key)
+        change, _ = changes_of(_places(spread), number.unit, key)
+        if change is Change.PERCENT and number.nominal == 0.0:
+            message = f"quantity {name}: {key} is 0, so percents of it do not scatter; left out"
+            warnings.warn(message, InputNotice, stacklevel=2)
+        else:
+            kept.append(key)
+    return tuple(kept)
+
+
 def with_types_apart(
     parameters: MachineParameters, table: str, kind: str
 ) -> tuple[MachineParameters, dict[str, str]]:
@@ -282,7 +316,7 @@ def with_types_apart(
     return with_values(with_values(parameters, {table: types}), changes), by_part
 
 
-def _laundry_variables(laundry: Laundry) -> tuple[list[Variable], list[Problem]]:
+def _laundry_variables(laundry: Laundry) -> tuple[list[UncertainVariable], list[Problem]]:
     variables, problems = [], []
     for field, spread in laundry.spreads().items():
         name, unit = f"{LAUNDRY}.{field}", _LAUNDRY_UNITS[field]
@@ -299,7 +333,7 @@ def _laundry_variables(laundry: Laundry) -> tuple[list[Variable], list[Problem]]
 
 def _variable(
     parameters: MachineParameters, name: str, keys: tuple[str, ...], spread: Spread, about: str
-) -> Variable:
+) -> UncertainVariable:
     variation, values = variation_of(parameters, name, keys, _places(spread), about)
     return _with_spread(variation, spread, values, keys[-1])
 
@@ -312,7 +346,7 @@ def _places(spread: Spread) -> dict[str, str]:
 
 def _with_spread(
     variation: Variation, spread: Spread, values: dict[str, float], key: str
-) -> Variable:
+) -> UncertainVariable:
     """Return a variation with a distribution.
 
     Args:
@@ -333,7 +367,7 @@ def _with_spread(
             raise input_error(message, key=f"{key}.deviation")
         values = values | {"deviation": deviation}
     marginal = _marginal(spread, values, key, can_be_negative=change is Change.DISTANCE)
-    return Variable(variation, marginal, _text(spread), spread.source)
+    return UncertainVariable(variation, marginal, _text(spread), spread.source)
 
 
 def _marginal(spread: Spread, n: dict[str, float], key: str, *, can_be_negative: bool) -> Marginal:

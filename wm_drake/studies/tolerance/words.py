@@ -1,22 +1,23 @@
 """Findings of a tolerance study in words."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.tolerances import LAUNDRY
-from wm_drake.report.formatting import number, shape_name, significant
+from wm_drake.report.formatting import listed, number, shape_name, significant
 from wm_drake.simulation.measures.responses import GAP
 from wm_drake.studies.tolerance.sensitivity import Index
 from wm_drake.studies.tolerance.study import (
     CRUDE,
     SUBSET,
     Contact,
-    ToleranceResult,
-    Verdict,
+    LimitVerdict,
+    ToleranceStudy,
     measure_key,
 )
-from wm_drake.studies.tolerance.variables import Variable
+from wm_drake.studies.tolerance.variables import UncertainVariable
 
 MOST_NAMED = 3
 """Number of quantities that the summary names."""
@@ -38,7 +39,7 @@ _LAUNDRY_WORDS = {
 }
 
 
-def summary(result: ToleranceResult) -> list[str]:
+def summary(result: ToleranceStudy) -> list[str]:
     """Return the findings, one sentence each."""
     sentences = ["The SDF has no shapes on both tub and housing, so contact cannot be judged."]
     if result.contact:
@@ -129,12 +130,12 @@ def quantity_words(name: str) -> str:
     return shape_name(name.replace(".", " "))
 
 
-def measure_titles(result: ToleranceResult) -> dict[str, tuple[str, str]]:
+def measure_titles(result: ToleranceStudy) -> dict[str, tuple[str, str]]:
     """Return name in words and unit of each measure, by its key such as smallest_gap_mm."""
     return {measure_key(r): (r.title.replace("_", " "), r.unit_text) for r in result.chosen}
 
 
-def _limit_sentences(verdicts: tuple[Verdict, ...]) -> list[str]:
+def _limit_sentences(verdicts: tuple[LimitVerdict, ...]) -> list[str]:
     if not verdicts:
         return []
     words = [v.word for v in verdicts]
@@ -142,7 +143,7 @@ def _limit_sentences(verdicts: tuple[Verdict, ...]) -> list[str]:
     return [f"Limits: {', '.join(parts)}."]
 
 
-def leading(result: ToleranceResult) -> tuple[str, list[tuple[Variable, Index]]]:
+def leading(result: ToleranceStudy) -> tuple[str, list[tuple[UncertainVariable, Index]]]:
     """Return the measure that the summary explains, and its quantities, largest total index first.
 
     The measure is the smallest gap if there is one, else the first measure.
@@ -155,7 +156,7 @@ def leading(result: ToleranceResult) -> tuple[str, list[tuple[Variable, Index]]]
     return name, sorted(pairs, key=lambda pair: -pair[1].total)
 
 
-def in_short(result: ToleranceResult) -> list[tuple[str, str]]:
+def in_short(result: ToleranceStudy) -> list[tuple[str, str]]:
     """Return the facts below the answer: probability, gap, what decides it, limits."""
     facts = []
     if result.contact:
@@ -178,23 +179,44 @@ def in_short(result: ToleranceResult) -> list[tuple[str, str]]:
     return facts
 
 
-def about_loads(gaps: Mapping[str, float]) -> str:
-    """Return why the test loads of a machine give other gaps than the samples.
+def about_loads(result: ToleranceStudy, gaps: Mapping[str, float]) -> str:
+    """Return why the loads of a machine give other gaps than the samples.
 
     Args:
         gaps: Smallest gap by load. [m]
     """
     if not gaps:
         return ""
-    listed = ", ".join(f"{load} {number(1e3 * gap)} mm" for load, gap in gaps.items())
+    listed_gaps = ", ".join(f"{load} {number(1e3 * gap)} mm" for load, gap in gaps.items())
+    compared = ""
+    masses = result.machine.laundry_masses(result.scores)
+    if masses:
+        compared = masses_text(result.machine.parameters, list(gaps), masses) + " "
     return (
-        f"The loads of the machine file are tests, not laundry: {listed}. They are often heavier "
-        "or placed worse than laundry in use, so a smaller gap with them is no contradiction. The "
-        "file of this study says what scatters and why; 'wm-drake verdict' judges both together."
+        f"The samples leave out the loads of the machine file: {listed_gaps}. {compared}The file "
+        "of this study says what scatters and why; 'wm-drake verdict' judges both together."
     )
 
 
-def _sensitivity_sentences(result: ToleranceResult) -> list[str]:
+def masses_text(
+    parameters: MachineParameters, loads: Sequence[str], masses: tuple[float, float]
+) -> str:
+    """Return how the masses of loads compare with the laundry of samples.
+
+    Args:
+        loads: Names of loads of the machine.
+        masses: Smallest and largest mass of the laundry. [kg]
+    """
+    of_load = {name: parameters.loads[name].mass for name in loads}
+    ends = f"{masses[0]:.2g} to {masses[1]:.2g} kg"
+    heavier = [f"{load} ({mass:.3g} kg)" for load, mass in of_load.items() if mass > masses[1]]
+    if not heavier:
+        return f"The laundry of the samples, {ends}, is as heavy as any of these loads."
+    verb = "is" if len(heavier) == 1 else "are"
+    return f"{listed(heavier)} {verb} heavier than all laundry of the samples, {ends}."
+
+
+def _sensitivity_sentences(result: ToleranceStudy) -> list[str]:
     key, indices = leading(result)
     if not indices:
         return [result.refused] if result.refused else []
@@ -203,14 +225,14 @@ def _sensitivity_sentences(result: ToleranceResult) -> list[str]:
     sentences = [
         f"Shares of the variance of the {title}, alone and together with others: {_listed(named)}."
     ]
-    parts = [(v, i) for v, i in indices if not v.is_laundry]
+    parts = [(v, i) for v, i in indices if not v.is_of_load]
     strong = [(v.name, i) for v, i in parts if i.total >= LEAST_TOTAL][:MOST_NAMED]
     if strong:
         sentences.append(f"To tighten: {_listed(strong)}.")
     elif parts:
         sentences.append("To tighten: nothing; no part causes as much as 1 % of this variance.")
     else:
-        sentences.append("To tighten: nothing; only the laundry scatters in this file.")
+        sentences.append("To tighten: nothing; only the load scatters in this file.")
     return sentences
 
 
@@ -218,7 +240,7 @@ def _listed(named: list[tuple[str, Index]]) -> str:
     return ", ".join(f"{quantity_words(name)} ({number(100 * i.total, 0)} %)" for name, i in named)
 
 
-def warnings(result: ToleranceResult) -> list[str]:
+def warnings(result: ToleranceStudy) -> list[str]:
     """Return what limits the use of the results."""
     texts = []
     if result.failed:

@@ -22,7 +22,8 @@ from wm_drake.report.table import Column, Table, table_of
 from wm_drake.report.terminal import Printed
 from wm_drake.simulation.measures.responses import GAP, Response
 from wm_drake.studies.study import Facts, Result
-from wm_drake.studies.verdict.study import Influence, Laundry, Outcome
+from wm_drake.studies.tolerance.words import masses_text
+from wm_drake.studies.verdict.study import Influence, LaundryGaps, Outcome
 
 MOST_NAMED = 3
 """Number of quantities that the answer names."""
@@ -71,8 +72,8 @@ class VerdictResult(Result):
     influences: tuple[Influence, ...]
     single: Outcome | None
     combination: Outcome | None
-    laundry: Laundry
-    laundry_changed: Laundry | None
+    laundry: LaundryGaps
+    laundry_changed: LaundryGaps | None
     about: str
     responses: tuple[Response, ...]
     command: str
@@ -229,6 +230,10 @@ def facts_of(findings: VerdictResult) -> list[tuple[str, str]]:
     f, named_influences = findings, findings.influences[:MOST_NAMED]
     margin = f.base.gap - f.clearance
     rows = [("Random laundry", laundry_text(f.laundry, f.about))]
+    heaviest = max(f.machine.loads[name].mass for name in f.loads)
+    if f.laundry.masses and f.laundry.masses[1] < heaviest:
+        compared = masses_text(f.machine, f.loads, f.laundry.masses)
+        rows.append(("Its mass", f"{compared} --laundry names a file with other laundry"))
     if f.clearance:
         kept = "more" if margin > 0.0 else "less"
         rows.append(("Margin", f"{_mm(abs(margin))} {kept} than the clearance, {_mm(f.clearance)}"))
@@ -249,7 +254,7 @@ def facts_of(findings: VerdictResult) -> list[tuple[str, str]]:
     return [*rows, (LINE, line_to_copy(f))]
 
 
-def laundry_text(laundry: Laundry, about: str = "") -> str:
+def laundry_text(laundry: LaundryGaps, about: str = "") -> str:
     """Return probability and smallest gap of the samples."""
     estimate, lower, upper = laundry.probability
     what = "touch" if not laundry.clearance else f"keep less than {_mm(laundry.clearance)}"

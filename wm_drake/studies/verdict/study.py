@@ -14,7 +14,7 @@ from wm_drake.engines.compiled.step_check import check_step
 from wm_drake.errors import InputError
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters, with_values
-from wm_drake.parameters.elements import Table
+from wm_drake.parameters.elements import CurveTable
 from wm_drake.parameters.keys import quantities
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
@@ -102,16 +102,18 @@ class Influence:
 
 
 @dataclass(frozen=True)
-class Laundry:
+class LaundryGaps:
     """Smallest gaps of samples of the laundry.
 
     Attributes:
         gaps: (n,) [m], minus infinity for a run that failed.
         clearance: Gap that must remain. [m]
+        masses: Smallest and largest mass of the laundry [kg]; None if loads scatter in its place.
     """
 
     gaps: FloatArray
     clearance: float
+    masses: tuple[float, float] | None
 
     @property
     def probability(self) -> tuple[float, float, float]:
@@ -122,7 +124,7 @@ class Laundry:
 
 
 @dataclass(frozen=True)
-class Trials:
+class VerdictTrials:
     """Runs of all loads with changed machines."""
 
     machine: Machine
@@ -216,7 +218,7 @@ def _ends(change: float) -> tuple[float, float]:
 
 def _text(parameters: MachineParameters, key: str, factor: float) -> str:
     """Return a multiple of a number as the text that `--set` takes, so that it is what is run."""
-    if isinstance(value_at(parameters, key), Table):
+    if isinstance(value_at(parameters, key), CurveTable):
         return f"{100.0 * factor:.4g} %"
     unit = next(unit for name, _, unit in quantities(parameters) if name == key)
     return f"{unit.from_si(factor * value_at(parameters, key)):.4g} {unit.shown}"
@@ -234,7 +236,11 @@ def changeable(parameters: MachineParameters) -> Iterator[str]:
         if (is_part or is_weight) and isinstance(value, float) and value != 0.0:
             yield key
         curve = key.rpartition(".")[0]
-        if is_part and isinstance(value, tuple) and isinstance(value_at(parameters, curve), Table):
+        if (
+            is_part
+            and isinstance(value, tuple)
+            and isinstance(value_at(parameters, curve), CurveTable)
+        ):
             yield curve
 
 

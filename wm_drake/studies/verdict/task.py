@@ -20,7 +20,7 @@ from wm_drake.studies.tolerance.study import CONTACTS
 from wm_drake.studies.tolerance.task import ToleranceTask
 from wm_drake.studies.verdict.options import VerdictOptions
 from wm_drake.studies.verdict.page import VerdictResult
-from wm_drake.studies.verdict.study import COUNTERWEIGHT, MM, Laundry, Trials, changeable
+from wm_drake.studies.verdict.study import COUNTERWEIGHT, MM, LaundryGaps, VerdictTrials, changeable
 
 NO_SHAPES = "the SDF has no shapes on both tub and housing, so no verdict can be given"
 
@@ -73,7 +73,7 @@ class VerdictTask(Task):
     def run(self, executor: Executor) -> Result:
         """Run the loads, the changes, and the laundry before and after the best change."""
         parameters = self.machine.parameters
-        trials = Trials(self.machine, self.cases, self.measures, executor)
+        trials = VerdictTrials(self.machine, self.cases, self.measures, executor)
         (base,) = trials.outcomes([{}], "loads")
         laundry = self._samples(self.laundry, executor)
         influences = trials.influences(changeable(parameters), self.options.change)
@@ -99,10 +99,15 @@ class VerdictTask(Task):
             executor.runs,
         )
 
-    def _samples(self, task: ToleranceTask, executor: Executor) -> Laundry:
+    def _samples(self, task: ToleranceTask, executor: Executor) -> LaundryGaps:
         """Return the gaps of the samples of a tolerance study."""
-        (gaps,) = (column for _, column in task.sampled(executor).values.items())
-        return Laundry(np.nan_to_num(1e-3 * gaps.to_numpy(), nan=-np.inf), self.clearance)
+        result = task.sampled(executor)
+        (gaps,) = (column for _, column in result.values.items())
+        return LaundryGaps(
+            np.nan_to_num(1e-3 * gaps.to_numpy(), nan=-np.inf),
+            self.clearance,
+            result.machine.laundry_masses(result.scores),
+        )
 
 
 def _length(text: str) -> float:

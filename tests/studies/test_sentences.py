@@ -1,0 +1,114 @@
+"""Sentences of results say what their data say, on data for which a set sentence would be wrong."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from wm_drake.parameters import load_machine
+from wm_drake.parameters.first_machine import FirstMachine, FirstNumbers
+from wm_drake.parameters.tolerances import Tolerances, load_tolerances
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.measures import MEASURES
+from wm_drake.simulation.measures.responses import Response
+from wm_drake.studies.orders.page import order_text
+from wm_drake.studies.tolerance.study import Settings, run_tolerances
+from wm_drake.studies.tolerance.variables import uncertain_machine
+from wm_drake.studies.tolerance.words import about_loads, masses_text, summary
+
+GAP = Response("gap", MEASURES["gap"].variables[0])
+SPRING = "spring_types.suspension.stiffness"
+PLACE = "loads.middle.unbalances.0.y"
+
+
+@pytest.fixture(scope="module")
+def machine():
+    return load_machine("reference")
+
+
+def tolerances(machine, tree, gap):
+    """Return the result of a tolerance study in which a function of the load gives the gap."""
+
+    def run(cases, _):
+        gaps = np.array([gap(case) for case in cases])
+        none = np.full(len(cases), "", dtype=object)
+        table = {"smallest_gap": ("run", gaps), "diverged": ("run", none)}
+        table["nearest_pair"] = ("run", np.zeros(len(cases)))
+        return xr.Dataset(table, {"pair": ["tub|wall"]})
+
+    uncertain = uncertain_machine(
+        machine, tree, Case("middle", machine.loads["middle"], machine.profile)
+    )
+    return run_tolerances(uncertain, (GAP,), run, Settings(256, 256, 0), ())
+
+
+def of_load(machine, *keys):
+    """Return the sentences of a study in which numbers change the gap alike."""
+    quantities = {
+        key.rpartition(".")[-1]: {
+            "keys": (key,),
+            "distribution": "normal",
+            "mean": "nominal",
+            "deviation": size,
+        }
+        for key, size in keys
+    }
+    tree = Tolerances.model_validate({"load": "middle", "quantities": quantities})
+    return " ".join(summary(tolerances(machine, tree, lambda case: (
+        0.03 + case.load.unbalances[0].y
+        + 1e-5 * case.parameters.spring_types["suspension"].stiffness
+    ))))  # fmt: skip
+
+
+def test_nobody_can_tighten_a_load(machine):
+    only = of_load(machine, (PLACE, "5 mm"))
+    assert "To tighten: nothing; only the load scatters in this file." in only
+    both = of_load(machine, (PLACE, "5 mm"), (SPRING, "0.5 N/mm"))
+    assert "To tighten: stiffness" in both
+    assert "y (" not in both.partition("To tighten")[2]
+
+
+@pytest.mark.parametrize(
+    ("mass", "words"),
+    [
+        ("0.5 kg", "middle (1 kg), counter (1 kg), back (0.7 kg) and front (0.7 kg) are heavier than all laundry of the samples, 0.2"),
+        ("0.8 kg", "middle (1 kg) and counter (1 kg) are heavier than all laundry"),
+        ("1.4 kg", "is as heavy as any of these loads."),
+    ],
+)  # fmt: skip
+def test_loads_are_compared_with_the_laundry_that_was_drawn(machine, mass, words):
+    tree = load_tolerances("laundry").model_dump()
+    tree["laundry"]["mass"]["high"] = mass
+    result = tolerances(machine, Tolerances.model_validate(tree), lambda _: 0.02)
+    text = about_loads(result, dict.fromkeys(machine.loads, 0.01))
+    assert words in text
+    assert "often" not in text
+
+
+def test_a_single_heavier_load_is_one(machine):
+    text = masses_text(machine, ["middle", "front"], (0.2, 0.9))
+    assert text == "middle (1 kg) is heavier than all laundry of the samples, 0.2 to 0.9 kg."
+
+
+@pytest.mark.parametrize(
+    ("order", "words"),
+    [(0.9375, "order 1"), (1.0625, "order 1"), (2.0, "order 2"), (0.0625, "order 0"), (2.5, "order 2.50")],
+)  # fmt: skip
+def test_an_order_is_as_sharp_as_its_window(order, words):
+    assert order_text(order) == words
+
+
+@pytest.mark.parametrize(
+    "name", ["gap", "drum_radius", "drum_depth", "tub_mass", "drum_mass", "speed"]
+)
+def test_a_given_number_of_a_new_machine_is_no_assumption(name):
+    """The same number, once given and once left out."""
+    value = getattr(FirstNumbers(), name)
+    texts = []
+    for numbers in (FirstNumbers(), FirstNumbers.model_validate({name: value})):
+        new = FirstMachine("mine", numbers, {})
+        texts.append(new.sdf() + new.yaml("mine.yaml", "mine.sdf"))
+    left_out, given = texts
+    assert given.count("given") == left_out.count("given") + 1
+    assert left_out.count(": assumption") + left_out.count(" assumption") > given.count(
+        ": assumption"
+    ) + given.count(" assumption")
