@@ -17,10 +17,9 @@ from wm_drake.studies.calibrate.computed import Evaluation, Runner
 from wm_drake.studies.calibrate.parameter_map import parameter_map_of
 from wm_drake.studies.calibrate.prediction import predict
 from wm_drake.studies.calibrate.solutions import Solution, distinct, solved_machine
-from wm_drake.studies.calibrate.study import Plan, calibrate, fit_with_fewer, identity_of
+from wm_drake.studies.calibrate.study import Plan, calibrate, identity_of
 from wm_drake.studies.calibrate.tables import (
     amplitude_rows,
-    fewer_table,
     prediction_table,
     quantity_table,
 )
@@ -418,21 +417,6 @@ def test_held_out_loads_are_predicted_from_the_others(recovered):
     assert row["predicted_mean_percent"] == pytest.approx(100.0 * np.abs(kind.predicted).mean())
     assert np.abs(kind.predicted).max() < 0.05
     assert not np.array_equal(kind.predicted, kind.calibrated)
-
-
-def test_fewer_quantities_cost_more_and_the_least_determined_goes_first(recovered, short, tmp_path):
-    _, free, targets, plan, calibration, _, _ = recovered
-    identity = identity_of(short, free, targets, plan)
-    with open_ledger(tmp_path / "ledger.sqlite", identity) as ledger:
-        fits = fit_with_fewer(Runner(short, ledger), calibration, [2, 1])
-    assert [fit.count for fit in fits] == [3, 2, 1]
-    assert fits[0].cost == pytest.approx(calibration.solutions[0].cost, rel=1e-9)
-    assert fits[1].fixed == ("motor",)  # its mass hardly changes an amplitude
-    assert fits[0].cost <= fits[1].cost < 0.6 * fits[2].cost
-    assert fits[2].amplitudes[0] > 1.5 * fits[1].amplitudes[0]
-    table = fewer_table(fits)
-    assert list(table.free_quantities) == [3, 2, 1]
-    assert table.set_to_expected[0] == ""
 
 
 def test_interrupted_calibration_continues_where_it_stopped(short, tmp_path, recovered):

@@ -72,7 +72,7 @@ def test_files_of_responses_are_no_files_of_amplitudes(short, tmp_path):
         (HEAD.replace("[N]", "[kg]") + ROWS, "column 'Fx' is in kg; it needs a unit such as N"),
         (HEAD.replace("Fx", "Fq") + ROWS, "no response 'Fq'"),
         (HEAD + ROWS.replace("middle", "midle"), "no load 'midle' in the machine"),
-        (HEAD + ROWS.replace("machine", "mean"), "is neither machine nor design"),
+        (HEAD + ROWS.replace("machine", "mean"), "is not allowed; allowed are machine, design"),
         (HEAD + ROWS.replace("50", "0"), "it must be above 0"),
         (HEAD + ROWS.replace("counter", "middle"), "occurs twice"),
         (HEAD + ROWS.replace("50", "x"), "'x' is not a finite number"),

@@ -15,15 +15,8 @@ class CalibrateOptions(Options):
         "those of the machine file.",
         "CSV",
     )
-    method: str = option(
-        "least-squares",
-        "Search method: least-squares, basin-hopping (slower, searches more widely) or evolution.",
-        "NAME",
-    )
     starts: int = option(8, "Number of searches, each with its own starting point.", ge=1)
-    iterations: int = option(
-        0, "Largest number of iterations per search; 0: default of the method.", ge=0
-    )
+    iterations: int = option(0, "Largest number of iterations per search; 0: 60.", ge=0)
     seed: int = option(0, "Seed of the random starting points.", "N", ge=0, le=2**32 - 1)
     deviation: tuple[str, ...] = option(
         (),
@@ -51,12 +44,6 @@ class CalibrateOptions(Options):
         (),
         "Loads to hold out: calibrate without them, then predict them. Repeatable.",
         "LOAD[,LOAD]",
-    )
-    fewer: str | None = option(
-        None,
-        "Fit again with fewer free quantities and show what that costs, such as 30,20,10. The "
-        "others keep their expected values.",
-        "COUNT[,COUNT]",
     )
 
 

@@ -19,12 +19,10 @@ from wm_drake.simulation.cases import case_of
 from wm_drake.studies.calibrate.figures import errors_figure, modes_figure, quantities_figure
 from wm_drake.studies.calibrate.prediction import Prediction
 from wm_drake.studies.calibrate.solutions import percents_of, solved_machine
-from wm_drake.studies.calibrate.study import BEYOND_LIMIT, Calibration, Simpler
+from wm_drake.studies.calibrate.study import BEYOND_LIMIT, Calibration
 from wm_drake.studies.calibrate.tables import (
     FITS,
     amplitude_rows,
-    fewer_shown,
-    fewer_table,
     predictions_shown,
     quantities_shown,
     quantity_table,
@@ -40,22 +38,21 @@ from wm_drake.studies.study import Facts, Result
 
 @dataclass(frozen=True)
 class CalibrateResult(Result):
-    """A calibration, predictions of held-out loads, and fits with fewer quantities."""
+    """A calibration, and predictions of held-out loads."""
 
     calibration: Calibration
     predictions: Sequence[Prediction] = ()
-    fewer: Sequence[Simpler] = ()
     float_formats: ClassVar[Mapping[str, str]] = {"amplitudes": "%.4f"}
 
     def tables(self) -> dict[str, pd.DataFrame]:
-        """Return quantities, amplitudes, and, if there are any, other responses and fewer fits."""
+        """Return quantities, amplitudes, and, if there are any, other responses."""
         shown = {
             "quantities": quantity_table(self.calibration),
             "amplitudes": amplitude_rows(self.calibration),
         }
         if self.calibration.targets.responses:
             shown["responses"] = response_table(self.calibration)
-        return shown | ({"fewer": fewer_table(self.fewer)} if self.fewer else {})
+        return shown
 
     def texts(self) -> dict[str, str]:
         """Return the machine of each solution."""
@@ -88,11 +85,10 @@ class CalibrateResult(Result):
                 | {"covered_percent": 100 * p.covered}
                 for p in self.predictions
             ],
-            "fewer": json.loads(fewer_table(self.fewer).to_json(orient="records")),
         }
 
     def terminal(self) -> Printed:
-        """Yield the quantities, the errors, predictions, and fits with fewer quantities."""
+        """Yield the quantities, the errors and predictions."""
         best = self.calibration.solutions[0]
         yield quantities_shown(self.calibration, is_short=True).terminal(
             "Best solution, machine_1.yaml"
@@ -109,8 +105,6 @@ class CalibrateResult(Result):
         yield from (f"  beyond its limit: {text}" for text in best.values_beyond())
         if self.predictions:
             yield predictions_shown(self.predictions).terminal("Held-out loads")
-        if self.fewer:
-            yield fewer_shown(self.fewer).terminal("Cost against number of free quantities")
 
     def page(self, facts: Facts) -> str:
         """Return the page."""
@@ -182,7 +176,7 @@ def _picture_sections(
 
 
 def _table_sections(result: CalibrateResult, best: SpinRuns, table: pd.DataFrame) -> list[Section]:
-    calibration, predictions, fewer = result.calibration, result.predictions, result.fewer
+    calibration, predictions = result.calibration, result.predictions
     effects, relations = effects_table(calibration), relations_table(calibration)
     responses = [responses_shown(calibration)] if calibration.targets.responses else []
     predicted = [predictions_shown(predictions)] if predictions else []
@@ -197,7 +191,6 @@ def _table_sections(result: CalibrateResult, best: SpinRuns, table: pd.DataFrame
             "prediction", "Prediction", tables=predicted, text=PREDICTION if predictions else ""
         ),
         Section("quantities", "Quantities", tables=quantities),
-        Section("fewer", "Fewer free quantities", tables=[fewer_shown(fewer)] if fewer else []),
         Section("speeds", "Critical speeds and smallest gaps", tables=speeds),
         Section("searches", "Searches", tables=[searches_table(calibration)]),
     ]
@@ -484,7 +477,7 @@ def _facts(calibration: Calibration, best: SpinRuns, facts: Facts) -> list[tuple
     plan = calibration.plan
     counted = sum(end.evaluations for end in calibration.ended)
     return [
-        ("Method", f"{plan.method}, {len(calibration.ended)} starts, seed {plan.seed}"),
+        ("Method", f"least squares, {len(calibration.ended)} starts, seed {plan.seed}"),
         ("Machines tried", f"{counted}, each with {len(calibration.targets.loads)} runs"),
         ("Versions", versions_of(best.results[0].record.attrs)),
         *facts.rows(),

@@ -1,28 +1,25 @@
-"""Calibrate a machine: search from several starts, store each evaluation; fit simpler machines."""
+"""Calibrate a machine: search from several starts, store each evaluation."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from wm_drake.batch.ledger import key_of
 from wm_drake.batch.remembered import model_version, sources_version
-from wm_drake.errors import check_known, input_error
 from wm_drake.model.machine import Machine
 from wm_drake.parameters.free import FreeFile
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.calibrate.computed import Evaluation, Runner
 from wm_drake.studies.calibrate.parameter_map import ParameterMap, parameter_map_of
-from wm_drake.studies.calibrate.solutions import Percents, Solution, distinct, percents_of
+from wm_drake.studies.calibrate.solutions import Solution, distinct
 from wm_drake.studies.calibrate.targets import Targets
 from wm_drake.studies.fitting.kinks import (
     DRAWS,
-    METHODS,
     least_squares_search,
     smooth_jacobian,
     start_number,
 )
-from wm_drake.studies.fitting.posterior import Posterior, least_needed_out
+from wm_drake.studies.fitting.posterior import Posterior
 from wm_drake.studies.fitting.problem import PriorProblem, Residuals, Unknown
 from wm_drake.studies.fitting.search import Search
 
@@ -43,8 +40,8 @@ that a limit gives way only where no machine within the bounds keeps it.
 RESOLUTION = 1e-4
 """Resolution of the published amplitudes. [m]"""
 
-ITERATIONS = {"least-squares": 60, "basin-hopping": 12, "evolution": 300}
-"""Default limit of iterations for each method."""
+ITERATIONS = 60
+"""Default limit of iterations of a search."""
 
 
 @dataclass(frozen=True)
@@ -52,11 +49,9 @@ class Plan:
     """Settings of the search.
 
     Attributes:
-        method: Name of a method, key of `METHODS`.
         starts: Number of starts. The first is the one in the free file; the others are drawn at
             random around it.
-        iterations: Limit of iterations from each start; number of hops for basin hopping. 0 for the
-            default of the method.
+        iterations: Limit of iterations from each start; 0 for `ITERATIONS`.
         deviation: Relative standard deviation of an amplitude.
         resolution: Resolution of the measured amplitudes. Rounding adds the standard deviation
             resolution / sqrt(12). [m]
@@ -66,7 +61,6 @@ class Plan:
             them.
     """
 
-    method: str = "least-squares"
     starts: int = 8
     seed: int = 0
     iterations: int = 0
@@ -74,14 +68,6 @@ class Plan:
     resolution: float = RESOLUTION
     draws: int = 200
     start_draws: int = DRAWS
-
-    def check(self) -> None:
-        """Check the method; the options of the study have the limits of the numbers.
-
-        Raises:
-            InputError: the method is unknown.
-        """
-        check_known(self.method, METHODS, f"no method '{self.method}'", key="method")
 
     def spread(self, amplitude: FloatArray) -> FloatArray:
         """Return the standard deviations of the logarithms of measured amplitudes."""
@@ -140,7 +126,6 @@ def calibrate(runner: Runner, free: FreeFile, targets: Targets, plan: Plan) -> C
         InputError: the free file does not fit the machine, the machine of the first start cannot be
             run, or a setting of the plan is not allowed.
     """
-    plan.check()
     parameter_map = parameter_map_of(runner.machine, free)
     values = runner.values(parameter_map, targets)
     if np.isnan(values(parameter_map.start[None]).amplitude).all():
@@ -150,8 +135,7 @@ def calibrate(runner: Runner, free: FreeFile, targets: Targets, plan: Plan) -> C
     for number in range(plan.starts):
         search = Search(problem, runner.report_of(number))
         start = start_number(search, number, plan.seed, plan.start_draws)
-        iterations = plan.iterations or ITERATIONS[plan.method]
-        end = METHODS[plan.method](search, start, iterations, plan.seed + number)
+        end = least_squares_search(search, start, plan.iterations or ITERATIONS)
         ended.append(_solution(number, search, end.point, values))
     return Calibration(parameter_map, targets, plan, tuple(distinct(ended)), tuple(ended))
 
@@ -220,99 +204,3 @@ def _solution(
         posterior=Posterior(coordinates, slopes, targets.count),
         evaluations=search.evaluations,
     )
-
-
-@dataclass(frozen=True)
-class Simpler:
-    """The best fit with some of the free quantities.
-
-    Attributes:
-        count: Number of quantities that stayed free.
-        fixed: Names of those that keep their expected values here, but were free in the fit before.
-        data_cost, prior_cost: Half the sums of squares of data and prior.
-        amplitudes, responses: Mean and largest absolute relative difference of the amplitudes and
-            of the other responses; NaN if there are none.
-    """
-
-    count: int
-    fixed: tuple[str, ...]
-    data_cost: float
-    prior_cost: float
-    amplitudes: Percents
-    responses: Percents
-
-    @property
-    def cost(self) -> float:
-        """Cost that the search minimizes."""
-        return self.data_cost + self.prior_cost
-
-
-def check_counts(counts: Sequence[int], quantities: int) -> None:
-    """Check the numbers of free quantities.
-
-    Raises:
-        InputError: a number is not between 1 and the number of free quantities, or they do not
-            fall.
-    """
-    falling = all(a > b for a, b in zip([quantities, *counts], [*counts, 0], strict=True))
-    if not falling:
-        shown = ", ".join(map(str, counts))
-        raise input_error(
-            f"{shown}: needs falling numbers from {quantities - 1} to 1; {quantities} quantities "
-            "are free",
-            where="--fewer",
-        )
-
-
-def fit_with_fewer(
-    runner: Runner, calibration: Calibration, counts: Sequence[int]
-) -> list[Simpler]:
-    """Fit the machine again with fewer and fewer free quantities.
-
-    From one fit to the next, those quantities go to their expected values whose loss raises the
-    cost least, one after the other in the linearised fit. The others are then searched anew by
-    least squares from where the linearised fit puts them.
-
-    Args:
-        runner: The machine of the calibration, and its ledger.
-        calibration: Its result; the first fit is its best solution.
-        counts: Falling numbers of free quantities.
-
-    Returns:
-        The calibration itself and a fit for each count.
-
-    Raises:
-        InputError: the counts do not fall from the number of free quantities.
-    """
-    parameter_map, targets, plan = calibration.parameter_map, calibration.targets, calibration.plan
-    names = parameter_map.names
-    check_counts(counts, len(names))
-    values = runner.values(parameter_map, targets)
-    problem = calibration_problem(values, plan)
-    iterations = plan.iterations or ITERATIONS["least-squares"]
-    best = calibration.solutions[0]
-
-    def simpler(point: FloatArray, free: np.ndarray, fixed: Sequence[str]) -> Simpler:
-        computed = values(problem.points_at(point)[None])
-        return Simpler(
-            len(free),
-            tuple(fixed),
-            *costs_at(problem, point, targets),
-            percents_of(targets.errors(computed.amplitude[0])),
-            percents_of(targets.response_errors(computed.responses[0])),
-        )
-
-    point, slopes, free = best.coordinates, best.posterior.all_slopes, np.arange(len(names))
-    fits = [simpler(point, free, ())]
-    for step, count in enumerate(counts):
-        kept, start = least_needed_out(slopes, point[free], count)
-        fixed = [names[i] for i in np.delete(free, kept)]
-        free = free[kept]
-        part = problem.restricted(free, np.zeros(len(names)))
-        search = Search(part, runner.report_of(step))
-        end = least_squares_search(search, search.clipped(start), iterations)
-        point = np.zeros(len(names))
-        point[free] = end.point
-        slopes = smooth_jacobian(search, end.point)
-        fits.append(simpler(point, free, fixed))
-    return fits

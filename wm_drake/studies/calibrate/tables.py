@@ -1,4 +1,4 @@
-"""Tables of a calibration: quantities, amplitudes, predictions, fits with fewer quantities."""
+"""Tables of a calibration: quantities, amplitudes, predictions."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -11,7 +11,7 @@ from wm_drake.report.table import Column, Table, table_of
 from wm_drake.studies.calibrate.prediction import Prediction
 from wm_drake.studies.calibrate.response_targets import CONTRIBUTION, TRIALS
 from wm_drake.studies.calibrate.solutions import percents_of
-from wm_drake.studies.calibrate.study import Calibration, Simpler
+from wm_drake.studies.calibrate.study import Calibration
 from wm_drake.studies.calibrate.targets import MILLIMETRE
 
 
@@ -172,42 +172,3 @@ def predictions_shown(predictions: Sequence[Prediction]) -> Table:
         "calibration without them."
     )
     return table_of(prediction_table(predictions), caption, PREDICTIONS)
-
-
-def fewer_table(fits: Sequence[Simpler]) -> pd.DataFrame:
-    """Return a table with a row for each fit; differences in percent, names separated by blanks."""
-    return pd.DataFrame(
-        [
-            {
-                "free_quantities": fit.count,
-                "cost": fit.cost,
-                "cost_of_data": fit.data_cost,
-                **fit.amplitudes.named("amplitudes_"),
-                **fit.responses.named("responses_"),
-                "set_to_expected": " ".join(fit.fixed),
-            }
-            for fit in fits
-        ]
-    )
-
-
-FEWER = {
-    "free_quantities": Column("free quantities", decimals=0),
-    "cost": Column("cost"),
-    "cost_of_data": Column("cost of the data"),
-    "amplitudes_mean_percent": Column("amplitudes: mean error", "%", 1),
-    "amplitudes_largest_percent": Column("largest", "%", 1),
-    "responses_mean_percent": Column("other responses: mean error", "%", 1),
-    "responses_largest_percent": Column("largest", "%", 1),
-    "set_to_expected": Column("set to expected values here"),
-}
-"""Columns of the fits with fewer free quantities."""
-
-
-def fewer_shown(fits: Sequence[Simpler]) -> Table:
-    """Return what the fit loses with fewer free quantities."""
-    caption = (
-        "Best fit with fewer free quantities. Each row frees those of the row above but for the "
-        "named ones, whose loss raises the cost least in the linearised fit."
-    )
-    return table_of(fewer_table(fits), caption, FEWER)

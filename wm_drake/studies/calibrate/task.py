@@ -23,10 +23,7 @@ from wm_drake.studies.calibrate.response_targets import with_deviations
 from wm_drake.studies.calibrate.study import (
     RELATIVE_DEVIATION,
     Plan,
-    Simpler,
     calibrate,
-    check_counts,
-    fit_with_fewer,
 )
 from wm_drake.studies.calibrate.targets import AMPLITUDE, Targets, targets_of
 from wm_drake.studies.executor import Executor
@@ -43,7 +40,7 @@ class CalibrateTask(Task):
         Raises:
             InputError: an option or a file is wrong.
         """
-        self.held_out, self.counts = _groups(options.leave_out), _counts(options.fewer)
+        self.held_out = _groups(options.leave_out)
         measured = with_measured(machine.parameters, options.targets, "--targets")
         deviations = _fractions(options.deviation, "--deviation")
         amplitude = deviations.pop(AMPLITUDE, RELATIVE_DEVIATION)
@@ -53,13 +50,9 @@ class CalibrateTask(Task):
         # the calibrated machine names the targets as its measurements
         self.machine = build_machine(measured) if options.targets else machine
         resolution = 1e-3 * options.resolution
-        self.plan = Plan(
-            options.method, options.starts, options.seed, options.iterations, amplitude, resolution
-        )
+        self.plan = Plan(options.starts, options.seed, options.iterations, amplitude, resolution)
         self.free = load_free(existing_file(options.free, "--free"))
-        self.plan.check()
         check_held_out(self.targets, self.held_out)
-        check_counts(self.counts, len(self.free.quantities))
         try:
             parameter_map_of(self.machine, self.free)
         except InputError as error:
@@ -73,22 +66,17 @@ class CalibrateTask(Task):
             "targets": self.targets,
             "plan": self.plan,
             "leave_out": "; ".join(map(",".join, self.held_out)),
-            "fewer": ",".join(map(str, self.counts)),
         }
 
     def run(self, executor: Executor) -> CalibrateResult:
-        """Calibrate, predict the held-out loads, and fit again with fewer quantities."""
+        """Calibrate, and predict the held-out loads."""
         assert executor.ledger is not None  # the study is declared with runs
         runner = Runner(self.machine, executor.ledger, executor.workers)
         with _searches(executor, runner, self.plan.starts) as shown:
             calibration = calibrate(shown, self.free, self.targets, self.plan)
         with _searches(executor, runner, len(self.held_out) * self.plan.starts) as shown:
             predictions = predict(shown, self.free, calibration, self.held_out)
-        fits: list[Simpler] = []
-        if self.counts:
-            with _searches(executor, runner, len(self.counts)) as shown:
-                fits = fit_with_fewer(shown, calibration, self.counts)
-        return CalibrateResult(calibration, predictions, fits)
+        return CalibrateResult(calibration, predictions)
 
 
 @contextmanager
@@ -164,14 +152,3 @@ def _groups(entries: Sequence[str]) -> list[list[str]]:
             if names.count(name) > 1:
                 raise input_error(f"'{name}' is given twice", where="--leave-out")
     return groups
-
-
-def _counts(entry: str | None) -> list[int]:
-    """Return the numbers of free quantities that `--fewer` names."""
-    texts = [text.strip() for text in entry.split(",")] if entry is not None else []
-    for text in texts:
-        if not (text.isascii() and text.isdigit() and len(text) < 6):
-            raise input_error(
-                f"'{text[:20]}' is not a whole number; write for example 30,20,10", where="--fewer"
-            )
-    return [int(text) for text in texts]

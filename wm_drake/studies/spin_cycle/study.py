@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from wm_drake.batch import simulate_many
-from wm_drake.batch.many import as_table
+from wm_drake.batch.run_table import RunTable
 from wm_drake.elements.bushing import AXES
 from wm_drake.errors import InputError, check_known, input_error
 from wm_drake.model.machine import Machine
@@ -291,14 +291,14 @@ def drake_runs(
 
         results = run_spin(parameters, runs, "drake", progress=report).results
         measures, scene = measures_of(parameters), Scene(parameters)
-        rows = {
-            number: (
-                result.case.name,
-                str(result.record.attrs["diverged"]),
-                measure(result.record, scene, measures).values,
-            )
-            for number, result in enumerate(results)
-        }
-        return as_table(parameters, measures, rows)
+        table = RunTable(parameters, measures)
+        for number, result in enumerate(results):
+            of_run = measure(result.record, scene, measures)
+            values = {
+                variable.name: of_run.table[variable.name].values for variable in table.variables
+            }
+            diverged = str(result.record.attrs["diverged"])
+            table.put(number, result.case.name, values, diverged)
+        return table.dataset()
 
     return evaluate
