@@ -16,7 +16,7 @@ from wm_drake.errors import problems_at
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import Load, MachineParameters, SpinProfile
 from wm_drake.parameters.spin import Region
-from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.types import BoolArray, FloatArray
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.displacements import envelopes
 from wm_drake.simulation.records import Record
@@ -43,8 +43,9 @@ class ResponseCase:
         load: Name of the load.
         gasket: Whether the gasket is in place.
         response: As `steady_response` returns it.
-        run_up: Speed and upper and lower envelope of the run over the machine's spin profile:
-            dataset over time with `speed`, `upper` and `lower` (time, sensor). SI
+        run_up: Speed and upper and lower envelope of the run over the machine's spin profile, at
+            the speeds of the response: dataset over time with `speed`, `upper` and `lower` (time,
+            sensor). SI
         wall_s: Time that the response took.
     """
 
@@ -53,6 +54,33 @@ class ResponseCase:
     response: xr.Dataset
     run_up: xr.Dataset | None
     wall_s: float
+
+    @property
+    def stable(self) -> BoolArray:
+        """Whether each motion of the branch attracts its neighbours. (points,)"""
+        return np.asarray(self.response.stable.values, dtype=bool)
+
+    @property
+    def touches(self) -> BoolArray:
+        """Whether the tub touches the housing in each motion of the branch. (points,)"""
+        return np.asarray(self.response.smallest_gap.values <= 0.0)  # false for NaN
+
+    @property
+    def reachable(self) -> BoolArray:
+        """Whether a machine moves so: in a stable motion without contact. (points,)"""
+        return self.stable & ~self.touches
+
+    def largest(self) -> tuple[FloatArray, FloatArray]:
+        """Return the largest reachable amplitude of each sensor [m], and its speed [rad/s].
+
+        Both are NaN if no motion is reachable.
+        """
+        values = np.where(self.reachable[:, None], self.response.amplitude.values, -np.inf)
+        at = values.argmax(axis=0)
+        size = values[at, np.arange(values.shape[1])]
+        none = np.isinf(size)
+        speed = self.response.speed.values[at]
+        return np.where(none, np.nan, size), np.where(none, np.nan, speed)
 
 
 @dataclass(frozen=True)
@@ -141,7 +169,7 @@ def run_response_study(
             pool.shutdown(wait=True, cancel_futures=True)
             raise
     cases = [
-        ResponseCase(name, gasket, response, _envelopes(run), wall)
+        ResponseCase(name, gasket, response, _envelopes(run, settings.speeds), wall)
         for (name, _, gasket), (response, wall), run in zip(pairs, responses, runs, strict=True)
     ]
     return ResponseStudy(machine.parameters, cases, sweeps, time.perf_counter() - begin)
@@ -175,13 +203,18 @@ def _records(machine: Machine, cases: list[Case], workers: int | None) -> list[R
     return [records[index] for index in range(len(cases))]
 
 
-def _envelopes(record: Record | None) -> xr.Dataset | None:
+def _envelopes(record: Record | None, speeds: FloatArray) -> xr.Dataset | None:
+    """Return the `run_up` of a `ResponseCase`; None without samples at these speeds."""
     if record is None:
         return None
     edges = envelopes(record)
     if np.isnan(edges.upper.values).all():
         return None
-    return edges.assign(speed=("time", record.drum_speed.values))
+    speed = record.drum_speed.values
+    inside = (speed >= speeds.min()) & (speed <= speeds.max())
+    if not inside.any():
+        return None
+    return edges.assign(speed=("time", speed)).isel(time=inside)
 
 
 def sweep_profile(first: float, last: float, rate: float) -> SpinProfile:
