@@ -31,6 +31,7 @@ ELSEWHERE = {  # pages whose commands and files something else runs
     "docs/gallery.md": "analyses/make_gallery.py runs them and takes pictures of what they write",
 }
 NOT_RUN = {  # beginning of a command, and why this test does not run it
+    "sudo": "installs packages of the system: .ci/fresh",
     "python3 -m venv": "installs into a new environment: .ci/run",
     ".venv/bin/pip": "installs into a new environment: .ci/run",
     "source .venv": "changes the shell only",

@@ -69,9 +69,7 @@ def __getattr__(name: str) -> Any:
         return version("wm-drake")
     if name not in _HOMES:
         raise AttributeError(f"module 'wm_drake' has no attribute '{name}'")
-    from wm_drake.errors import libraries_named
-
-    with libraries_named():
+    with importlib.import_module("wm_drake.errors").libraries_named():
         return getattr(importlib.import_module(f"wm_drake.{_HOMES[name]}"), name)
 
 
