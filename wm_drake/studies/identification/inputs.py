@@ -1,6 +1,7 @@
 """Input of fits to measured loops: loops, laws, bounds and fixed numbers."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from wm_drake.errors import InputError, Problem, check_known, input_error, nearest_names
@@ -17,13 +18,16 @@ from wm_drake.studies.identification.models import (
     units_of_fields,
 )
 from wm_drake.studies.identification.options import FitOptions
-from wm_drake.studies.inputs import LOOP_WORDS, channels_of, pairs_of, quantities_of
+from wm_drake.studies.inputs import LOOP_WORDS, channel_names, pairs_of, quantities_of
 
 
 def loops_of(files: Sequence[Path], options: FitOptions) -> list[MeasuredLoop]:
     """Return the loops of files."""
-    channels = channels_of(options.channels, LOOP_WORDS)
-    return read_loops(existing_files(files), units_of(options.units), channels)
+    names, default = channel_names(options, LOOP_WORDS)
+    if default:
+        raise input_error(f"'{default}' is not NAME=UNIT", where="--unit")
+    units = units_of(options.units)
+    return read_loops(existing_files(files), replace(names, units={**units, **names.units}))
 
 
 def motions_of(
@@ -68,16 +72,16 @@ def motions_of(
     return motions
 
 
-def units_of(text: str | None) -> tuple[str, str, str] | None:
-    """Return the units of time, displacement and force of the option `--units`."""
+def units_of(text: str | None) -> dict[str, str]:
+    """Return the units of time, displacement and force of the option `--units`, by word."""
     if text is None:
-        return None
+        return {}
     parts = [part.strip() for part in text.split(",")]
     if len(parts) != 3:
         raise input_error(
             f"'{text}' is not three units; write for example 's,mm,N'", where="--units"
         )
-    return (parts[0], parts[1], parts[2])
+    return dict(zip(LOOP_WORDS, (parts[0], parts[1], parts[1], parts[2], parts[2]), strict=True))
 
 
 def given_by_law(text: str, axis: str, options: FitOptions) -> dict[str, Given]:
