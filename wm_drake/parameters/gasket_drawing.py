@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -11,7 +12,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, ValidationError, model_validator
 
-from wm_drake.errors import InputError
+from wm_drake.errors import InputError, InputNotice
 from wm_drake.parameters import units as u
 from wm_drake.parameters.dxf import DxfLine, corners_of
 from wm_drake.parameters.elements import Frozen
@@ -25,6 +26,9 @@ GASKETS = ShippedFiles("gasket drawing", DATA / "gaskets")
 
 STIFFEST_STRETCH = 3.0
 """Stretch up to which a rubber must stiffen in tension and compression: beyond folded gaskets."""
+
+MOST_TERMS = 3
+"""Constants of Yeoh."""
 
 NEARLY_INCOMPRESSIBLE = 500.0
 """Bulk modulus in shear moduli if none is given (assumption): Poisson's ratio 0.4990. Rubber has
@@ -48,6 +52,13 @@ def tension_stress(stretch: FloatArray, constants: Sequence[float]) -> FloatArra
     return np.asarray(_tension_terms(stretch) @ np.asarray(constants))
 
 
+def falls_at(constants: Sequence[float]) -> float | None:
+    """Return the stretch at which the force of a rubber falls most; None if it rises throughout."""
+    stretch = np.linspace(1.0 / STIFFEST_STRETCH, STIFFEST_STRETCH, 201)
+    steps = np.diff(tension_stress(stretch, constants))
+    return None if np.all(steps > 0.0) else float(stretch[int(np.argmin(steps))])
+
+
 def _tension_terms(stretch: FloatArray) -> FloatArray:
     """Return the stress in tension per constant of Yeoh. (n, 3)"""
     x = stretch**2 + 2.0 / stretch - 3.0
@@ -60,12 +71,13 @@ class TensionTest(Frozen):
     Attributes:
         stretch: Length over first length, at each point.
         stress: Force over first cross-section, at each point.
-        terms: Number of constants that are fitted: c1, then c2, then c3.
+        terms: Number of constants that are fitted: c1, then c2, then c3. Without it, as many of
+            three as give a force that rises with the stretch.
     """
 
     stretch: tuple[Annotated[float, u.PureNumber(), Field(gt=0.05, lt=20.0)], ...]
     stress: Annotated[tuple[float, ...], u.Unit("Pa", "MPa")]
-    terms: Annotated[int, Field(ge=1, le=3)] = 3
+    terms: Annotated[int, Field(ge=1, le=MOST_TERMS)] | None = None
 
     @model_validator(mode="after")
     def _can_be_fitted(self) -> "TensionTest":
@@ -75,25 +87,39 @@ class TensionTest(Frozen):
                 f"{len(self.stress)}"
             )
         loaded = len({stretch for stretch in self.stretch if abs(stretch - 1.0) > 1e-6})
-        if loaded <= self.terms:
+        terms = self.terms or MOST_TERMS
+        if loaded <= terms:
             raise ValueError(
-                f"has {loaded} stretches beside 1; {self.terms} constants need at least "
-                f"{self.terms + 1}"
+                f"has {loaded} stretches beside 1; {terms} constants need at least {terms + 1}"
             )
         return self
 
     @property
     def constants(self) -> tuple[float, float, float]:
         """Constants of Yeoh with the smallest sum of squared differences of the stress. [Pa]"""
-        terms = _tension_terms(np.array(self.stretch))[:, : self.terms]
-        fitted = np.linalg.lstsq(terms, np.array(self.stress), rcond=None)[0]
-        c1, c2, c3 = (*fitted.tolist(), 0.0, 0.0)[:3]
+        return self.fitted(self.terms or self.stable_terms or MOST_TERMS)
+
+    @cached_property
+    def stable_terms(self) -> int:
+        """Largest number of constants with which the force rises with the stretch; 0 if none."""
+        counts = range(MOST_TERMS, 0, -1)
+        return next((n for n in counts if falls_at(self.fitted(n)) is None), 0)
+
+    def fitted(self, terms: int) -> tuple[float, float, float]:
+        """Return the constants of a fit of some of them, the others zero. [Pa]"""
+        matrix = _tension_terms(np.array(self.stretch))[:, :terms]
+        numbers = np.linalg.lstsq(matrix, np.array(self.stress), rcond=None)[0]
+        c1, c2, c3 = (*numbers.tolist(), 0.0, 0.0)[:3]
         return c1, c2, c3
 
     @property
     def deviation(self) -> float:
         """Root mean square of fitted less measured stress, by the largest measured one."""
-        error = tension_stress(np.array(self.stretch), self.constants) - np.array(self.stress)
+        return self.deviation_of(self.constants)
+
+    def deviation_of(self, constants: Sequence[float]) -> float:
+        """Return `deviation` for other constants."""
+        error = tension_stress(np.array(self.stretch), constants) - np.array(self.stress)
         return float(np.sqrt(np.mean(error**2)) / np.max(np.abs(self.stress)))
 
 
@@ -164,16 +190,29 @@ class Rubber(Frozen):
 
     @model_validator(mode="after")
     def _is_stable(self) -> "Rubber":
-        stretch = np.linspace(1.0 / STIFFEST_STRETCH, STIFFEST_STRETCH, 201)
-        force = tension_stress(stretch, self.constants)
-        if not np.all(np.diff(force) > 0.0):
-            at = stretch[int(np.argmin(np.diff(force)))]
+        at = falls_at(self.constants)
+        if at is not None:
             raise ValueError(
                 f"the rubber is unstable: its force falls at stretch {at:.2g}; allowed are "
                 f"constants with which it rises from {1.0 / STIFFEST_STRETCH:.2g} to "
-                f"{STIFFEST_STRETCH:g}"
+                f"{STIFFEST_STRETCH:g}{self._way_out()}"
             )
+        if self.test is not None and not self.test.terms and self.test.stable_terms < MOST_TERMS:
+            count = self.test.stable_terms
+            message = (
+                f"rubber.test: {MOST_TERMS} constants give a force that falls; fitted with "
+                f"terms: {count}, which deviates by {100.0 * self.test.deviation:.2g} %"
+            )
+            warnings.warn(message, InputNotice, stacklevel=2)
         return self
+
+    def _way_out(self) -> str:
+        """Return a hint for an unstable fit of a tension test: fewer constants."""
+        if self.test is None or not self.test.stable_terms:
+            return ""
+        count = self.test.stable_terms
+        error = 100.0 * self.test.deviation_of(self.test.fitted(count))
+        return f"; terms: {count} is stable and deviates from the test by {error:.2g} %"
 
     @property
     def constants(self) -> tuple[float, float, float]:

@@ -164,6 +164,7 @@ def _is_array(content: Any) -> bool:
         isinstance(content, h5py.Dataset)
         and _text(content.attrs.get("MATLAB_class", "")) != "char"
         and "MATLAB_object_decode" not in content.attrs
+        and not content.is_scale  # it is the abscissa of others
         and (content.dtype.kind in "fiubc" or content.dtype.names == ("real", "imag"))
         and 1 <= len(content.shape) <= 2
         and content.size > 1
