@@ -1,6 +1,7 @@
 """Recorded files of every format: labels, clocks, gaps, units and names are treated alike."""
 
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from wm_drake.parameters.recorded import (
     ACCELERATION,
     SPEED,
     ChannelNames,
+    Synchronous,
     Wanted,
     evenly,
     read_recording,
@@ -419,7 +421,18 @@ def test_an_even_clock_has_places_for_samples_that_were_not_recorded(tmp_path):
     path = write_text(tmp_path / "x.csv", "\n".join(["time [s],acc [g]", *rows]))
     recording = read_recording(path)
     channels = recording.synchronous({"acc": Wanted(recording.chosen("acc"), None)})
-    with pytest.warns(InputNotice, match=r"20 samples of 1000 were not recorded \(1 gaps"):
+    with pytest.warns(InputNotice, match=r"20 samples of 1000 were not recorded \(1 gap in"):
         even = evenly(channels)
     np.testing.assert_allclose(even.time, TIME, atol=1e-9)
     assert np.isnan(even.values["acc"]).sum() == 20
+
+
+def test_scattered_time_stamps_are_made_even():
+    random = np.random.default_rng(5)
+    time = TIME + 0.0003 * random.uniform(-1.0, 1.0, len(TIME))
+    channels = Synchronous(Path("x.csv"), time, {"acc": np.sin(2.0 * np.pi * 20.0 * time)})
+    with pytest.warns(InputNotice, match="its steps of time scatter"):
+        even = evenly(channels)
+    assert np.ptp(np.diff(even.time)) < 1e-12
+    wanted = np.sin(2.0 * np.pi * 20.0 * even.time)
+    np.testing.assert_allclose(even.values["acc"], wanted, atol=2e-3)

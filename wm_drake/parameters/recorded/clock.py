@@ -27,6 +27,9 @@ FILTER_ORDER = 8
 UNEVEN = 1e-3
 """Largest relative difference of two steps of time of equally spaced samples."""
 
+SCATTER = 2.0
+"""Largest ratio of a step of time to the median one that interpolation makes even."""
+
 MOST_FILLED = 10
 """Most samples of an even grid for each recorded one."""
 
@@ -304,9 +307,10 @@ def _filtered(time: FloatArray, part: FloatArray, step: float) -> tuple[FloatArr
 def evenly(channels: Synchronous) -> Synchronous:
     """Return channels on an equally spaced clock; where samples were not recorded, they are NaN.
 
+    Time stamps that scatter, as those of a phone do, are interpolated to an even clock.
+
     Raises:
-        InputError: there are fewer than three samples, or the steps of time differ by other than
-            whole steps.
+        InputError: there are fewer than three samples, or the steps of time differ too much.
     """
     time = channels.time
     if len(time) < 3:
@@ -316,24 +320,51 @@ def evenly(channels: Synchronous) -> Synchronous:
     if np.ptp(steps) <= UNEVEN * np.mean(steps):
         return channels
     counts = np.rint(steps / step)
-    whole = counts >= 1.0
     if (
-        not whole.all()
-        or np.max(np.abs(steps - counts * step)) > UNEVEN * step * np.max(counts)
-        or counts.sum() > MOST_FILLED * len(time)
+        counts.min() >= 1.0
+        and np.max(np.abs(steps - counts * step)) <= UNEVEN * step * np.max(counts)
+        and counts.sum() <= MOST_FILLED * len(time)
     ):
-        raise input_error(
-            f"the steps of time differ by more than {100 * UNEVEN:g} %; resample it",
-            where=str(channels.path),
-        )
+        return _with_places(channels, counts)
+    if steps.min() >= step / SCATTER and steps.max() <= step * SCATTER:
+        return _interpolated(channels)
+    raise input_error(
+        f"the steps of time differ, from {steps.min():.4g} to {steps.max():.4g} s: allowed are "
+        f"{1.0 / SCATTER:g} to {SCATTER:g} of their median, {step:.4g} s, or whole multiples of "
+        "it; resample it",
+        where=str(channels.path),
+    )
+
+
+def _with_places(channels: Synchronous, counts: FloatArray) -> Synchronous:
+    """Return channels with places for samples that were not recorded.
+
+    Args:
+        counts: Number of even steps in each step of time (n - 1,).
+    """
     places = np.concatenate([[0], np.cumsum(counts)]).astype(int)
-    grid = np.interp(np.arange(places[-1] + 1), places, time)
+    grid = np.interp(np.arange(places[-1] + 1), places, channels.time)
+    gaps = int(np.sum(counts > 1.0))
     notice(
         channels.path,
-        f"{len(grid) - len(time)} samples of {len(grid)} were not recorded "
-        f"({int(np.sum(counts > 1.0))} gaps in time); they are left out",
+        f"{len(grid) - len(places)} samples of {len(grid)} were not recorded ({gaps} "
+        f"gap{'s' * (gaps > 1)} in time); they are left out",
     )
     values = {word: np.full(len(grid), np.nan) for word in channels.values}
     for word, column in channels.values.items():
         values[word][places] = column
     return replace(channels, time=grid, values=values)
+
+
+def _interpolated(channels: Synchronous) -> Synchronous:
+    """Return channels at even times, by cubic splines."""
+    time = channels.time
+    even = np.linspace(time[0], time[-1], len(time))
+    steps = np.diff(time)
+    notice(
+        channels.path,
+        f"its steps of time scatter from {steps.min():.4g} to {steps.max():.4g} s; the channels "
+        f"are interpolated to {1.0 / np.mean(steps):.5g} Hz",
+    )
+    columns = resampled(time, np.stack(list(channels.values.values()), axis=1), even, 0.0)
+    return replace(channels, time=even, values=dict(zip(channels.values, columns.T, strict=True)))

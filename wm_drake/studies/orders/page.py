@@ -80,10 +80,11 @@ def _table(result: Orders) -> Table:
 
 
 def signal_figure(result: Orders, index: int) -> fig.Figure:
-    """Return waterfall and order map of a signal."""
-    return fig.Figure(
-        panels=fig.in_grid([_waterfall(result, index), _order_map(result, index)], 2), height=350.0
-    )
+    """Return waterfall and order map of a signal; a record of a few seconds has no waterfall."""
+    drawn = [_order_map(result, index)]
+    if result.frequencies.sizes["time"]:
+        drawn.insert(0, _waterfall(result, index))
+    return fig.Figure(panels=fig.in_grid(drawn, 2), height=350.0)
 
 
 def _largest(values: FloatArray) -> float:
