@@ -436,3 +436,32 @@ def test_scattered_time_stamps_are_made_even():
     assert np.ptp(np.diff(even.time)) < 1e-12
     wanted = np.sin(2.0 * np.pi * 20.0 * even.time)
     np.testing.assert_allclose(even.values["acc"], wanted, atol=2e-3)
+
+
+def binary_set(name, unit, values):
+    """Return a set 58b: a head of text, then little-endian floats of 8 bytes."""
+    head = [
+        "    -1",
+        f"    58b     1     2          11{8 * len(values):>12}     0     0           0           0",
+        *(f"{text:<80}" for text in (name, "NONE", "NONE", "NONE", "NONE")),
+        "    1         0    0         0 NONE               1   3 NONE               0   0",
+        f"         4{len(values):>10}         1  0.00000E+00  2.00000E-03  0.00000E+00",
+        "        17    0    0    0 Time                 s                   ",
+        f"         8    0    0    0 NONE                 {unit:<20}",
+        "         0    0    0    0 NONE                 NONE                ",
+        "         0    0    0    0 NONE                 NONE                ",
+    ]
+    return "\n".join(head).encode() + b"\n" + values.astype("<f8").tobytes() + b"\n    -1\n"
+
+
+def test_binary_sets_of_uff_are_read(tmp_path):
+    pytest.importorskip("pyuff")
+    path, (mm, newton) = tmp_path / "x.uff", loop(TIME)
+    path.write_bytes(binary_set("displacement", "mm", mm) + binary_set("force", "N", newton))
+    assert planted(read_loop(path)) == pytest.approx((STIFFNESS, DAMPING), rel=1e-6)
+
+
+def test_a_header_and_a_row_of_units_must_agree(tmp_path):
+    text = "\n".join(["time [s],displacement [mm],force [N]", "ms,mm,N", *ROWS])
+    with pytest.raises(InputError, match=r"time \[s\]: is in s by its header, in ms by the row"):
+        read_loop(write_text(tmp_path / "x.csv", text))

@@ -105,7 +105,13 @@ def format_of(path: Path) -> Format:
         if start.startswith(sign):
             raise input_error(f"is {what}; {way}", where=str(path))
     suffix = path.suffix.lower()
-    return next((form for form in FORMATS if suffix in form.suffixes), TEXT)
+    form = next((form for form in FORMATS if suffix in form.suffixes), TEXT)
+    if form in _SIGNS.values() and form is not MAT:  # MAT of version 4 has no sign
+        raise input_error(
+            f"is not in the format of its suffix {suffix}: {form.package} cannot read it",
+            where=str(path),
+        )
+    return form
 
 
 def numbers(values: Any) -> np.ndarray | None:

@@ -17,8 +17,8 @@ TIME = "time"
 _KINDS = {
     "an angle": Unit("rad", "deg"),
     "a distance": Unit("m", "mm"),
-    "a drum speed": Unit("rad/s", "rpm"),
     "a frequency": Unit("Hz", "Hz"),
+    "a drum speed": Unit("rad/s", "rpm"),
 }
 """Kinds of an abscissa that is no time, by its unit."""
 

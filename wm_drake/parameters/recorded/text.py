@@ -79,7 +79,15 @@ def text_signals(path: Path) -> Iterator[Signal]:
         unit = units[place] if place < min(len(units), width) else ""
         signal = _column(title, column, lines)
         if signal is not None:
-            yield replace(signal, unit=signal.unit or unit.strip("[]() "))
+            yield _with_unit(signal, unit.strip("[]() "))
+
+
+def _with_unit(signal: Signal, below: str) -> Signal:
+    """Return a column with the unit of the row below its header, which must not contradict it."""
+    if plain_unit(signal.unit) and plain_unit(below) not in ("", plain_unit(signal.unit)):
+        fault = f"is in {signal.unit} by its header, in {below} by the row of units below"
+        return replace(signal, fault=fault)
+    return replace(signal, unit=signal.unit or below)
 
 
 def _rows(path: Path) -> list[_Row]:
@@ -120,9 +128,11 @@ def _check_width(path: Path, row: _Row, head: Sequence[str]) -> None:
     filled = row.cells if len(row.cells) <= len(head) else row.cells[: len(head)]
     surplus = any(row.cells[len(filled) :])
     if len(row.cells) < named or surplus:
+        hint = "; the decimal sign is a point" if surplus else ""
+        if not any(_is_number(cell) for cell in row.cells):
+            hint = "; the first line must have the names: begin remarks above it with #"
         raise input_error(
-            f"has {len(row.cells)} values but the header has {len(head)} columns"
-            f"{'; the decimal sign is a point' if surplus else ''}",
+            f"has {len(row.cells)} values but the header has {len(head)} columns{hint}",
             where=f"{path}:{row.line}",
         )
 
