@@ -15,7 +15,7 @@ from wm_drake.parameters.recorded import (
     SPEED,
     ChannelNames,
     Synchronous,
-    Wanted,
+    ChannelUse,
     evenly,
     read_recording,
     resampled,
@@ -195,8 +195,8 @@ def test_units_of_the_file_are_read_and_others_named(tmp_path, suffix):
     def read(names=None):
         recording = read_recording(path, names)
         wanted = {
-            "speed": Wanted(recording.chosen("speed"), SPEED, "rpm"),
-            "acc": Wanted(recording.chosen("acc"), ACCELERATION, "m/s^2"),
+            "speed": ChannelUse(recording.chosen("speed"), SPEED, "rpm"),
+            "acc": ChannelUse(recording.chosen("acc"), ACCELERATION, "m/s^2"),
         }
         return recording.synchronous(wanted)
 
@@ -325,7 +325,7 @@ def test_dates_without_a_unit_are_refused(tmp_path, first, step):
     rows = [f"{first + step * k!r},60,{k % 7}" for k in range(100)]
     path = write_text(tmp_path / "x.csv", "\n".join(["time,speed,acc", *rows]))
     recording = read_recording(path)
-    wanted = {"acc": Wanted(recording.chosen("acc"), ACCELERATION, "m/s^2")}
+    wanted = {"acc": ChannelUse(recording.chosen("acc"), ACCELERATION, "m/s^2")}
     with pytest.raises(InputError, match=r"has no unit, and its first value, .* looks like"):
         recording.synchronous(wanted)
 
@@ -420,7 +420,7 @@ def test_an_even_clock_has_places_for_samples_that_were_not_recorded(tmp_path):
     rows = [f"{TIME[k]:.3f},{k}" for k in kept]
     path = write_text(tmp_path / "x.csv", "\n".join(["time [s],acc [g]", *rows]))
     recording = read_recording(path)
-    channels = recording.synchronous({"acc": Wanted(recording.chosen("acc"), None)})
+    channels = recording.synchronous({"acc": ChannelUse(recording.chosen("acc"), None)})
     with pytest.warns(InputNotice, match=r"20 samples of 1000 were not recorded \(1 gap in"):
         even = evenly(channels)
     np.testing.assert_allclose(even.time, TIME, atol=1e-9)

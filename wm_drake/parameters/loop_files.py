@@ -12,7 +12,7 @@ from wm_drake.parameters.recorded import (
     Recording,
     Signal,
     Synchronous,
-    Wanted,
+    ChannelUse,
     read_recording,
 )
 from wm_drake.parameters.recorded.signal import word_of
@@ -101,8 +101,8 @@ def read_loop(path: Path, names: ChannelNames | None = None) -> MeasuredLoop:
             "mixes a rotation with a translation: angle goes with moment, displacement with force",
             where=str(path),
         )
-    wanted = {word: Wanted(signal, _UNITS[word]) for word, signal in picked.items()}
-    channels = recording.synchronous(wanted, time_unit="")
+    uses = {word: ChannelUse(signal, _UNITS[word]) for word, signal in picked.items()}
+    channels = recording.synchronous(uses, time_unit="")
     whole = channels.whole()
     _check_loop(whole, picked)
     displacement, force = whole.values.values()

@@ -21,7 +21,7 @@ from wm_drake.parameters.recorded.recording import (
     SPEED,
     ChannelNames,
     Recording,
-    Wanted,
+    ChannelUse,
     read_recording,
 )
 from wm_drake.parameters.recorded.signal import Abscissa, Signal
@@ -34,7 +34,7 @@ __all__ = [
     "Recording",
     "Signal",
     "Synchronous",
-    "Wanted",
+    "ChannelUse",
     "evenly",
     "read_recording",
     "resampled",

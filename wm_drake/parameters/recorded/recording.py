@@ -51,7 +51,7 @@ class ChannelNames:
 
 
 @dataclass(frozen=True)
-class Wanted:
+class ChannelUse:
     """A channel that a command uses.
 
     Attributes:
@@ -176,20 +176,20 @@ class Recording:
             rows.append(row)
         return rows
 
-    def synchronous(self, wanted: Mapping[str, Wanted], time_unit: str = "s") -> Synchronous:
+    def synchronous(self, uses: Mapping[str, ChannelUse], time_unit: str = "s") -> Synchronous:
         """Return channels in SI units on one clock; see `wm_drake.parameters.recorded.clock`.
 
         Args:
-            wanted: The channels by word.
+            uses: The channels by word.
             time_unit: Unit of a column of time without one; "" if there is none.
 
         Raises:
             InputError: a channel cannot be used, its unit does not fit, or the times do not.
         """
-        self._check_names(wanted)
+        self._check_names(uses)
         assumed: dict[str, list[str]] = {}
         factors, signals = {}, {}
-        for word, each in wanted.items():
+        for word, each in uses.items():
             signals[word] = self._with_time_unit(each.signal, time_unit, assumed)
             text = self.unit_of(word, each.signal, each.unit)
             if not text and each.default:
@@ -202,7 +202,7 @@ class Recording:
                 f"{shown}: the file has no unit; {unit} is assumed (--unit NAME=UNIT names one)",
             )
         return synchronous(
-            self.path, signals, factors, [word for word, each in wanted.items() if each.is_main]
+            self.path, signals, factors, [word for word, each in uses.items() if each.is_main]
         )
 
     def unit_of(self, word: str, signal: Signal, unit: Unit | None = None) -> str:
@@ -232,19 +232,19 @@ class Recording:
             )
         return in_file
 
-    def _factor(self, word: str, text: str, wanted: Wanted) -> float:
-        if wanted.unit is None:
+    def _factor(self, word: str, text: str, use: ChannelUse) -> float:
+        if use.unit is None:
             return 1.0
-        name = wanted.signal.title or wanted.signal.name
+        name = use.signal.title or use.signal.name
         if not text:
             raise input_error(
-                f"has no unit; write '{word} [{wanted.unit.shown}]' in the header, or name it: "
-                f"--unit '{word}={wanted.unit.shown}'",
+                f"has no unit; write '{word} [{use.unit.shown}]' in the header, or name it: "
+                f"--unit '{word}={use.unit.shown}'",
                 where=str(self.path),
                 key=name,
             )
         try:
-            return factor_of(text, wanted.unit)
+            return factor_of(text, use.unit)
         except ValueError as error:
             raise input_error(str(error), where=str(self.path), key=name) from None
 

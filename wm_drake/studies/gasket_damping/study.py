@@ -22,7 +22,7 @@ from wm_drake.parameters import (
 )
 from wm_drake.parameters.csv_files import with_distinct_times
 from wm_drake.parameters.machine import OUTPUT_PERIOD
-from wm_drake.parameters.recorded import Wanted, read_recording, resampled
+from wm_drake.parameters.recorded import ChannelUse, read_recording, resampled
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.report.terminal import say
@@ -223,8 +223,8 @@ def read_records(parameters: MachineParameters, entries: Sequence[str]) -> dict[
 def _recorded(path: Path, sensors: Sequence[str]) -> xr.DataArray:
     """Return the displacements at sensors in a recorded file (time, sensor). [m]"""
     recording = read_recording(path)
-    wanted = {name: Wanted(recording.chosen(name), LENGTH, LENGTH.shown) for name in sensors}
-    channels = recording.synchronous(wanted)
+    uses = {name: ChannelUse(recording.chosen(name), LENGTH, LENGTH.shown) for name in sensors}
+    channels = recording.synchronous(uses)
     return xr.DataArray(
         np.stack([channels.values[name] for name in sensors], axis=1),
         {"time": channels.time, "sensor": list(sensors)},

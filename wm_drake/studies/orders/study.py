@@ -17,7 +17,7 @@ from wm_drake.parameters.recorded import (
     Recording,
     Signal,
     Synchronous,
-    Wanted,
+    ChannelUse,
     evenly,
     read_recording,
 )
@@ -144,9 +144,13 @@ def read_signals(path: Path, names: ChannelNames | None = None, unit: str = "") 
     recording = read_recording(path, names)
     speed, used = _speed_and_signals(recording)
     shown, factor, measured = _common_unit(recording, used, unit or ACCELERATION.si)
-    wanted = {word: Wanted(each, measured, unit or ACCELERATION.si) for word, each in used.items()}
+    uses = {
+        word: ChannelUse(each, measured, unit or ACCELERATION.si) for word, each in used.items()
+    }
     channels = evenly(
-        recording.synchronous({**wanted, "speed": Wanted(speed, DRUM_SPEED, "rpm", is_main=False)})
+        recording.synchronous(
+            {**uses, "speed": ChannelUse(speed, DRUM_SPEED, "rpm", is_main=False)}
+        )
     )
     values = np.stack([channels.values[word] / factor for word in used], axis=1)
     angle, turning = _angle(channels.values["speed"], channels.time, path)

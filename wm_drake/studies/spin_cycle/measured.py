@@ -10,7 +10,7 @@ import xarray as xr
 from wm_drake.errors import check_known, input_error
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.csv_files import read_csv
-from wm_drake.parameters.recorded import ACCELERATION, ChannelNames, Wanted, read_recording
+from wm_drake.parameters.recorded import ACCELERATION, ChannelNames, ChannelUse, read_recording
 from wm_drake.parameters.recorded.clock import UNEVEN
 from wm_drake.parameters.recorded.formats import SUFFIXES
 from wm_drake.parameters.types import FloatArray
@@ -142,11 +142,11 @@ def _samples(
         InputError: a channel is missing, has a gap or is too short, or the time does not fit.
     """
     recording = read_recording(path, names)
-    wanted = {
-        word: Wanted(recording.word(word) or recording.chosen(word), ACCELERATION, unit)
+    uses = {
+        word: ChannelUse(recording.word(word) or recording.chosen(word), ACCELERATION, unit)
         for word in words
     }
-    channels = recording.synchronous(wanted)
+    channels = recording.synchronous(uses)
     time = channels.time
     if len(time) < LEAST_ROWS:
         raise input_error(
