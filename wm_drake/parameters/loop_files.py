@@ -9,10 +9,10 @@ import numpy as np
 from wm_drake.errors import InputError, Problem, input_error
 from wm_drake.parameters.recorded import (
     ChannelNames,
+    ChannelUse,
     Recording,
     Signal,
     Synchronous,
-    ChannelUse,
     read_recording,
 )
 from wm_drake.parameters.recorded.signal import word_of

@@ -20,8 +20,8 @@ from wm_drake.parameters.recorded.recording import (
     ACCELERATION,
     SPEED,
     ChannelNames,
-    Recording,
     ChannelUse,
+    Recording,
     read_recording,
 )
 from wm_drake.parameters.recorded.signal import Abscissa, Signal
@@ -31,10 +31,10 @@ __all__ = [
     "SPEED",
     "Abscissa",
     "ChannelNames",
+    "ChannelUse",
     "Recording",
     "Signal",
     "Synchronous",
-    "ChannelUse",
     "evenly",
     "read_recording",
     "resampled",

@@ -14,10 +14,10 @@ from wm_drake.errors import input_error
 from wm_drake.parameters.recorded import (
     ACCELERATION,
     ChannelNames,
+    ChannelUse,
     Recording,
     Signal,
     Synchronous,
-    ChannelUse,
     evenly,
     read_recording,
 )
