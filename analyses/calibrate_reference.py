@@ -11,9 +11,9 @@ amplitudes of [B] Tables 1 and 3 and to the 18 means of Table 5, and predicts he
 It prints the errors of the best machine and of the predictions.
 With --write, the best machine is written to its file in wm_drake/data/machines, and its masses and
 places to its SDF model, with the uncertainty beside each number. `wm-drake calibrate` makes a
-report page of such a fit. Tables of the predictions and of the fits with fewer free quantities are
-written beside the result; write_validation.py reads them as reference_held_out.csv,
-reference_held_out_study.csv, reference_2026_11_held_out.csv and reference_2026_11_fewer.csv.
+report page of such a fit. Tables of the predictions are written beside the result;
+write_validation.py reads them as reference_held_out.csv, reference_held_out_study.csv and
+reference_2026_11_held_out.csv.
 """
 
 import argparse
@@ -39,19 +39,18 @@ from wm_drake.parameters.measured import (
 from wm_drake.parameters.published import CONSTANT, published_results
 from wm_drake.report.progress import progress_bar
 from wm_drake.simulation.measures.responses import known_responses
-from wm_drake.studies.calibration.calibration import (
+from wm_drake.studies.calibrate.computed import Runner
+from wm_drake.studies.calibrate.prediction import Prediction, predict
+from wm_drake.studies.calibrate.response_targets import with_deviations
+from wm_drake.studies.calibrate.solutions import Solution, percents_of, solved_machine
+from wm_drake.studies.calibrate.study import (
     Calibration,
     Plan,
     calibrate,
-    fit_with_fewer,
     identity_of,
 )
-from wm_drake.studies.calibration.computed import Runner
-from wm_drake.studies.calibration.prediction import Prediction, predict
-from wm_drake.studies.calibration.response_targets import with_deviations
-from wm_drake.studies.calibration.solutions import Solution, percents_of, solved_machine
-from wm_drake.studies.calibration.study import FITS, fewer_table, prediction_table
-from wm_drake.studies.calibration.targets import Targets, targets_of
+from wm_drake.studies.calibrate.tables import FITS, prediction_table
+from wm_drake.studies.calibrate.targets import Targets, targets_of
 from wm_drake.studies.gasket.screening import published_for
 
 REFERENCE, EARLIER = "reference", "reference_2026_11"
@@ -67,7 +66,7 @@ LIMITS = {"amplitudes": 0.1985, "displacement": 0.485, "force": 0.485, "moment":
 They lie a little within those that it must keep: 20 % of an amplitude, 50 % of a mean, 25 % of My.
 """
 
-PLAN = Plan(method="least-squares", starts=1, iterations=1, deviation=0.033)
+PLAN = Plan(starts=1, iterations=1, deviation=0.033)
 """The start of the free file is the end of a wide search within the limits; it is only evaluated.
 
 With this deviation of the amplitudes and that of the means below, the mean difference is below
@@ -95,12 +94,6 @@ PREDICTION = {
 """Plans of a prediction: searches from and near the expected values. The starting values of the
 free file are not used, because they come from a fit to all loads."""
 
-FEWER = (60, 50, 40, 30, 20, 12, 6)
-"""Numbers of free quantities that --fewer tries, without limits, which few cannot keep."""
-
-FEWER_PLAN = replace(PLAN, iterations=12)
-"""Plan of a fit with fewer quantities, which must be searched."""
-
 QUICK_DRAWS = 8
 """Machines drawn for the intervals of a prediction with --quick."""
 
@@ -127,23 +120,16 @@ def main() -> None:
             for number, group in enumerate(held_out, start=1):
                 predictions += predict(runner, free, calibration, [group], prediction_plan)
                 done(number)
-        fits = []
-        if arguments.fewer:
-            searched = replace(calibration, plan=FEWER_PLAN)
-            fits = fit_with_fewer(runner, searched, FEWER)
         ledger.mark_finished()
     tables = {
         "held_out": prediction_table(predictions),
         "held_out_study": _study_table(predictions) if arguments.predict else pd.DataFrame(),
-        "fewer": fewer_table(fits) if fits else pd.DataFrame(),
     }
     for name, table in tables.items():
         if len(table):
             path = arguments.out.with_name(f"{arguments.out.stem}_{name}.csv")
             table.to_csv(path, index=False, float_format="%.2f")
     text = "\n".join(_lines(calibration, predictions))
-    if fits:
-        text += "\n" + tables["fewer"].to_string(index=False, float_format="%.2f")
     print(text)
     arguments.out.write_text(text + "\n", encoding="utf-8")
 
@@ -156,14 +142,14 @@ def _searched(arguments: argparse.Namespace) -> tuple[FreeFile, Plan, tuple[tupl
         return FreeFile(quantities=few), Plan(starts=1, iterations=1), (("back", "front"),)
     if arguments.machine == REFERENCE:
         return free, ADAMS_PLAN, HELD_OUT[REFERENCE] if arguments.predict else ()
-    return free, PLAN, () if arguments.fewer else HELD_OUT[EARLIER]
+    return free, PLAN, HELD_OUT[EARLIER]
 
 
 def _targets_for(arguments: argparse.Namespace, parameters: MachineParameters) -> Targets:
     if arguments.machine == REFERENCE and not arguments.quick:
         return adams_targets(parameters)
     targets = _targets(parameters, with_means=not arguments.quick)
-    return targets if arguments.quick or arguments.fewer else targets.limited(LIMITS)
+    return targets if arguments.quick else targets.limited(LIMITS)
 
 
 def _targets(parameters: MachineParameters, *, with_means: bool) -> Targets:
@@ -217,11 +203,6 @@ def _arguments() -> argparse.Namespace:
         help="file for the result; the ledger of evaluations is written beside it",
     )
     parser.add_argument(
-        "--fewer",
-        action="store_true",
-        help="fit with fewer free quantities too, in place of the predictions",
-    )
-    parser.add_argument(
         "--predict",
         action="store_true",
         help="predict tables that a fit has not seen; the earlier machine is always tested so",
@@ -232,8 +213,6 @@ def _arguments() -> argparse.Namespace:
     arguments = parser.parse_args()
     if arguments.predict and (arguments.quick or arguments.machine != REFERENCE):
         parser.error("--predict is for the machine reference, without --quick")
-    if arguments.quick and arguments.fewer:
-        parser.error("--quick leaves three quantities; leave out --quick or --fewer")
     if arguments.quick and arguments.write:
         parser.error("--quick cannot be written to the shipped files; leave out --quick or --write")
     return arguments

@@ -24,11 +24,11 @@ from wm_drake.model.machine import Machine
 from wm_drake.parameters import load_machine
 from wm_drake.parameters.free import FreeFile, load_free
 from wm_drake.parameters.types import FloatArray
-from wm_drake.studies.calibration.calibration import Calibration, Plan, calibrate, identity_of
-from wm_drake.studies.calibration.computed import Evaluation, Runner
-from wm_drake.studies.calibration.options import CalibrateOptions
-from wm_drake.studies.calibration.parameter_map import ParameterMap, parameter_map_of
-from wm_drake.studies.calibration.targets import Targets
+from wm_drake.studies.calibrate.computed import Evaluation, Runner
+from wm_drake.studies.calibrate.options import CalibrateOptions
+from wm_drake.studies.calibrate.parameter_map import ParameterMap, parameter_map_of
+from wm_drake.studies.calibrate.study import Calibration, Plan, calibrate, identity_of
+from wm_drake.studies.calibrate.targets import Targets
 
 LOADS = tuple((name, True) for name in ("middle", "counter", "back", "front"))
 QUANTITIES = ("spring_stiffness", "damper_friction", "damper_lean", "gasket_radial")

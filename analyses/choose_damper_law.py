@@ -24,9 +24,9 @@ from wm_drake.parameters.damper_laws import DAMPER_LAWS
 from wm_drake.parameters.files import read_yaml, yaml_text
 from wm_drake.parameters.free import FreeFile
 from wm_drake.report.progress import progress_bar
-from wm_drake.studies.calibration.calibration import calibrate, identity_of
-from wm_drake.studies.calibration.computed import Runner
-from wm_drake.studies.calibration.solutions import Solution, percents_of
+from wm_drake.studies.calibrate.computed import Runner
+from wm_drake.studies.calibrate.solutions import Solution, percents_of
+from wm_drake.studies.calibrate.study import calibrate, identity_of
 
 FREE, EARLIER_FREE = (
     Path(__file__).with_name(f"{name}_free.yaml") for name in (REFERENCE, EARLIER)

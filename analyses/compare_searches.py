@@ -20,9 +20,9 @@ from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.designs import load_design
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
-from wm_drake.studies.pareto.problem import MachineDesigns, machine_designs
-from wm_drake.studies.pareto.search import Problem, SearchResult, SearchSettings
-from wm_drake.studies.pareto.study import SEARCHES
+from wm_drake.studies.design.problem import MachineDesigns, machine_designs
+from wm_drake.studies.design.search import Problem, SearchResult, SearchSettings
+from wm_drake.studies.design.study import SEARCHES
 
 
 def searched(

@@ -17,7 +17,7 @@ import pandas as pd
 from scipy.stats import spearmanr
 
 from wm_drake.rigs import Harmonic
-from wm_drake.studies.identification.table2 import (
+from wm_drake.studies.identify.table2 import (
     coulomb_fits,
     mstv_motions,
     mstv_of_c,

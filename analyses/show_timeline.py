@@ -37,8 +37,8 @@ COMMANDS = (
 IMPORTS, OTHER = "imports", "other"
 PARTS = {
     "machine": ("wm_drake.studies.run:_machine_of",),
-    "runs": ("wm_drake.studies.run:Executor.simulate", "wm_drake.batch.runs:Runner.run"),
-    "half step": ("wm_drake.studies.run:Executor.step_error",),
+    "runs": ("wm_drake.studies.executor:Executor.simulate", "wm_drake.batch.runs:Runner.run"),
+    "half step": ("wm_drake.studies.executor:Executor.step_error",),
     "page": ("wm_drake.studies.study:Result.pages",),
     "files": ("wm_drake.studies.run:_written",),
 }

@@ -24,7 +24,7 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.rigs import ForceLoop, Harmonic, damper_bench, force_loops, measures_of
 from wm_drake.rigs.loops import steady_deformations
 from wm_drake.rigs.run import MATRICES, slider_friction_curves
-from wm_drake.studies.identification.table2 import (
+from wm_drake.studies.identify.table2 import (
     coulomb_fits,
     mstv_motions,
     mstv_of_c,

@@ -8,10 +8,10 @@ MSTV damper of [C]. It renews verification, validation and prediction on a page:
     python analyses/write_validation.py --page docs/validation.md --fitted-means
 
 Explanations of results that are missed are in validation_reasons.yaml, the tests of the
-verification in verification.yaml. Loads held out of the calibration, and fits with fewer free
-quantities, take hours: calibrate_reference.py wrote them for the machine `reference_2026_11` to
-reference_2026_11_held_out.csv and reference_2026_11_fewer.csv. The script takes about two minutes;
-with --tests, which runs the tests except those marked `hours`, three to five more.
+verification in verification.yaml. Loads held out of the calibration take hours:
+calibrate_reference.py wrote them for the machine `reference_2026_11` to
+reference_2026_11_held_out.csv. The script takes about two minutes; with --tests, which runs the
+tests except those marked `hours`, three to five more.
 """
 
 import argparse
@@ -34,7 +34,7 @@ from wm_drake.parameters import MachineParameters, published_results
 from wm_drake.parameters.files import read_yaml
 from wm_drake.parameters.unbalance_cases import load_unbalance_cases
 from wm_drake.rigs import Harmonic
-from wm_drake.studies.identification.table2 import (
+from wm_drake.studies.identify.table2 import (
     coulomb_fits,
     mstv_motions,
     mstv_of_c,
@@ -48,7 +48,7 @@ from wm_drake.studies.spin_cycle.study import compiled_runs, run_spin_cycle
 HERE = Path(__file__).parent
 REASONS, VERIFICATION = HERE / "validation_reasons.yaml", HERE / "verification.yaml"
 HELD_OUT, HELD_OUT_STUDY = (HERE / f"reference_held_out{end}.csv" for end in ("", "_study"))
-EARLIER, FEWER = (HERE / f"reference_2026_11_{name}.csv" for name in ("held_out", "fewer"))
+EARLIER = HERE / "reference_2026_11_held_out.csv"
 QUICK = 150  # trials with --quick
 SHOWN_BY_A = ("2", "5", "29")  # cases of [A] Table 9 that [A] describes
 
@@ -86,23 +86,6 @@ def compared(reference: MachineParameters, quick: bool, means_kind: str) -> list
             run_spin_cycle(free, chosen, load_profile("spin_cycle"), runs)
         )
     return table + rows.coulomb_rows(coulomb(quick))
-
-
-def simpler_machines() -> pd.DataFrame:
-    """Return the fits of `reference_2026_11` with fewer free quantities, as a table of texts."""
-    table = pd.read_csv(FEWER, keep_default_na=False)
-    names = [str(text).replace(" ", ", ").replace("_", " ") for text in table.set_to_expected]
-    return pd.DataFrame(
-        {
-            "free quantities": table.free_quantities.astype(str),
-            "cost": table.cost.map("{:.0f}".format),
-            "amplitudes: mean difference": table.amplitudes_mean_percent.map("{:.1f} %".format),
-            "largest": table.amplitudes_largest_percent.map("{:.0f} %".format),
-            "means: mean difference": table.responses_mean_percent.map("{:.1f} %".format),
-            "largest of the means": table.responses_largest_percent.map("{:.0f} %".format),
-            "set to expected values here": names,
-        }
-    )
 
 
 def run_tests(groups: dict[str, list[dict[str, Any]]]) -> dict[str, tuple[int, int]]:
@@ -172,10 +155,9 @@ def main() -> None:
     ]
     reasons = {str(key): str(text) for key, text in read_yaml(REASONS).items()}
     groups = YAML(typ="safe").load(VERIFICATION)
-    fewer = {"Machine reference_2026_11 with fewer free quantities": simpler_machines()}
     text = page.origin(command, notes)
     text += page.verified(groups, run_tests(groups) if arguments.tests else {})
-    text += page.compared(table, rows.FITTED, reasons, fewer)
+    text += page.compared(table, rows.FITTED, reasons)
     text += page.compared(table, rows.PREDICTED, reasons)
     print(text)
     page.write(text, arguments.out, arguments.page)

@@ -23,11 +23,14 @@ settings.load_profile("same_every_time")
 
 
 def pytest_configure():
-    """Let BLAS use one thread in each process.
+    """Let BLAS use one thread in each process, and let processes share byte code.
 
     Workers share the cores. Threads of one solution of 200 equations that wait for each other take
-    forty times the CPU time of one thread.
+    forty times the CPU time of one thread. Without byte code every process of a test, and there are
+    hundreds, would compile 2000 modules anew.
     """
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    sys.dont_write_bytecode = False
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # of workers and processes of tests
     threadpool_limits(1, "blas")  # of this process, which has numpy already
 

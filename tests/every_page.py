@@ -70,7 +70,7 @@ KINDS = {
     "calibration": _one(
         "sections.html", "calibrate", "--machine", "short.yaml", "--free", "free.yaml",
         "--targets", "measured.csv", "--starts", "1", "--iterations", "3",
-        "--leave-out", "back", "--fewer", "1",
+        "--leave-out", "back",
     ),
     "gasket": _one(
         "sections.html", "study", "gasket", "--trials", "150", "--check", "C_L=120 %",

@@ -13,7 +13,7 @@ from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import measure
 from wm_drake.simulation.outputs import point_displacements
 from wm_drake.simulation.records import Record
-from wm_drake.studies.spin.study import CaseResult, SpinResult
+from wm_drake.studies.spin.study import CaseResult, SpinRuns
 
 SENSOR_POINTS = {
     "Xr": (0.0, 0.2, -0.2),
@@ -114,5 +114,5 @@ def case_result(
     )
 
 
-def spin_result(parameters: MachineParameters, results: Sequence[CaseResult]) -> SpinResult:
-    return SpinResult(parameters, "drake", 2.5e-3, tuple(results))
+def spin_result(parameters: MachineParameters, results: Sequence[CaseResult]) -> SpinRuns:
+    return SpinRuns(parameters, "drake", tuple(results))

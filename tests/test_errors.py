@@ -1,10 +1,17 @@
 """Messages: one printable line of limited length."""
 
+import os
+import subprocess
+import sys
+
+import pytest
+
 from wm_drake.errors import (
     LONGEST_LINE,
     MOST_PROBLEMS,
     InputError,
     Problem,
+    libraries_named,
     nearest_names,
     shortened,
 )
@@ -56,3 +63,60 @@ def test_long_list_of_names_ends_with_their_number():
     assert "known: name_0000, name_0001, " in hint
     assert hint.endswith("name_0007, 992 more)")
     assert len(hint) < 350
+
+
+GLIB = "libglib-2.0.so.0: cannot open shared object file: No such file or directory"
+TO_INSTALL = "libglib-2.0.so.0: is missing, and Drake needs it; install the package of this system that has it"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (GLIB, f"{TO_INSTALL}; on Debian or Ubuntu: apt-get install libglib2.0-0"),
+        (GLIB.replace("glib", "new"), TO_INSTALL.replace("glib", "new")),
+        (
+            "dlopen(common.so, 0x2): Library not loaded: /opt/lib/libglib-2.0.0.dylib\n  Reason: tried",
+            TO_INSTALL.replace("libglib-2.0.so.0", "/opt/lib/libglib-2.0.0.dylib"),
+        ),
+    ],
+)
+def test_a_library_that_drake_does_not_find_is_named_with_its_package(text, message):
+    with pytest.raises(InputError) as raised, libraries_named():
+        raise ImportError(text)
+    assert str(raised.value) == message
+
+
+def test_another_error_of_an_import_stays():
+    with pytest.raises(ImportError, match="no name"), libraries_named():
+        raise ImportError("cannot import: no name")
+
+
+@pytest.fixture
+def without_glib(tmp_path):
+    """Return the environment of a process in which importing Drake fails as on a minimal Debian."""
+    (tmp_path / "pydrake").mkdir()
+    (tmp_path / "pydrake" / "__init__.py").write_text(f"raise ImportError({GLIB!r})\n")
+    return {**os.environ, "PYTHONPATH": str(tmp_path)}
+
+
+@pytest.mark.parametrize("command", ["spin", "study gasket", "machine show reference"])
+def test_a_command_without_a_library_of_drake_ends_with_one_message(
+    command, without_glib, tmp_path
+):
+    line = [sys.executable, "-m", "wm_drake", *command.split()]
+    ended = subprocess.run(
+        line, env=without_glib, cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert ended.returncode == 2
+    assert ended.stderr.splitlines()[-1].startswith(TO_INSTALL)
+    assert "Traceback" not in ended.stderr
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["pydrake"]
+
+
+def test_a_public_name_without_a_library_of_drake_raises_one_message(without_glib, tmp_path):
+    code = "import wm_drake as wm\ntry: wm.simulate\nexcept Exception as error: print(error)"
+    line = [sys.executable, "-c", code]
+    ended = subprocess.run(
+        line, env=without_glib, cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert ended.stdout.startswith(TO_INSTALL)

@@ -10,6 +10,10 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from every_page import write_inputs_of_studies
+from typer.main import get_command
+
+from wm_drake.cli import app
 
 CHECKOUT = Path(__file__).parents[1]
 
@@ -52,20 +56,9 @@ def wheel(tmp_path_factory):
 def python(wheel, tmp_path_factory):
     """Return the interpreter of an environment with the wheel; it borrows our dependencies."""
     home = tmp_path_factory.mktemp("environment")
-    venv.create(home, with_pip=False, symlinks=True)
+    venv.create(home, with_pip=True, symlinks=True)
     python = home / "bin" / "python"
-    run(
-        sys.executable,
-        "-m",
-        "pip",
-        "--python",
-        python,
-        "install",
-        "--no-deps",
-        "--no-index",
-        wheel,
-        cwd=home,
-    )
+    run(python, "-m", "pip", "install", "--no-deps", "--no-index", wheel, cwd=home)
     own = Path(
         run(
             python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))", cwd=home
@@ -80,11 +73,9 @@ def test_wheel_holds_the_data_and_nothing_else(wheel):
     names = zipfile.ZipFile(wheel).namelist()
     for folder, pattern in (
         ("sdf", "*"),
-        ("wm_drake", "data/machines/*"),
-        ("wm_drake", "data/cycles/*"),
-        ("wm_drake", "data/components/*"),
-        ("wm_drake", "data/tolerances/*"),
-        ("wm_drake", "data/designs/*"),
+        ("wm_drake", "data/**/*"),
+        ("wm_drake", "export/c/*.c"),
+        ("wm_drake", "studio/static/*"),
         ("wm_drake", "**/*.py"),
         ("wm_drake", "**/*.html"),
         ("wm_drake", "**/*.js"),
@@ -113,9 +104,52 @@ def test_package_and_bodies_come_from_the_wheel(python, tmp_path):
         assert Path(line).exists()
 
 
-def test_command_runs_a_rig_and_writes_a_page(python, tmp_path):
-    """Compile code of the wheel, less than a whole machine needs, and write a page."""
-    command = python.parent / "wm-drake"
-    rig = ["rig", "damper", "--component", "mstv_damper", "-f", "1 Hz", "-a", "1 mm"]
-    run(command, *rig, "--out", "out", cwd=tmp_path)
-    assert {"report.html", "run.json"} < {path.name for path in (tmp_path / "out").iterdir()}
+EACH_COMMAND = """
+wm-drake machine list --json
+wm-drake machine schema file
+wm-drake machine new mine --tub-mass '40 kg' --springs 2
+wm-drake machine check mine.yaml
+wm-drake machine show mine.yaml
+wm-drake rig damper --component mstv_damper -f '1,5 Hz' -a '0.3,1 mm' --out damper
+wm-drake identify damper damper/loop_*.csv --law mstv --quick --out damper_fit
+wm-drake rig bushing --machine free_stroke --axis axial -f '1,5 Hz' -a '0.4 mm' --out bushing
+wm-drake identify bushing bushing/loop_*.csv --machine free_stroke --axis axial --law voigt --out bushing_fit
+wm-drake rig gasket --axis axial -f '1,5 Hz' -a '1 mm' --out ring
+wm-drake identify gasket ring/loop_*.csv --axis axial --law voigt --out ring_fit
+wm-drake identify table2 --quick --out table2
+wm-drake gasket curves folded --quick --axial '8 mm' --out curves
+wm-drake spin --load middle --profile short_cycle.yaml --out spin
+wm-drake record orders spin/record_middle.nc --out orders
+wm-drake calibrate --machine short.yaml --free free.yaml --targets measured.csv --quick --out calibrate
+wm-drake verdict short.yaml --samples 16 --out verdict
+wm-drake export fmu --load middle --out machine.fmu
+wm-drake study balancer --quick --place '0 mm' --damping '100 %' --release '80 rpm' --to '110 rpm' --rate '80 rpm/s' --out balancer
+wm-drake study design gasket --quick --profile short_cycle.yaml --out design
+wm-drake study drive --quick --load middle --out drive
+wm-drake study gasket --quick --response D --profile short_cycle.yaml --out gasket
+wm-drake study gasket-damping --quick --record middle=spin/record_middle.nc --out gasket_damping
+wm-drake study gasket-geometry --quick --profile short_cycle.yaml --out gasket_geometry
+wm-drake study modes --quick --out modes
+wm-drake study response --quick --load middle --out response
+wm-drake study spin-cycle --quick --profile eight_regions.yaml --out spin_cycle
+wm-drake study spin-identify --quick --case 2 --unknown 'gasket.stiffness_y=(1, 4) N/mm' --profile short_cycle.yaml --out spin_identify
+wm-drake study tolerance laundry --samples 32 --subset 0 --profile short_cycle.yaml --out tolerance
+wm-drake studio --no-browser --quiet & sleep 5; kill -INT $!; wait $! || test $? = 130
+"""  # fmt: skip
+
+
+def names_of_commands(group, words=()):
+    for name in group.list_commands(None):
+        command = group.get_command(None, name)
+        if hasattr(command, "list_commands"):
+            yield from names_of_commands(command, (*words, name))
+        else:
+            yield " ".join((*words, name))
+
+
+def test_each_command_runs_from_an_empty_folder(python, tmp_path, monkeypatch):
+    names = set(names_of_commands(get_command(app)))
+    assert {name for name in names if f"\nwm-drake {name} " in EACH_COMMAND} == names
+    write_inputs_of_studies(tmp_path)
+    monkeypatch.setenv("PATH", str(python.parent), prepend=os.pathsep)
+    run("bash", "-euxc", EACH_COMMAND, cwd=tmp_path)

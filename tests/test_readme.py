@@ -1,6 +1,7 @@
 """README and the how-to pages are checked where a machine can: commands, snippets, machine files."""
 
 import shlex
+import subprocess
 from collections import Counter
 
 import numpy as np
@@ -13,6 +14,7 @@ from pydrake.systems.framework import Diagram
 
 import wm_drake as wm
 from wm_drake.cli import app
+from wm_drake.errors import LIBRARIES
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import SpinProfile, load_component, load_machine, quantities
 from wm_drake.parameters.designs import load_design
@@ -22,7 +24,7 @@ from wm_drake.parameters.tolerances import load_limits, load_tolerances
 from wm_drake.parameters.variation import number_at
 from wm_drake.simulation.measures import measure
 from wm_drake.simulation.runs import simulate
-from wm_drake.studies.calibration.parameter_map import parameter_map_of
+from wm_drake.studies.calibrate.parameter_map import parameter_map_of
 
 PAGES = [README, *HOW_TO]
 SHORT = SpinProfile(time=(0.0, 6.0), speed=(0.0, 12.0))
@@ -140,6 +142,21 @@ def test_the_python_snippets_run(path):
         assert len(set(table.gasket_force.sel(axis="x").values)) == 8
         alone = measure(simulate(names["machine"], names["worn"](35)))
         assert table.gasket_force.values[7] == pytest.approx(alone.gasket_force.values, rel=1e-9)
+
+
+def test_ci_runs_the_commands_of_the_readme():
+    """Both install what Drake needs first; nothing else than the README has the commands."""
+    main, tests = (
+        subprocess.run(
+            [CHECKOUT / ".ci" / "readme", marker], capture_output=True, text=True, check=True
+        ).stdout.splitlines()
+        for marker in ("main", "tests")
+    )
+    assert [*main, *tests] == "\n".join(blocks(README, "bash")).splitlines()
+    assert main[-1].endswith(".venv/bin/wm-drake study gasket")
+    assert tests[-1].endswith(".venv/bin/pytest")
+    for first, *_ in (main, tests):
+        assert first.split()[-1] == LIBRARIES["libglib-2.0.so.0"]
 
 
 def test_the_snippet_of_the_readme_is_short():

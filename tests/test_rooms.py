@@ -1,15 +1,18 @@
-"""Imports between rooms, read from the source: each room imports only rooms before it.
+"""Imports read from the source: each room imports only rooms before it, and none runs in circles.
 
-Imports inside functions count too.
+Imports inside functions and those for annotations count too.
 """
 
 import ast
 import sys
+from graphlib import CycleError, TopologicalSorter
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 
 import wm_drake
+from wm_drake.studies.study import Study
 
 PACKAGE = Path(wm_drake.__file__).parent
 ORDER = (
@@ -36,6 +39,8 @@ ORDER = (
 LEVEL = {room: level for level, rooms in enumerate(ORDER) for room in rooms}
 DRAWING = {"page", "figures", "tables", "words"}
 """Modules of a study that may import a plotting library."""
+PARTS = ("options", "study", "page", "task")
+"""Parts of a study: each imports those before it only."""
 # laws do without much more
 WITHOUT_DRAKE = {"registry", "errors", "compiler", "parameters", "solid", "elements", "rigs", "cli"}
 
@@ -87,6 +92,43 @@ def _reason(name, target):
     return ""
 
 
+def circle(sources):
+    """Return names of modules that import each other in a circle, or an empty list.
+
+    Args:
+        sources: Names and sources of all modules, and whether each is a package.
+    """
+    known = {name for name, _, _ in sources}
+    imports = {
+        name: {_module(target, known) for target in imported(name, source, is_package)}
+        - {name, "", "wm_drake"}
+        for name, source, is_package in sources
+    }
+    try:
+        TopologicalSorter(imports).prepare()
+    except CycleError as error:
+        return error.args[1]
+    return []
+
+
+def _module(target, known):
+    """Return the module that a full name is or is in, or ""."""
+    while target and target not in known:
+        target = target.rpartition(".")[0]
+    return target
+
+
+def parts_backwards(name, source):
+    """Return what a part of a study imports of the parts after it."""
+    folder, _, part = name.rpartition(".")
+    later = {f"{folder}.{other}" for other in PARTS[PARTS.index(part) + 1 :]}
+    return [
+        f"{name} imports {target}"
+        for target in imported(name, source)
+        if target in later or target.rpartition(".")[0] in later
+    ]
+
+
 def _draws(room, places):
     return room == "report" or (room == "studies" and places[-1] in DRAWING)
 
@@ -111,11 +153,55 @@ def test_imports_point_upwards():
     ] == []
 
 
+def test_no_modules_import_each_other_in_a_circle():
+    assert circle([*modules()]) == []
+
+
+def test_parts_of_a_study_import_earlier_ones_only():
+    assert [
+        fault
+        for name, source, _ in modules()
+        if name.startswith("wm_drake.studies.") and name.rpartition(".")[2] in PARTS
+        if name != "wm_drake.studies.study"
+        for fault in parts_backwards(name, source)
+    ] == []
+
+
+def test_folder_of_a_study_has_the_name_of_its_command():
+    for path in sorted((PACKAGE / "studies").glob("*/options.py")):
+        folder = path.parent.name
+        declared = vars(import_module(f"wm_drake.studies.{folder}.options")).values()
+        many = (value if isinstance(value, tuple) else (value,) for value in declared)
+        studies = [one for some in many for one in some if isinstance(one, Study)]
+        assert studies, folder
+        for study in studies:
+            name = study.name.replace("-", "_")
+            assert folder in (name, study.group, f"{study.group}_{name}")
+
+
+@pytest.mark.parametrize("at", ["{}", "def f():\n    {}", "if TYPE_CHECKING:\n    {}"])
+def test_planted_circle_is_found(at):
+    back = at.format("from wm_drake.studies.spin.study import X")
+    sources = [
+        ("wm_drake.studies.spin.study", "from wm_drake.studies.spin import page", False),
+        ("wm_drake.studies.spin.page", "from wm_drake.studies.spin.figures import Y", False),
+        ("wm_drake.studies.spin.figures", back, False),
+    ]
+    assert len(set(circle(sources))) == 3
+    assert circle(sources[:2]) == []
+
+
+def test_planted_step_backwards_is_found():
+    source = "def f():\n    from wm_drake.studies.spin.task import SpinTask"
+    assert len(parts_backwards("wm_drake.studies.spin.page", source)) == 1
+    assert parts_backwards("wm_drake.studies.spin.task", source) == []
+
+
 def test_package_itself_imports_no_room_until_asked():
     (source,) = (source for name, source, _ in modules() if name == "wm_drake")
-    assert {
-        target.split(".")[0] for target in imported("wm_drake", source, is_package=True)
-    } <= sys.stdlib_module_names
+    targets = imported("wm_drake", source, is_package=True)
+    rooms = {target for target in targets if not target.startswith("wm_drake.errors.")}
+    assert {target.split(".")[0] for target in rooms} <= sys.stdlib_module_names
 
 
 def test_no_room_imports_by_a_name_made_at_run_time():
@@ -144,7 +230,7 @@ def test_no_room_imports_by_a_name_made_at_run_time():
         ("wm_drake.laws.friction", "from wm_drake.errors import InputError"),
         ("wm_drake.model.scene", "from wm_drake.engines.drake import run_drake"),
         ("wm_drake.simulation.runs", "from wm_drake import batch"),
-        ("wm_drake.studies.description.description", "import matplotlib.pyplot as plt"),
+        ("wm_drake.studies.machine_show.description", "import matplotlib.pyplot as plt"),
         ("wm_drake.cli", "def f():\n    import matplotlib"),
         ("wm_drake.cli", "from tests.conftest import wm_drake"),
         ("wm_drake.studies.spin.study", "import analyses.run"),

@@ -31,6 +31,7 @@ ELSEWHERE = {  # pages whose commands and files something else runs
     "docs/gallery.md": "analyses/make_gallery.py runs them and takes pictures of what they write",
 }
 NOT_RUN = {  # beginning of a command, and why this test does not run it
+    "sudo": "installs packages of the system: .ci/fresh",
     "python3 -m venv": "installs into a new environment: .ci/run",
     ".venv/bin/pip": "installs into a new environment: .ci/run",
     "source .venv": "changes the shell only",
@@ -44,7 +45,6 @@ NOT_RUN = {  # beginning of a command, and why this test does not run it
     "wm-drake study tolerance laundry --samples 8192": "minutes: the tutorial will-it-hit runs 128",
     "wm-drake study design mine.yaml --evaluations 5000": "minutes: test_readme reads the file",
     "wm-drake study gasket-damping --mesh 0.05": "minutes: --mesh 4 is in the gallery",
-    "wm-drake calibrate --free free.yaml --fewer": "needs many free quantities: test_cli_calibrate",
     "wm-drake calibrate --free free.yaml --resume": "continues what was interrupted: test_cli_calibrate",
 }
 HOURS = (  # commands of more than ten seconds of processor time; the marker `hours` runs them

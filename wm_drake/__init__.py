@@ -24,7 +24,7 @@ _HOMES = {
     "advance_to": "engines.drake",
     "build_machine": "model.build",
     "case_of": "simulation.cases",
-    "describe": "studies.description.description",
+    "describe": "studies.machine_show.description",
     "export_fmu": "export.fmu",
     "envelopes": "simulation.displacements",
     "filtered_displacement": "simulation.displacements",
@@ -34,7 +34,7 @@ _HOMES = {
     "load_record": "simulation.records",
     "measure": "simulation.measures",
     "modes": "studies.modes.study",
-    "natural_modes": "studies.description.description",
+    "natural_modes": "studies.machine_show.description",
     "progress_bar": "report.progress",
     "register_element": "elements.kind",
     "register_study": "studies.study",
@@ -45,7 +45,7 @@ _HOMES = {
     "simulate": "simulation.runs",
     "simulate_many": "batch",
     "step_error": "batch",
-    "steady_response": "studies.steady.response",
+    "steady_response": "studies.response.response",
     "with_value": "parameters",
     "with_values": "parameters",
 }
@@ -69,7 +69,8 @@ def __getattr__(name: str) -> Any:
         return version("wm-drake")
     if name not in _HOMES:
         raise AttributeError(f"module 'wm_drake' has no attribute '{name}'")
-    return getattr(importlib.import_module(f"wm_drake.{_HOMES[name]}"), name)
+    with importlib.import_module("wm_drake.errors").libraries_named():
+        return getattr(importlib.import_module(f"wm_drake.{_HOMES[name]}"), name)
 
 
 def __dir__() -> list[str]:

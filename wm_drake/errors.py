@@ -16,6 +16,14 @@ MOST_PROBLEMS = 8
 MOST_NAMES = 8
 """Largest number of allowed names that a message lists."""
 
+LIBRARIES = {
+    "libglib-2.0.so.0": "libglib2.0-0",
+    "libpcre2-8.so.0": "libpcre2-8-0",
+    "libstdc++.so.6": "libstdc++6",
+    "libgcc_s.so.1": "libgcc-s1",
+}
+"""Libraries that Drake links and no wheel has, and the packages of Debian and Ubuntu with them."""
+
 _LONGEST_WHERE, _LONGEST_KEY, _LONGEST_WORD, _LONGEST_LIST = 220, 80, 60, 300
 
 
@@ -62,7 +70,7 @@ class InputError(WmDrakeError):
         self.problems = tuple(problems)
         lines = [str(problem) for problem in self.problems[:MOST_PROBLEMS]]
         if left_out := len(self.problems) - len(lines):
-            lines.append(f"and {left_out} more problem{'s' * (left_out > 1)}")
+            lines.append(f"and {left_out} more problem{'s' if left_out > 1 else ''}")
         super().__init__("\n".join(lines))
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -89,6 +97,23 @@ def problems_at(where: str, key: str | None = None) -> Iterator[None]:
         raise InputError(
             replace(p, where=where, key=p.key if key is None else key) for p in error.problems
         ) from None
+
+
+@contextmanager
+def libraries_named() -> Iterator[None]:
+    """Replace the error of an import that does not find a library by one that names its package."""
+    try:
+        yield
+    except ImportError as error:
+        pattern = r"(?P<linux>[^\s/]+): cannot open shared object|Library not loaded: (?P<mac>\S+)"
+        missing = re.search(pattern, str(error))
+        if not missing:
+            raise
+        library = missing["linux"] or missing["mac"]
+        how = "install the package of this system that has it"
+        if library in LIBRARIES:
+            how += f"; on Debian or Ubuntu: apt-get install {LIBRARIES[library]}"
+        raise input_error(f"is missing, and Drake needs it; {how}", where=library) from None
 
 
 def shortened(text: str, longest: int) -> str:

@@ -7,7 +7,6 @@ from textwrap import fill
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike
 
 from analysis_tools.validation_rows import FITTED, MISSED, PREDICTED, Row, counts
@@ -89,7 +88,6 @@ def compared(
     rows: Sequence[Row],
     kind: str,
     reasons: Mapping[str, str],
-    tables: Mapping[str, pd.DataFrame] = {},
 ) -> str:
     """Return the part of the rows of one kind as Markdown.
 
@@ -98,7 +96,6 @@ def compared(
         kind: `FITTED` or `PREDICTED`.
         reasons: Explanations by section, by `SECTION | QUANTITY`, and command and tolerance of a
             section by `SECTION | command` and `SECTION | tolerance`.
-        tables: Tables without verdicts by heading, for the end of the part.
     """
     chosen = [row for row in rows if row.kind == kind]
     heading, about = HEADS[kind]
@@ -107,10 +104,6 @@ def compared(
         text += ["", f"### {section}", "", *_head_of_section(section, reasons)]
         text += _line(COLUMNS), _line(["---"] * len(COLUMNS))
         text += [_line(_cells(row, reasons)) for row in group]
-    for name, table in tables.items():
-        text += ["", f"### {name}", "", *_head_of_section(name, reasons)]
-        text += _line(list(map(str, table.columns))), _line(["---"] * len(table.columns))
-        text += [_line(list(map(str, row))) for row in table.itertuples(index=False)]
     return "\n".join(text) + "\n"
 
 

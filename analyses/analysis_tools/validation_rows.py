@@ -169,7 +169,7 @@ def held_out_table_rows(table: pd.DataFrame, studies: pd.DataFrame) -> list[Row]
     """Return rows for tables of [B] that were held out of the fit and predicted.
 
     Args:
-        table: Table from `wm_drake.studies.calibration.study.prediction_table`.
+        table: Table from `wm_drake.studies.calibrate.tables.prediction_table`.
         studies: Agreement of the gasket study of each held-out load, fitted and predicted, with the
             columns held_out, fit, responses and same_leading_factor.
     """
@@ -228,7 +228,7 @@ def held_out_rows(table: pd.DataFrame) -> list[Row]:
     """Return rows for loads that were held out of the calibration and predicted.
 
     Args:
-        table: Table from `wm_drake.studies.calibration.study.prediction_table`.
+        table: Table from `wm_drake.studies.calibrate.tables.prediction_table`.
     """
     section, rows = "[B] Tables 1 and 3: loads held out of the calibration", list[Row]()
     for group in table.to_dict("records"):
@@ -350,9 +350,16 @@ def spin_cycle_rows(result: SpinCycleResult) -> list[Row]:
         reason = "the region agrees" if ours == region else _runner_up(values, region, ours)
         verdict = _verdict(ours == region)
         rows.append(Row(section, what, FITTED, region, ours, "", verdict, reason))
-    ratio = (opposite.sel(axis="z").max("region") / front.sel(axis="z").max("region")).max()
+    both = [values.sel(axis="z") for values in (opposite, front)]
+    ratio = (both[0].max("region") / both[1].max("region")).max()
+    by_region = (both[0] / both[1]).max("accelerometer")
+    rising = by_region.region.values[by_region.values > 1.0]
     verdict = _verdict(float(ratio) < REDUCED)
-    reason = f"largest ratio of all sensors; limit {REDUCED:g}, an assumption"
+    reason = (
+        "largest values over the regions, largest ratio of all sensors; limit "
+        f"{REDUCED:g}, an assumption. By region and sensor z rises in {', '.join(rising)}, up to "
+        f"{float(by_region.max()):.1f} times"
+    )
     what = "400 g at both ends, opposite: z against 400 g at the front"
     texts = ("significantly reduced", f"{float(ratio):.2f}")
     rows.append(Row(section, what, FITTED, *texts, "", verdict, reason))

@@ -9,7 +9,7 @@ from wm_drake.model.build import build_machine
 from wm_drake.parameters import load_machine
 from wm_drake.parameters.free import load_free
 from wm_drake.parameters.keys import quantities
-from wm_drake.studies.calibration.parameter_map import parameter_map_of
+from wm_drake.studies.calibrate.parameter_map import parameter_map_of
 
 ANALYSES = Path(__file__).parents[2] / "analyses"
 

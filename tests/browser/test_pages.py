@@ -14,12 +14,12 @@ from wm_drake.parameters import GASKET_FACTORS, levels_of, load_factors, load_ma
 from wm_drake.report.figure import MARK, MEASURED, Axis, Figure, Line, Panel, Rule, Span, in_grid
 from wm_drake.report.page import picture, render
 from wm_drake.simulation.cases import Case
-from wm_drake.studies.description.page import machine_page
 from wm_drake.studies.doe.design import make_design
 from wm_drake.studies.gasket.page import GasketResult
 from wm_drake.studies.gasket.screening import Meaning, Responses, run_screening
 from wm_drake.studies.gasket.study import GasketTrials
 from wm_drake.studies.gasket.surface import surfaces
+from wm_drake.studies.machine_show.page import machine_page
 from wm_drake.studies.spin.page import spin_page as page_of_spin
 from wm_drake.studies.study import Facts
 

@@ -188,6 +188,112 @@ def test_empty_field_says_so_and_the_last_value_stays(page):
     assert field.get_attribute("value").endswith("N/mm")
 
 
+def test_refused_value_is_seen_whatever_is_searched_for(page):
+    settled(page)
+    page.find("#search").send_keys("damper left")
+    row, gap = page.find(ROW.format(STIFFNESS, "")), page.find("#verdict strong").text
+    assert not row.is_displayed()
+    move = (
+        "const field = document.querySelector(arguments[0]); field.value = arguments[1];"
+        "field.dispatchEvent(new Event('change'))"
+    )
+    page.run(move, ROW.format(STIFFNESS, ".text"), "3")
+    refused = page.wait("return document.querySelector('#verdict .refused')?.innerText")
+    assert refused.split("\n") == [
+        "Not run",
+        "gasket stiffness x: '3' has no unit; write for example '1 N/mm'",
+    ]
+    assert f"The last machine that ran: {gap}" in page.find("#verdict").text.replace("\n", " ")
+    assert page.find(ROW.format(STIFFNESS, ".problem")).is_displayed()
+    assert page.run("return document.querySelectorAll('.old').length") == 6
+    page.find("#search").send_keys(" outer")  # nothing has these words
+    assert page.find(ROW.format(STIFFNESS, ".problem")).is_displayed()
+    page.run(move, ROW.format(STIFFNESS, ".text"), "4 N/mm")
+    page.wait("return !document.querySelector('#verdict .refused')")
+    settled(page)
+    assert page.run("return document.querySelectorAll('.old').length") == 0
+
+
+def test_warning_without_a_slider_stands_above(page):
+    typed(page, "spring_types.suspension.stiffness", "0.5 N/mm")
+    words = "return document.getElementById('problems').checkVisibility() && document.getElementById('problems').textContent"
+    assert "springs.left: is too soft: it carries" in page.wait(words)
+
+
+def test_presses_of_a_key_are_one_entry_of_the_history(page):
+    from selenium.webdriver.common.keys import Keys
+
+    entries = "return [...document.querySelectorAll('#history li')].map((one) => one.textContent)"
+    unfolded(page, STIFFNESS)
+    slider = page.find(ROW.format(STIFFNESS, "input[type=range]"))
+    before = page.run("return arguments[0].value", slider)
+    slider.send_keys(Keys.ARROW_RIGHT * 20)
+    assert page.run("return arguments[0].value", slider) == str(int(before) + 20)
+    begin, moved = page.wait(f"const all = (() => {{ {entries} }})(); return all.length > 1 && all")
+    assert moved.startswith("gasket stiffness x ")
+    page.find("#gasket").click()
+    slider.send_keys(Keys.ARROW_LEFT)
+    assert page.run(entries)[:3] == [begin, moved, "gasket out"]
+    assert len(page.run(entries)) == 4
+    for _ in range(3):
+        page.find("#undo").click()
+    assert page.run("return arguments[0].value", slider) == before
+    settled(page)
+
+
+def test_variants_show_the_gap_of_all_loads_and_name_the_load(page):
+    page.find("#keep").click()
+    page.run("document.querySelectorAll('#verdict button')[2].click()")
+    settled(page)
+    cells = "return [...document.querySelectorAll('#variants tbody tr')].map((r) => [...r.children].map((c) => c.textContent))"
+    all_loads, load, *others = page.wait(
+        f"const rows = (() => {{ {cells} }})(); return rows[1]?.[1] !== rows[1]?.[2] && rows"
+    )
+    deciding = page.run("return document.querySelector('#verdict button').textContent").split()
+    text = f"{deciding[1]} ({deciding[0]})"
+    assert all_loads == ["smallest gap of all loads, mm", text, text]
+    chosen = page.run("return document.getElementById('load').value")
+    assert load == ["all below with the load", chosen, deciding[0]]
+    (gaps,) = (row for row in others if row[0] == "smallest gap, mm")
+    assert float(gaps[1]) > float(gaps[2]) == pytest.approx(float(deciding[1]), abs=0.06)
+    notes = page.run(
+        "return [...document.querySelectorAll('.with-load')].map((n) => n.textContent)"
+    )
+    assert set(notes) == {f" with load {chosen}"}
+
+
+def test_machine_opens_on_the_load_that_decides(page, folder):
+    light = "extends: reference\nname: light\nloads: {middle: {unbalances: [{mass: 100 g, radius: 236 mm, y: 0 mm, phase: 0 deg}]}}\n"
+    (folder / "light.yaml").write_text(light)
+    page.driver.refresh()
+    ready(page)
+    page.run(
+        "const m = document.querySelector('#machine'); m.value = 'light.yaml'; m.dispatchEvent(new Event('change'))"
+    )
+    page.wait("return document.querySelector('#about').textContent.startsWith('light')")
+    settled(page)
+    shown = page.run(
+        "return [...document.querySelectorAll('#verdict button')].map((b) => b.textContent.split(' ')[0])"
+    )
+    assert page.run("return document.getElementById('load').value") == shown[0] != "middle"
+    settled(page)
+    assert page.errors() == []
+
+
+def test_charts_say_what_they_show(page):
+    settled(page)
+    labels = page.run("return [...document.querySelectorAll('main svg')].map((s) => s.ariaLabel)")
+    (xr,) = (label for label in labels if label.startswith("Xr in mm over time: "))
+    largest = float(re.search(r"largest ([\d.]+) at [\d.]+ s and \d+ rpm", xr)[1])
+    assert largest == pytest.approx(float(page.run(XR)), rel=0.05)
+    assert "; as it was " in xr
+    assert xr.endswith("measured 14.6")
+    assert sum(label.startswith("orbit, ") for label in labels) == 2
+    (tub,) = (label for label in labels if label.startswith("tub in the housing, smallest gap "))
+    assert "rpm: tub" in tub
+    assert any(label.startswith("mount spring left in N over time: ") for label in labels)
+
+
 def test_contact_and_gap_stay_in_view_beside_the_sliders(page):
     verdict = "return document.getElementById('verdict').textContent"
     assert re.match(r"No contact: gap \d+\.\d mm", page.run(verdict))

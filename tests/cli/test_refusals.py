@@ -166,12 +166,9 @@ CASES = {  # command -> arguments, message, more files
     "calibrate --machine short.yaml --targets measured.csv --out out": [
         ("--free none.yaml", "--free: no such file 'none.yaml'"),
         ("--free free.yaml --targets none.csv", "--targets: no such file 'none.csv'"),
-        ("--free free.yaml --method luck", "no method 'luck'"),
         ("--free free.yaml --leave-out bck", "no measured load 'bck' (did you mean 'back'?"),
         ("--free free.yaml --leave-out back,middle", "leaves no load"),
         ("--free free.yaml --leave-out middle,middle", "--leave-out: 'middle' is given twice"),
-        ("--free free.yaml --fewer 2", "--fewer: 2: needs falling numbers"),
-        ("--free free.yaml --fewer one", "--fewer: 'one' is not a whole number"),
         ("--free free.yaml --limit Q=2", "--limit: 'Q' is no load, sensor"),
         ("--free free.yaml --limit 0", "--limit: '0' is not allowed"),
         ("--free free.yaml --weight Q=2", "'Q' is no load, sensor"),

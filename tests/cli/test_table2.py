@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wm_drake.studies.identification.table2 import frequency_trend, mstv_of_c
+from wm_drake.studies.identify.table2 import frequency_trend, mstv_of_c
 
 
 def test_force_grows_with_frequency_because_of_the_dashpots_alone():

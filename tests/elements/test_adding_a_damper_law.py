@@ -68,8 +68,8 @@ from wm_drake.rigs import Harmonic, damper_bench, force_loops, measures_of
 from wm_drake.parameters.loop_files import MeasuredLoop
 from wm_drake.rigs.measured import measured_motion
 from wm_drake.studies.fitting.methods import least_squares
-from wm_drake.studies.identification.models import Given, damper_model
-from wm_drake.studies.identification.problem import fit_problem
+from wm_drake.studies.identify.models import Given, damper_model
+from wm_drake.studies.identify.problem import fit_problem
 from both_engines import difference
 from machines_of_each_kind import changed
 

@@ -29,7 +29,7 @@ from wm_drake.parameters.files import machine_yaml
 from wm_drake.parameters.keys import quantities
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.runs import simulate
-from wm_drake.studies.description.schema import Description
+from wm_drake.studies.machine_show.schema import Description
 from wm_drake.studies.modes.linearisation import Linearisation
 from wm_drake.systems.element_system import ElementSystem
 

@@ -37,8 +37,8 @@ try:
 except Exception as error:
     fault = f"{type(error).__name__}: {error}"
 print(json.dumps({
-    "same": here.shown[0].frame.equals(there.shown[0].frame),
-    "rows": len(here.shown[0].frame),
+    "same": here.to_dataframe().equals(there.to_dataframe()),
+    "rows": len(here.to_dataframe()),
     "schema": mine.UNBALANCE_AMPLITUDE.options.model_json_schema()["properties"],
     "fault": fault,
 }))
@@ -100,7 +100,7 @@ def test_found_by_an_entry_point_it_is_a_command_with_help_json_and_page(folder)
     table = pd.read_csv(folder / "out" / "amplitudes.csv")
     assert table["Xr_mm"].tolist() == pytest.approx([row["Xr_mm"] for row in rows], rel=1e-5)
     page = (folder / "out" / "report.html").read_text(encoding="utf-8")
-    assert printed["summary"] in page
+    assert printed["answer"] in page
     assert "data-picture" in page
     made = json.loads((folder / "out" / "run.json").read_text())
     assert (made["command"], made["options"]["count"]) == (f"study {NAME}", 3)

@@ -34,31 +34,26 @@ class UnbalanceTask(Task):
 
     def run(self, executor):
         """Run all cases in one batch."""
-        import pandas as pd
+        from wm_drake.parameters.units import Unit
+        from wm_drake.report.labelled import LabelledTable
+        from wm_drake.report.quantity import Quantity, shown
+        from wm_drake.studies.answer import Answer, Part, diverged_runs
 
-        from wm_drake.studies.table_result import ShownTable, TableResult
-
-        table = executor.simulate(self.machine, ("amplitudes",), self.cases, "masses")
-        sensors = [str(name) for name in table.sensor.values]
+        runs = executor.simulate(self.machine, ("amplitudes",), self.cases, "masses")
         masses = [sum(u.mass for u in case.load.unbalances) for case in self.cases]
-        frame = pd.DataFrame({"mass_kg": masses})
-        for index, sensor in enumerate(sensors):
-            frame[f"{sensor}_mm"] = 1e3 * table.amplitude.values[:, index]
-        per_kg = frame[f"{sensors[0]}_mm"] / frame["mass_kg"]
-        name = self.machine.parameters.name
-        return TableResult(
-            f"Amplitude against unbalance of machine {name}",
+        mass = Quantity("mass", Unit("kg", "kg")).variable("mass", masses)
+        data = runs[["amplitude"]].rename(run="mass").assign_coords(mass=mass)
+        per_kg = shown(data.amplitude[:, 0]) / masses
+        caption = "Amplitude of each sensor over the mass of the unbalance."
+        table = LabelledTable("amplitudes", data, "Amplitudes", caption, across="sensor")
+        return Answer(
+            f"Amplitude against unbalance of machine {self.machine.parameters.name}",
+            f"Sensor {data.sensor.values[0]} moves {per_kg[0]:.1f} mm for each kg of a small "
+            f"unbalance, {per_kg[-1]:.1f} mm of the largest.",
             self.machine.parameters,
-            f"Sensor {sensors[0]} moves {per_kg.iloc[0]:.1f} mm for each kg of a small unbalance, "
-            f"{per_kg.iloc[-1]:.1f} mm of the largest.",
-            (ShownTable("Amplitudes", "Largest amplitude of each sensor.", frame),),
-            (_figure(frame, sensors),),
-            tuple(f"{case.name}: {text}" for case, text in self._diverged(table)),
+            (Part("Figures", [_plot(data, caption)]), Part("Amplitudes", [table])),
+            diverged=diverged_runs(runs),
         )
-
-    def _diverged(self, table):
-        pairs = zip(self.cases, map(str, table.diverged.values), strict=True)
-        return [(case, text) for case, text in pairs if text]
 
 
 def _scaled(case, factor):
@@ -70,16 +65,17 @@ def _scaled(case, factor):
     return replace(case, name=f"factor {factor:g}", load=load)
 
 
-def _figure(frame, sensors):
+def _plot(data, caption):
     from wm_drake.report.figure import COLOURS, Axis, Figure, Line, Panel
+    from wm_drake.report.quantity import quantity_of, shown
+    from wm_drake.studies.answer import Plot
 
     lines = tuple(
-        Line(frame["mass_kg"], frame[f"{name}_mm"], color=color, key=name)
-        for name, color in zip(sensors, COLOURS, strict=False)
+        Line(shown(data.mass), shown(data.amplitude.sel(sensor=name)), color=color, key=name)
+        for name, color in zip(data.sensor.values.tolist(), COLOURS, strict=False)
     )
-    panel = Panel(marks=lines, x=Axis(label="mass, kg"), y=Axis(label="amplitude, mm"))
-    caption = "Amplitude of each sensor over the mass of the unbalance."
-    return Figure(panels=(panel,), height=360.0), caption, caption
+    x, y = (Axis(label=quantity_of(array).label) for array in (data.mass, data.amplitude))
+    return Plot(Figure(panels=(Panel(marks=lines, x=x, y=y),), height=360.0), caption, caption)
 
 
 UNBALANCE_AMPLITUDE = Study(

@@ -218,7 +218,7 @@ OPTIONS = [
     ("study modes", ["--amplitude", "--load"]),
     ("study response", ["--from", "--to", "--points", "--harmonics", "--rate", "--load", "--workers"]),
     ("record orders record.csv", ["--highest", "--unit"]),
-    ("calibrate --free FREE", ["--fewer", "--targets"]),
+    ("calibrate --free FREE", ["--targets"]),
 ]  # fmt: skip
 VALUED = {
     "--weight": ["middle=", "=", "middle:Xf=", "nowhere="],

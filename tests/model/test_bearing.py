@@ -23,7 +23,7 @@ from wm_drake.parameters import (
 )
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.runs import simulate
-from wm_drake.studies.description.description import natural_modes
+from wm_drake.studies.machine_show.description import natural_modes
 
 RUN_UP = SpinProfile(time=(0.0, 3.0), speed=(5.0, 30.0))
 RADIAL, TILTING = 2e5, 5e3  # N/m, N m/rad

@@ -11,7 +11,7 @@ from wm_drake.model.bodies import sdf_path
 from wm_drake.model.build import build_machine
 from wm_drake.model.equilibrium import EQUILIBRIUM_TOLERANCE
 from wm_drake.parameters import Load, Unbalance, load_machine, with_value, with_values
-from wm_drake.studies.description.description import natural_modes
+from wm_drake.studies.machine_show.description import natural_modes
 from wm_drake.systems.speed_source import REFLECTED_INERTIA
 
 

@@ -8,7 +8,7 @@ from wm_drake.errors import InputError
 from wm_drake.model.build import build_machine
 from wm_drake.model.equilibrium import tensions_at
 from wm_drake.parameters import with_value, with_values
-from wm_drake.studies.description.description import describe, oscillating_mass
+from wm_drake.studies.machine_show.description import describe, oscillating_mass
 
 FREE_LENGTH = "spring_types.suspension.free_length"
 

@@ -17,7 +17,7 @@ from wm_drake.parameters import (
     shipped_machines,
     source_of,
 )
-from wm_drake.studies.description.description import natural_modes, oscillating_mass
+from wm_drake.studies.machine_show.description import natural_modes, oscillating_mass
 
 README = SDF_FOLDER / "README.md"
 CARRIED = {"oscillating_group.sdf": 2e-3}

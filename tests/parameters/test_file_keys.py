@@ -5,11 +5,11 @@ import json
 import jsonschema
 import pytest
 from documents import CHECKOUT, HOW_TO, blocks, name_of
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 from ruamel.yaml import YAML
 
 from wm_drake.parameters import MachineParameters, load_machine, quantities
-from wm_drake.parameters.file_keys import file_schema, key_groups
+from wm_drake.parameters.file_keys import file_schema, key_groups, meanings_of
 from wm_drake.parameters.files import machine_tree
 
 MACHINES = sorted((CHECKOUT / "wm_drake" / "data" / "machines").glob("*.yaml"))
@@ -36,6 +36,24 @@ def test_each_key_and_each_group_say_what_they_are():
     ]
     assert silent == []
     assert all(group.about.endswith(".") for group in GROUPS.values())
+
+
+@pytest.mark.parametrize("indentation", ["    ", ""], ids=["up to Python 3.12", "from 3.13 on"])
+def test_meanings_are_read_with_and_without_the_indentation_of_a_docstring(indentation):
+    docstring = f"""A spring.
+
+{indentation}Attributes:
+{indentation}    stiffness, preload: Force by elongation,
+{indentation}        and at rest. [N/m]
+{indentation}    length:
+{indentation}        Unloaded.
+
+{indentation}Drawn in [B].
+"""
+    spring = type("Spring", (BaseModel,), {"__doc__": docstring})
+    both = "Force by elongation, and at rest."
+    expected = {"stiffness": both, "preload": both, "length": "Unloaded."}
+    assert meanings_of(spring) == meanings_of(BaseModel) | expected
 
 
 def test_unit_range_default_and_place_are_those_of_the_type():

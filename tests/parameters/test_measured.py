@@ -3,7 +3,7 @@
 import pytest
 
 from wm_drake.errors import InputError
-from wm_drake.parameters import measured_amplitudes
+from wm_drake.parameters import load_machine, measured_amplitudes, measured_changes
 
 HEADER = "load,gasket,source,Xr,Yr,Zr,Xf,Yf,Zf\n"
 ROW = "middle,yes,experiment,1,2,3.5,4,5,6\n"
@@ -29,6 +29,34 @@ def test_tables_are_put_together(machine):
     assert table.columns.tolist() == HEADER.strip().split(",")
 
 
+def test_change_by_the_gasket_is_the_printed_one_or_that_of_the_amplitudes(machine):
+    without = "middle,no,experiment,2,0,2,2,2,2\n"
+    computed = measured_changes(machine(HEADER + ROW + without)).iloc[0]
+    assert (computed["load"], computed["source"]) == ("middle", "experiment")
+    assert computed[["Xr", "Zr", "Xf"]].tolist() == pytest.approx([-50.0, 75.0, 100.0])
+    assert computed.isna()["Yr"]  # nothing moves without gasket
+    printed = ROW.replace("yes", "change")
+    both = machine(HEADER + ROW + without, HEADER + printed)
+    assert measured_changes(both).iloc[0]["Xr":].tolist() == [1, 2, 3.5, 4, 5, 6]
+    assert "change" not in measured_amplitudes(both)["gasket"].tolist()
+    assert measured_changes(machine(HEADER + ROW)).empty
+
+
+@pytest.mark.parametrize("name", ["reference", "reference_2026_11"])
+def test_printed_changes_are_those_of_the_amplitudes_before_rounding(name):
+    """Check [B] Table 1: each printed percentage lies within the rounding of both amplitudes."""
+    parameters = load_machine(name)
+    table = measured_amplitudes(parameters)
+    experiment = table[table["source"] == "experiment"].set_index(["load", "gasket"])
+    half = 0.05 if name == "reference_2026_11" else 0.025  # half of the last printed digit
+    for row in measured_changes(parameters).to_dict("records"):
+        for sensor in parameters.sensors:
+            one, other = (experiment.loc[(row["load"], word), sensor] for word in ("no", "yes"))
+            low = 100.0 * ((other - half) / (one + half) - 1.0)
+            high = 100.0 * ((other + half) / (one - half) - 1.0)
+            assert low - 0.06 <= row[sensor] <= high + 0.06, (row["load"], sensor)
+
+
 def test_no_tables_give_the_columns_alone(machine):
     table = measured_amplitudes(machine())
     assert table.empty
@@ -43,7 +71,7 @@ def test_no_tables_give_the_columns_alone(machine):
         (HEADER.replace("Zf", "Zg") + ROW, "needs the columns"),
         (HEADER.replace("\n", ",extra\n") + ROW.replace("\n", ",1\n"), "needs the columns"),
         (HEADER + ROW.replace("\n", ",1\n"), "a row has more values than columns"),
-        (HEADER + ROW.replace("yes", "perhaps"), "in the column gasket is neither yes nor no"),
+        (HEADER + ROW.replace("yes", "perhaps"), "'perhaps' in the column gasket is not allowed; allowed are yes, no, change"),
         (HEADER + ROW.replace("3.5", "big"), "not a finite number"),
         (HEADER + ROW.replace("3.5", ""), "not a finite number"),
         (HEADER + ROW.replace("3.5", "inf"), "not a finite number"),

@@ -6,6 +6,7 @@ from wm_drake.model.build import build_machine
 from wm_drake.model.expectations import unusual_springs, unusual_values
 from wm_drake.parameters import load_machine, quantities, with_values
 from wm_drake.parameters.files import shipped_machines
+from wm_drake.parameters.gasket_drawing import load_gasket_drawing
 from wm_drake.parameters.plausibility import RANGES, unusual_numbers, usual_range
 
 
@@ -75,6 +76,7 @@ def test_every_range_belongs_to_a_number_and_has_its_unit(tmp_path):
     (tmp_path / "more.yaml").write_text(MORE)
     machines = map(load_machine, [*shipped_machines(), tmp_path / "more.yaml"])
     units = {key: unit.shown for machine in machines for key, _, unit in quantities(machine)}
+    units |= dict.fromkeys(load_gasket_drawing("folded").sizes, "mm")
     used = {usual: key for key in units if (usual := usual_range(key)) and usual.unit == units[key]}
     assert [usual.pattern for usual in RANGES if usual not in used] == []
 

@@ -8,7 +8,7 @@ from wm_drake.engines.drake import run_drake
 from wm_drake.model.build import build_machine
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.runs import simulate
-from wm_drake.studies.description.description import natural_modes
+from wm_drake.studies.machine_show.description import natural_modes
 
 UNBALANCE = 0.02  # kg: so small that the drive torque couples pitch into translation by < 1e-3
 RADIUS = 0.25  # m

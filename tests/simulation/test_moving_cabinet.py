@@ -21,7 +21,7 @@ from wm_drake.simulation.measures.record import walk_of
 from wm_drake.simulation.records import as_record
 from wm_drake.simulation.runs import DivergenceWarning, simulate
 from wm_drake.studies.modes.study import modes, three_linearisations
-from wm_drake.studies.steady.response import steady_response
+from wm_drake.studies.response.response import steady_response
 
 RUN_UP = SpinProfile(time=(0.0, 1.0, 12.0, 15.0), speed=(0.0, 5.0, 24.0, 24.0))
 SHORT = SpinProfile(time=(0.0, 0.5, 2.0), speed=(4.0, 8.0, 20.0))

@@ -14,8 +14,8 @@ from wm_drake.parameters.measured import DESIGN, NamedValue
 from wm_drake.parameters.variation import number_at
 from wm_drake.simulation.cases import case_of
 from wm_drake.simulation.runs import simulate
-from wm_drake.studies.calibration.response_targets import ComputedResponses, response_targets_of
-from wm_drake.studies.calibration.targets import targets_of
+from wm_drake.studies.calibrate.response_targets import ComputedResponses, response_targets_of
+from wm_drake.studies.calibrate.targets import targets_of
 from wm_drake.studies.spin.comparison import steady_amplitudes, steady_window
 
 R_GASKET = 0.18

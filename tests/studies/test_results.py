@@ -8,13 +8,13 @@ from wm_drake.errors import InputError
 
 @pytest.fixture(scope="module")
 def result():
-    """Return a quick result with three tables."""
+    """Return a quick result with four tables."""
     return wm.run_study("drive", load=["middle"], quick=True, quiet=True)
 
 
 def test_table_is_the_first_one_or_the_named_one(result):
-    assert result.to_dataframe().equals(result.tables()["thresholds"])
-    assert result.to_dataframe("map").equals(result.tables()["map"])
+    assert result.to_dataframe().equals(result.tables()["map"])
+    assert result.to_dataframe("thresholds").equals(result.tables()["thresholds"])
     with pytest.raises(InputError, match=r"no table 'mapp' .*did you mean 'map'"):
         result.to_dataframe("mapp")
 
@@ -29,5 +29,5 @@ def test_plot_is_a_figure_of_the_page(result):
 
 def test_notebook_shows_each_table_under_its_name(result):
     shown = result._repr_html_()
-    assert [shown.count(f"<h4>{name}</h4>") for name in result.tables()] == [1, 1, 1]
-    assert shown.count("<table") == 3
+    assert [shown.count(f"<h4>{name}</h4>") for name in result.tables()] == [1, 1, 1, 1]
+    assert shown.count("<table") == 4

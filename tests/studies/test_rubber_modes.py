@@ -11,9 +11,9 @@ from wm_drake.model.build import build_machine
 from wm_drake.parameters import load_machine
 from wm_drake.studies.modes.linearisation import Linearisation
 from wm_drake.studies.modes.shapes import ANGLE_ARM
-from wm_drake.studies.steady.balance import HarmonicBalance
-from wm_drake.studies.steady.response import branch_of, settled_trajectory, trajectory_of_period
-from wm_drake.studies.steady.series import Series
+from wm_drake.studies.response.balance import HarmonicBalance
+from wm_drake.studies.response.response import branch_of, settled_trajectory, trajectory_of_period
+from wm_drake.studies.response.series import Series
 
 pytestmark = pytest.mark.slow
 REFERENCE = load_machine("reference")

@@ -38,6 +38,34 @@ def test_each_number_has_a_part_of_the_machine_and_words(machines, name):
     assert not [text for text in words if "_" in text or "frames" in text]
 
 
+@pytest.mark.parametrize("name", ["reference", "free_stroke", "rodrigues_2010"])
+def test_both_ends_of_each_slider_are_allowed(machines, name):
+    machine = machines.open(name)
+    for slider in machine.sliders.values():
+        if not slider.needs:
+            for end in (slider.low, slider.high):
+                machine.moved({slider.key: f"{end!r} {slider.unit.label}"})
+
+
+def test_number_that_cannot_be_moved_alone_has_no_slider_and_comes_last(machines):
+    machine = machines.open("reference")
+    alone = [number for number in machine.for_page()["numbers"] if not number["needs"]]
+    others = machine.for_page()["numbers"][len(alone) :]
+    keys = {number["key"] for number in others if number["part"] == "gasket"}
+    axes = [f"{part}_{axis}" for part in ("force", "torque") for axis in "xyz"]
+    assert {f"gasket.dahl_{axis}" for axis in axes} < keys
+    assert all("dahl" in key or "maxwell" in key for key in keys)
+    (force,) = (number for number in others if number["key"] == "gasket.dahl_force_x")
+    assert force["needs"] == "dahl_displacement_x: must be above 0 where dahl_force_x is"
+    both = {"gasket.dahl_force_x": "5 N", "gasket.dahl_displacement_x": "1 mm"}
+    assert machine.moved(both).gasket.dahl_force_x == 5.0
+
+
+def test_time_of_a_profile_stays_between_its_neighbours(machines):
+    slider = machines.open("reference").sliders["profile.time.1"]
+    assert 0.0 < slider.low < slider.high < 70.0
+
+
 def test_folders_and_other_files_are_not_listed(machines):
     (machines.folder / "folder.yaml").mkdir()
     (machines.folder / "notes.txt").write_text("")

@@ -17,14 +17,14 @@ from typing import Any
 import xarray as xr
 
 from wm_drake.batch.ledger import Ledger, Result
-from wm_drake.batch.many import as_table, simulate_many
-from wm_drake.batch.remembered import run_keys, sources_version
+from wm_drake.batch.many import BatchOptions, simulate_many
+from wm_drake.batch.remembered import keyed, sources_version
+from wm_drake.batch.run_table import RunTable
 from wm_drake.errors import WmDrakeError, input_error, shortened
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters
 from wm_drake.simulation.cases import Case, notice_jumping_friction
-from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.steps import checked_step
 
 CASES_PER_WORK_ITEM = 32
@@ -165,21 +165,23 @@ def simulate_on_cluster(
     notice_jumping_friction(machine.parameters)
     distinct = tuple(dict.fromkeys(measures))
     step = checked_step(machine.parameters, step)
-    names: list[str] = []
-    keys: list[str] = []
+    options = BatchOptions(distinct, step)
+    table = RunTable(machine.parameters, distinct)
+    running: dict[str, list[tuple[int, str]]] = {}  # numbers and names of the cases by their keys
     done = 0
 
     def missing() -> Iterator[tuple[str, Case]]:
         nonlocal done
-        given, hashed = itertools.tee(cases)
-        known = run_keys(machine.parameters, hashed, measures=distinct, step=step)
-        for case, key in zip(given, known, strict=True):
-            names.append(case.name)
-            keys.append(key)
+        for number, (case, key) in enumerate(keyed(machine.parameters, cases, options)):
             if key in ledger:
+                put(ledger.get(key), number, case.name)
                 done += 1
             else:
+                running.setdefault(key, []).append((number, case.name))
                 yield key, case
+
+    def put(result: Result, number: int, name: str) -> None:
+        table.put(number, name, result.values, result.note)
 
     queue = missing()
     work_items: Iterator[tuple[tuple[str, Case], ...]] = iter(
@@ -199,27 +201,23 @@ def simulate_on_cluster(
 
     in_flight = WORK_ITEMS_PER_THREAD * max(1, sum(client.nthreads().values()))
     with _cluster_errors():
-        running = as_completed(
+        ended = as_completed(
             [send(work_item) for work_item in itertools.islice(work_items, in_flight)],
             loop=client.loop,
         )
-        for future in _as_they_end(running, client):
+        for future in _as_they_end(ended, client):
             results = future.result()
             ledger.put_all(results)
+            for key, result in results.items():
+                for number, name in running.pop(key, ()):
+                    put(result, number, name)
             done += len(results)
             progress(done)
             for work_item in itertools.islice(work_items, 1):
-                running.add(send(work_item))
-    progress(len(keys))
-    rows = {}
-    for number, (name, key) in enumerate(zip(names, keys, strict=True)):
-        result = ledger.get(key)
-        rows[number] = (
-            name,
-            result.note,
-            [result.values[n] for measure in distinct for n in MEASURES[measure].names],
-        )
-    return as_table(machine.parameters, distinct, rows)
+                ended.add(send(work_item))
+    data = table.dataset()
+    progress(data.sizes["run"])
+    return data
 
 
 def map_on_cluster(

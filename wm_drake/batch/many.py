@@ -2,26 +2,22 @@
 
 import os
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from typing import Any
+from dataclasses import dataclass
 
-import numpy as np
 import xarray as xr
 
+from wm_drake.batch.run_table import RunTable
 from wm_drake.batch.runs import Runner, RunResult
 from wm_drake.batch.work_items import Preparation
 from wm_drake.engines.memory import RECORDS_OF_BATCH
-from wm_drake.errors import input_error
 from wm_drake.model.build import AnyMachine, machine_of
-from wm_drake.model.scene import Scene
-from wm_drake.parameters import MachineParameters
-from wm_drake.parameters.types import FloatArray
+from wm_drake.model.machine import Machine
 from wm_drake.simulation.cases import Case, case_of, notice_jumping_friction
 from wm_drake.simulation.feet import cabinet_of
 from wm_drake.simulation.first_call import compile_in_two_processes
-from wm_drake.simulation.measures import MEASURES, Variable
-from wm_drake.simulation.measures.labels import LABELS
+from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.steps import checked_integrator, checked_step
 
 AHEAD = 3
@@ -29,9 +25,6 @@ AHEAD = 3
 
 PAUSE = 2e-5
 """Pause after each case that is prepared. [s]"""
-
-_ALWAYS = ("axis", "sensor", "mount")
-"""Dimensions whose labels every table has."""
 
 
 class SimulationInterrupted(KeyboardInterrupt):
@@ -91,99 +84,73 @@ def simulate_many(
         {'run': 2, 'sensor': 6}
     """
     machine = machine_of(machine)
-    compile_in_two_processes(machine.parameters)
-    chosen = tuple(dict.fromkeys(measures))
-    if any("feet" in MEASURES.find(name, key="measures").needs for name in chosen):
-        cabinet_of(machine.parameters)
-    step = checked_step(machine.parameters, step)
-    scheme = checked_integrator(machine.parameters, integrator)
-    notice_jumping_friction(machine.parameters)
-    results: dict[int, tuple[str, str, list[FloatArray]]] = {}
+    chosen = tuple(MEASURES.find(name, key="measures").name for name in dict.fromkeys(measures))
     parameters = machine.parameters
     listed = (case_of(parameters, case) if isinstance(case, str) else case for case in cases)
+    table = RunTable(parameters, chosen)
+    done = 0
 
     def collect(runs: list[RunResult]) -> None:
+        nonlocal done
         for run in runs:  # fill the table first: the callbacks may raise
-            results[run.number] = (run.case.name, run.diverged, list(run.values.values()))
+            table.put(run.number, run.case.name, run.values, run.diverged)
+        done += len(runs)
         for run in runs:
             finished(run)
-        progress(len(results))
+        progress(done)
 
+    options = BatchOptions(chosen, step, integrator, histories, workers)
     try:
-        runner = Runner(machine.parameters, chosen, histories, machine.cache.scenes)
-        threads = workers or os.cpu_count() or 1
-        at_once = threads * (RECORDS_OF_BATCH if histories else 1.0)
-        preparation = Preparation(machine, step, scheme, at_once)
-        _run_all(preparation, runner, listed, threads, collect)
+        pairs = run_cases(machine, listed, options, collect)
     except KeyboardInterrupt:
-        raise SimulationInterrupted(as_table(machine.parameters, chosen, results)) from None
-    pairs = runner.scenes[0].pair_names() if runner.scenes else None
-    machine.cache.scenes.extend(runner.scenes)
-    return as_table(machine.parameters, chosen, results, pairs)
+        raise SimulationInterrupted(table.dataset()) from None
+    return table.dataset(pairs)
 
 
-def as_table(
-    parameters: MachineParameters,
-    measures: tuple[str, ...],
-    results: dict[int, tuple[str, str, list[FloatArray]]],
-    pairs: Sequence[str] | None = None,
-) -> xr.Dataset:
-    """Return the table of runs that `simulate_many` describes.
+@dataclass(frozen=True)
+class BatchOptions:
+    """How `run_cases` runs; see `simulate_many`."""
+
+    measures: tuple[str, ...]
+    step: float | None = None
+    integrator: str | None = None
+    histories: bool = False
+    workers: int | None = None
+
+
+def run_cases(
+    machine: Machine,
+    cases: Iterable[Case],
+    options: BatchOptions,
+    collect: Callable[[list[RunResult]], None],
+) -> list[str] | None:
+    """Run cases and pass finished runs on; nothing of them is kept.
 
     Args:
-        parameters: Machine, for the names of the sensors.
-        measures: Names of measures, keys of `MEASURES`.
-        results: For each number of a run: name of the case, text of `diverged`, and the values of
-            the variables that the measures have in `MEASURES`, in this order.
-        pairs: Names of the pairs of shapes, if they are known already.
+        collect: Called with the runs of a batch when they have ended.
+
+    Returns:
+        Names of the pairs of shapes, if they are known.
 
     Raises:
-        InputError: the runs have different numbers of regions.
+        InputError: a case or an option is wrong.
+        KeyboardInterrupt: Ctrl-C was pressed; `collect` has got what had ended.
     """
-    numbers = sorted(results)
-    variables = [variable for name in measures for variable in MEASURES[name].variables]
-    used = {dim for variable in variables for dim in variable.dims}
-    labels: dict[str, Any] = {
-        "run": numbers,
-        "case": ("run", [results[number][0] for number in numbers]),
-    }
-    for dim in (*_ALWAYS, "foot", *sorted(used - {"region", "pair"})):
-        labels[dim] = list(LABELS[dim](parameters, parameters.profile))
-    if not parameters.cabinet:
-        del labels["foot"]
-    if "region" in used:
-        labels["region"] = range(_region_count(variables, results))
-    if "pair" in used:
-        labels["pair"] = list(pairs) if pairs is not None else Scene(parameters).pair_names()
-    columns = {}
-    for index, variable in enumerate(variables):
-        values = np.reshape(
-            [results[number][2][index] for number in numbers],
-            [len(numbers), *(len(labels[dim]) for dim in variable.dims)],
-        )
-        attributes = {"units": variable.units, "long_name": variable.about}
-        columns[variable.name] = (("run", *variable.dims), values, attributes)
-    diverged = np.array([results[number][1] for number in numbers], dtype=object)
-    return xr.Dataset({**columns, "diverged": ("run", diverged)}, labels)
-
-
-def _region_count(
-    variables: Sequence[Variable], results: dict[int, tuple[str, str, list[FloatArray]]]
-) -> int:
-    """Return the number of regions, which must be the same for all runs.
-
-    Raises:
-        InputError: the runs have different numbers of regions.
-    """
-    first = next(at for at, variable in enumerate(variables) if "region" in variable.dims)
-    counts = {len(values[first]) for _, _, values in results.values()}
-    if len(counts) > 1:
-        raise input_error(
-            f"the profiles have {' and '.join(map(str, sorted(counts)))} regions; "
-            "all runs of one table need the same number",
-            key="profile",
-        )
-    return counts.pop() if counts else 0
+    parameters = machine.parameters
+    compile_in_two_processes(parameters)
+    if any("feet" in MEASURES[name].needs for name in options.measures):
+        cabinet_of(parameters)
+    step = checked_step(parameters, options.step)
+    scheme = checked_integrator(parameters, options.integrator)
+    notice_jumping_friction(parameters)
+    runner = Runner(parameters, options.measures, options.histories, machine.cache.scenes)
+    threads = options.workers or os.cpu_count() or 1
+    at_once = threads * (RECORDS_OF_BATCH if options.histories else 1.0)
+    preparation = Preparation(machine, step, scheme, at_once)
+    _run_all(preparation, runner, cases, threads, collect)
+    pairs = runner.scenes[0].pair_names() if runner.scenes else None
+    machine.cache.scenes.extend(runner.scenes)
+    return pairs
 
 
 def _with_pauses(cases: Iterable[Case]) -> Iterator[Case]:

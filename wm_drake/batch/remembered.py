@@ -9,13 +9,13 @@ from pathlib import Path
 import xarray as xr
 
 from wm_drake.batch.ledger import Ledger, Result, key_of
-from wm_drake.batch.many import as_table, simulate_many
+from wm_drake.batch.many import BatchOptions, SimulationInterrupted, run_cases
+from wm_drake.batch.run_table import RunTable
 from wm_drake.batch.runs import RunResult
 from wm_drake.model.bodies import sdf_path
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters
 from wm_drake.simulation.cases import Case
-from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.records import versions
 from wm_drake.simulation.steps import checked_step
 
@@ -110,58 +110,46 @@ def simulate_remembered(
         SimulationInterrupted: Ctrl-C was pressed.
         LedgerError: the ledger cannot be written to, or it is damaged.
     """
-    distinct = tuple(dict.fromkeys(measures))
-    names: list[str] = []
-    keys: list[str] = []
-    to_run: list[int] = []  # numbers of the cases that are run, in the order of running
-    done = 0
+    options = BatchOptions(tuple(dict.fromkeys(measures)), step, workers=workers)
+    table = RunTable(machine.parameters, options.measures)
+    running: dict[int, tuple[int, str]] = {}  # number and key of each case that is run
+    order, done = itertools.count(), 0
 
     def missing() -> Iterator[Case]:
         nonlocal done
-        given, hashed = itertools.tee(cases)
-        known = run_keys(machine.parameters, hashed, measures=distinct, step=step)
-        for case, key in zip(given, known, strict=True):
-            names.append(case.name)
-            keys.append(key)
+        for number, (case, key) in enumerate(keyed(machine.parameters, cases, options)):
             if key in ledger:
+                result = ledger.get(key)
+                table.put(number, case.name, result.values, result.note)
                 done += 1
                 progress(done)
             else:
-                to_run.append(len(keys) - 1)
+                running[next(order)] = number, key
                 yield case
 
-    ended: dict[str, Result] = {}  # finished since the last call of `store`
-
-    def keep(run: RunResult) -> None:
-        ended[keys[to_run[run.number]]] = Result(run.values, run.diverged)
-
-    def store(_finished: int) -> None:
+    def store(runs: list[RunResult]) -> None:
         nonlocal done
-        together = dict(ended)  # runs that end together are stored together
-        ended.clear()
-        ledger.put_all(together)
-        computed.update(together)
-        for _ in together:
+        places = [running.pop(run.number) for run in runs]
+        # runs that end together are stored together
+        ledger.put_all(
+            {key: Result(r.values, r.diverged) for (_, key), r in zip(places, runs, strict=True)}
+        )
+        for (number, _), run in zip(places, runs, strict=True):
+            table.put(number, run.case.name, run.values, run.diverged)
             done += 1
             progress(done)
 
-    computed: dict[str, Result] = {}
-    table = simulate_many(
-        machine,
-        missing(),
-        measures=distinct,
-        step=step,
-        workers=workers,
-        progress=store,
-        finished=keep,
-    )
-    rows = {}
-    for number, (name, key) in enumerate(zip(names, keys, strict=True)):
-        result = computed[key] if key in computed else ledger.get(key)
-        rows[number] = (
-            name,
-            result.note,
-            [result.values[n] for measure in distinct for n in MEASURES[measure].names],
-        )
-    pairs = table.pair.values.tolist() if "pair" in table.coords and computed else None
-    return as_table(machine.parameters, distinct, rows, pairs)
+    try:
+        pairs = run_cases(machine, missing(), options, store)
+    except KeyboardInterrupt:
+        raise SimulationInterrupted(table.dataset()) from None
+    return table.dataset(pairs)
+
+
+def keyed(
+    parameters: MachineParameters, cases: Iterable[Case], options: BatchOptions
+) -> Iterator[tuple[Case, str]]:
+    """Yield each case with its key, as `run_keys`; one case at a time is taken."""
+    given, hashed = itertools.tee(cases)
+    keys = run_keys(parameters, hashed, measures=options.measures, step=options.step)
+    return zip(given, keys, strict=True)

@@ -17,7 +17,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from wm_drake.cli.common import HELP_OPTIONS
-from wm_drake.errors import Problem, WmDrakeError, reason_of
+from wm_drake.errors import Problem, WmDrakeError, libraries_named, reason_of
 
 COMMANDS = {
     "verdict": (
@@ -29,7 +29,7 @@ COMMANDS = {
         "Simulate the run-up of the drum through the resonances, and report the motion of the tub.",
     ),
     "calibrate": (
-        "wm_drake.studies.calibration.options:CALIBRATE",
+        "wm_drake.studies.calibrate.options:CALIBRATE",
         "Fit unknown numbers of a machine to measured amplitudes, within bounds and with priors.",
     ),
     "studio": (
@@ -42,7 +42,7 @@ COMMANDS = {
         "Compute a gasket from its drawing.",
     ),
     "identify": (
-        "wm_drake.studies.identification.options:IDENTIFY",
+        "wm_drake.studies.identify.options:IDENTIFY",
         "Find the numbers of a component from measured loops.",
     ),
     "machine": ("wm_drake.cli.machine:app", "List, start, check and show machine files."),
@@ -146,7 +146,8 @@ def main() -> None:
     gc.set_threshold(1_000_000, 20, 20)
     atexit.register(gc.freeze)  # the end of Python would look through them once more
     try:
-        app()
+        with libraries_named():
+            app()
     except WmDrakeError as error:
         typer.echo(str(error), err=True)
     except OSError as error:  # a disk that is full, a folder that cannot be read

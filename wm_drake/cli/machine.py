@@ -61,7 +61,7 @@ def _check(file: str, strict: bool, draw: Callable[[str], None] | None) -> None:
     parameters = load_parameters(file, None)
     machine, unusual = built_with_problems(file, parameters)
     if draw is not None:
-        from wm_drake.studies.description.page import machine_page
+        from wm_drake.studies.machine_show.page import machine_page
 
         draw(machine_page(machine, [str(problem) for problem in unusual]))
     if unusual and strict:
@@ -118,7 +118,7 @@ def machine_show(
     """
     from wm_drake.model.build import build_machine
     from wm_drake.simulation.steps import checked_step
-    from wm_drake.studies.description.description import as_text, describe
+    from wm_drake.studies.machine_show.description import as_text, describe
 
     parameters = load_parameters(file, sets)
     with located_in(file):
@@ -142,7 +142,7 @@ def machine_schema(
     if of == "file":
         from wm_drake.parameters.file_keys import file_schema as schema
     elif of == "description":
-        from wm_drake.studies.description.schema import description_schema as schema
+        from wm_drake.studies.machine_show.schema import description_schema as schema
     else:
         raise input_error(
             f"no schema of '{shortened(of, 40)}'; allowed are file, description",

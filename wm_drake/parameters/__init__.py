@@ -63,7 +63,7 @@ from wm_drake.parameters.machine import (
     MachineParameters,
     Sensor,
 )
-from wm_drake.parameters.measured import measured_amplitudes
+from wm_drake.parameters.measured import measured_amplitudes, measured_changes
 from wm_drake.parameters.published import PublishedResults, PublishedTerm, published_results
 from wm_drake.parameters.spin import Load, SpinProfile, Unbalance
 from wm_drake.parameters.variation import Change, Variation, apply, variation_of
@@ -123,6 +123,7 @@ __all__ = [
     "machine_path",
     "machine_yaml",
     "measured_amplitudes",
+    "measured_changes",
     "place_of",
     "published_results",
     "quantities",

@@ -113,8 +113,12 @@ def _title(model: type[BaseModel]) -> str:
 
 
 def _about(model: type[BaseModel]) -> str:
-    text = inspect.cleandoc(model.__doc__ or "").split("\nAttributes:")[0]
-    return " ".join(text.split())
+    return " ".join(_docstring(model).partition("\nAttributes:")[0].split())
+
+
+def _docstring(model: type) -> str:
+    """Return the docstring of a type without its indentation, which Python 3.13 takes away too."""
+    return inspect.cleandoc(model.__doc__ or "")
 
 
 def _entry(name: str, field: FieldInfo, meaning: str) -> FileKey:
@@ -161,21 +165,21 @@ def meanings_of(model: type[BaseModel]) -> dict[str, str]:
     """Return what the docstrings of a type and of its bases say about each field."""
     texts: dict[str, str] = {}
     for base in reversed(model.__mro__):
-        texts |= _attributes(base.__doc__ or "")
+        texts |= _attributes(_docstring(base))
     return texts
 
 
 def _attributes(docstring: str) -> dict[str, str]:
-    """Return the section "Attributes" of a Google docstring: text by name."""
+    """Return the section "Attributes" of a Google docstring without indentation: text by name."""
     _, _, section = docstring.partition("Attributes:\n")
     texts: dict[str, str] = {}
     names: list[str] = []
     for line in section.splitlines():
-        entry = re.match(r"^ {8}(\w[\w, ]*?):( .*)?$", line)
+        entry = re.match(r"^ {4}(\w[\w, ]*?):( .*)?$", line)
         if entry:
             names = [name.strip() for name in entry[1].split(",")]
             texts |= dict.fromkeys(names, (entry[2] or "").strip())
-        elif line.startswith(" " * 12):
+        elif line.startswith(" " * 8):
             texts |= {name: f"{texts[name]} {line.strip()}".strip() for name in names}
         elif line.strip():
             break

@@ -14,9 +14,10 @@ from pydantic import Field, ValidationError, model_validator
 
 from wm_drake.errors import InputError, InputNotice
 from wm_drake.parameters import units as u
-from wm_drake.parameters.dxf import DxfLine, corners_of
+from wm_drake.parameters.dxf import MOST_CORNERS, DxfLine, corners_of_line
 from wm_drake.parameters.elements import Frozen
 from wm_drake.parameters.files import read_model, read_yaml
+from wm_drake.parameters.plausibility import unusual_values
 from wm_drake.parameters.problems import problems_of
 from wm_drake.parameters.text_files import DATA, ShippedFiles
 from wm_drake.parameters.types import FloatArray
@@ -277,7 +278,7 @@ class GasketDrawing(_Described):
         contact: Whether folds hold each other off; without it they may overlap.
     """
 
-    meridian: tuple[MeridianPoint, ...] = Field(max_length=60)
+    meridian: tuple[MeridianPoint, ...] = Field(max_length=MOST_CORNERS)
 
     @model_validator(mode="after")
     def _can_be_built(self) -> "GasketDrawing":
@@ -314,6 +315,16 @@ class GasketDrawing(_Described):
                 f"({1e3 * p[0]:.1f}, {1e3 * p[1]:.1f}) mm" for p in (first, second)
             )
             raise ValueError(f"meridian: the wall crosses itself, at radius and y {places}")
+
+    @property
+    def sizes(self) -> dict[str, tuple[float, ...]]:
+        """Sizes that have a usual range, by the keys of `plausibility.RANGES`. [m]"""
+        along = [point.y for point in self.meridian]
+        return {
+            "meridian.radius": tuple(point.radius for point in self.meridian),
+            "meridian.height": (max(along) - min(along),),
+            "meridian.thickness": tuple(point.thickness for point in self.meridian),
+        }
 
     def _turn(self, number: int) -> float:
         """Return the angle by which the line turns at a corner. [rad]"""
@@ -383,18 +394,25 @@ class GasketDrawing(_Described):
 
 
 def load_gasket_drawing(name_or_path: str | Path) -> GasketDrawing:
-    """Read a drawing of a gasket.
+    """Read a drawing of a gasket, with a notice for each kind of size that is unusual.
 
     Args:
         name_or_path: Name of a shipped drawing, or path of a YAML file.
     """
     path = GASKETS.path(name_or_path)
-    if "dxf" not in read_yaml(path):
-        return read_model(GasketDrawing, path)
+    drawing = _of_dxf(path) if "dxf" in read_yaml(path) else read_model(GasketDrawing, path)
+    for key, values in drawing.sizes.items():
+        for remark in unusual_values(key, values, u.Unit("m", "mm")):
+            warnings.warn(str(replace(remark, where=str(path))), InputNotice, stacklevel=2)
+    return drawing
+
+
+def _of_dxf(path: Path) -> GasketDrawing:
+    """Return the drawing of a YAML file that names a DXF file."""
     read = read_model(_DxfDrawing, path)
     meridian = [
         {"radius": radius, "y": y, "thickness": read.dxf.thickness, "fillet": fillet}
-        for radius, y, fillet in corners_of(read.dxf, path.parent)
+        for radius, y, fillet in corners_of_line(read.dxf, path.parent)
     ]
     try:
         described = read.model_dump(exclude={"dxf"})

@@ -8,6 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from wm_drake.errors import input_error
 from wm_drake.parameters.csv_files import finite_numbers, read_csv, read_header, read_note
 from wm_drake.parameters.machine import MachineParameters
@@ -17,6 +19,9 @@ if TYPE_CHECKING:  # slow to import: CSV files
     import pandas as pd
 
 _KEYS = ["load", "gasket", "source"]
+
+CHANGE = "change"
+"""Entry of the column `gasket` in a row with the change of the amplitudes by the gasket. [%]"""
 
 EXPERIMENT = "experiment"
 """Source of measured values; rows with another source are only compared with them."""
@@ -69,12 +74,40 @@ def measured_amplitudes(parameters: MachineParameters) -> "pd.DataFrame":
     """Read the measured amplitudes of a machine.
 
     Returns:
-        All rows of the files of amplitudes in `measured`: load, gasket (yes, no), source, then one
-        column per sensor. [mm]
+        The rows of the files of amplitudes in `measured`: load, gasket (yes, no), source, then one
+        column per sensor. [mm] Rows of changes are left out.
 
     Raises:
         InputError: a file is missing, has other columns, or contains a value that is not a number.
     """
+    table = _amplitudes_and_changes(parameters)
+    return table[table["gasket"] != CHANGE].reset_index(drop=True)
+
+
+def measured_changes(parameters: MachineParameters) -> "pd.DataFrame":
+    """Read the changes of the measured amplitudes by the gasket.
+
+    Returns:
+        A row of each load and source: load, source, then one column per sensor. [%] They are those
+        of a row whose gasket is `CHANGE`, as printed values come from amplitudes before rounding;
+        without one, they follow from the amplitudes with and without gasket ([B] Eq. (1)).
+    """
+    import pandas as pd  # slow to import: CSV files
+
+    sensors, rows = list(parameters.sensors), []
+    for keys, group in _amplitudes_and_changes(parameters).groupby(["load", "source"], sort=False):
+        by_gasket = group.drop_duplicates("gasket").set_index("gasket")[sensors].astype(float)
+        if CHANGE in by_gasket.index:
+            change = by_gasket.loc[CHANGE]
+        elif {"yes", "no"} <= set(by_gasket.index):
+            change = 100.0 * (by_gasket.loc["yes"] / by_gasket.loc["no"] - 1.0)
+        else:
+            continue
+        rows.append([*keys, *change.where(np.isfinite(change))])
+    return pd.DataFrame(rows, columns=["load", "source", *sensors])
+
+
+def _amplitudes_and_changes(parameters: MachineParameters) -> "pd.DataFrame":
     import pandas as pd  # slow to import: CSV files
 
     sensors = list(parameters.sensors)
@@ -168,10 +201,12 @@ def _responses(path: str) -> list[NamedValue]:
     ]
 
 
-def _check_entries(table: "pd.DataFrame", column: str, allowed: tuple[str, str], path: str) -> None:
-    if not set(table[column]) <= set(allowed):
+def _check_entries(table: "pd.DataFrame", column: str, allowed: tuple[str, ...], path: str) -> None:
+    wrong = set(map(str, table[column])) - set(allowed)
+    if wrong:
         raise input_error(
-            f"a value in the column {column} is neither {allowed[0]} nor {allowed[1]}",
+            f"'{min(wrong)}' in the column {column} is not allowed; allowed are "
+            f"{', '.join(allowed)}",
             where=path,
             key="measured",
         )
@@ -179,6 +214,6 @@ def _check_entries(table: "pd.DataFrame", column: str, allowed: tuple[str, str],
 
 def _read(path: str, sensors: list[str]) -> "pd.DataFrame":
     table = read_csv(path, _KEYS + sensors, key="measured", optional=BAND)
-    _check_entries(table, "gasket", ("yes", "no"), path)
+    _check_entries(table, "gasket", ("yes", "no", CHANGE), path)
     values = finite_numbers(table[sensors], path, key="measured")
     return table[_KEYS].assign(**dict(zip(sensors, values.T, strict=True)))

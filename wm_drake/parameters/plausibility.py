@@ -1,4 +1,4 @@
-"""Usual ranges of the numbers of a machine, to find wrong units and slips of the keyboard.
+"""Usual ranges of numbers of a machine or gasket, to find wrong units and slips of the keyboard.
 
 A number outside its range is legal: it is reported as unusual, not refused.
 """
@@ -11,6 +11,7 @@ from fnmatch import fnmatchcase
 from wm_drake.errors import Problem
 from wm_drake.parameters.keys import quantities
 from wm_drake.parameters.machine import MachineParameters
+from wm_drake.parameters.units import Unit
 
 
 @dataclass(frozen=True)
@@ -63,6 +64,9 @@ RANGES = (
     UsualRange("*.rotational_stiffness_?.angle", -45.0, 45.0, "deg"),
     UsualRange("*unbalances.*.mass", 0.0, 5.0, "kg"),
     UsualRange("imperfections.residual_imbalance.mass", 0.0, 0.5, "kg"),
+    UsualRange("meridian.radius", 80.0, 400.0, "mm"),
+    UsualRange("meridian.height", 10.0, 250.0, "mm"),
+    UsualRange("meridian.thickness", 0.5, 8.0, "mm"),
     UsualRange("*.radius", 0.0, 400.0, "mm"),
     UsualRange("*.y", -400.0, 400.0, "mm"),
     UsualRange("imperfections.phase_error", -45.0, 45.0, "deg"),
@@ -84,29 +88,32 @@ def unusual_numbers(
     Args:
         keys: Key paths of the numbers to check, or of entries of them; all if None.
     """
-    remarks = []
+    remarks = list[Problem]()
     chosen = None if keys is None else {whole for k in keys for whole in (k, k.rpartition(".")[0])}
     for key, value, unit in quantities(parameters):
         if chosen is not None and key not in chosen:
             continue
-        usual = usual_range(key)
-        values = value if isinstance(value, tuple) else (value,)
-        # rounding of a converted number must not count as outside
-        shown = [float(f"{unit.from_si(number):.9g}") for number in values]
-        if usual is None or usual.unit != unit.shown:
-            continue
-        outside = [number for number in shown if not usual.low <= number <= usual.high]
-        if outside:
-            name = unit.label
-            remarks.append(
-                Problem(
-                    "",
-                    key,
-                    f"{outside[0]:g} {name} is unusual; usual is {usual.low:g} to {usual.high:g} "
-                    f"{name}",
-                )
-            )
+        remarks += unusual_values(key, value if isinstance(value, tuple) else (value,), unit)
     return _first_of_each_value(remarks)
+
+
+def unusual_values(key: str, values: Iterable[float], unit: Unit) -> list[Problem]:
+    """Return one problem for the first of some numbers that is outside the usual range of a key."""
+    usual = usual_range(key)
+    if usual is None or usual.unit != unit.shown:
+        return []
+    # rounding of a converted number must not count as outside
+    shown = [float(f"{unit.from_si(number):.9g}") for number in values]
+    outside = [number for number in shown if not usual.low <= number <= usual.high]
+    return [
+        Problem(
+            "",
+            key,
+            f"{number:g} {unit.label} is unusual; usual is {usual.low:g} to {usual.high:g} "
+            f"{unit.label}",
+        )
+        for number in outside[:1]
+    ]
 
 
 def usual_range(key: str) -> UsualRange | None:

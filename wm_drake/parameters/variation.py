@@ -79,7 +79,7 @@ class Number:
         return original * value if change is Change.PERCENT else original + value
 
     def at(self, value: float) -> float | Table:
-        """Return the value in SI, or of a curve the one with this stiffness at rest."""
+        """Return the value in SI, or of a curve the one with this nominal stiffness."""
         if isinstance(self.original, Table) and self.nominal:
             return self.original.scaled(value / self.nominal)
         return value

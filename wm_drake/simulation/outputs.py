@@ -200,8 +200,8 @@ def tub_outputs(setup: Setup, trajectory: Trajectory) -> tuple[FloatArray, ...]:
     displacements, springs, dampers, bushings, others = np.split(
         columns, np.cumsum(sizes)[:-1], axis=1
     )
-    bushings = bushings.reshape(len(columns), bushing_count, 6)
-    return displacements, springs, dampers, bushings, others
+    forces = bushings.reshape(len(columns), bushing_count, 6)
+    return displacements, springs, dampers, forces, others
 
 
 def _with_telescopes(

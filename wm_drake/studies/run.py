@@ -3,7 +3,7 @@
 import tempfile
 import time
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ValidationError
 
 from wm_drake.errors import InputError, InputNotice, Problem, input_error
-from wm_drake.report.progress import progress_bar, progress_bars
 from wm_drake.report.provenance import command_line
 from wm_drake.report.terminal import QUIET, say
+from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import (
     build_checked,
     changed_parameters,
@@ -36,14 +36,9 @@ from wm_drake.studies.result_folder import (
 from wm_drake.studies.study import PAGE, STUDIES, Facts, OptionModel, Result, Study, option
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
-    import xarray as xr
-
     from wm_drake.batch.ledger import Ledger
-    from wm_drake.batch.verification import Sample, StepError
     from wm_drake.model.machine import Machine
     from wm_drake.parameters import MachineParameters
-    from wm_drake.simulation.cases import Case
-    from wm_drake.simulation.records import Record
 
 RUNS_KEPT = (
     "all runs are kept, so repeat the command to write the results without running them again"
@@ -90,182 +85,6 @@ class StudyInterrupted(KeyboardInterrupt):
     """Ctrl-C was pressed during a study; the text says what is kept."""
 
 
-@dataclass
-class Executor:
-    """Run cases for a task: on the cores of this computer or on a cluster, with a progress bar.
-
-    Attributes:
-        ledger: Finished runs; None for a study without runs.
-        workers: Number of threads; None for the number of cores.
-        client: Client of a cluster, or None.
-        out: Folder of the results, or None.
-        runs: Number of runs so far.
-    """
-
-    ledger: "Ledger | None" = None
-    workers: int | None = None
-    client: Any = None
-    out: Path | None = None
-    runs: int = 0
-    _sample: "Sample | None" = field(default=None, repr=False)
-    _report: Callable[..., None] | None = field(default=None, repr=False)
-    _reported: int = field(default=0, repr=False)
-
-    def simulate(
-        self,
-        machine: "Machine",
-        measures: tuple[str, ...],
-        cases: "Iterable[Case]",
-        what: str = "runs",
-    ) -> "xr.Dataset":
-        """Run cases that the ledger does not have, and return the table of all.
-
-        The table is that of `wm_drake.simulate_many`, with the step and the integrator of the
-        machine.
-
-        Args:
-            machine: Built machine.
-            measures: Names of measures.
-            cases: Cases.
-            what: Word beside the progress bar.
-        """
-        if self._report is None:
-            listed = list(cases)
-            with progress_bar(len(listed), what) as report:
-                return self._run(machine, measures, listed, report)
-        whole, before = self._report, self._reported
-        table = self._run(machine, measures, cases, lambda done: whole(before + done))
-        self._reported += table.sizes["run"]
-        return table
-
-    def each(
-        self, function: Callable[[Any], Any], items: Sequence[Any]
-    ) -> Iterator[tuple[int, Any]]:
-        """Yield number and result of a function for each item, as they end: here or on a cluster.
-
-        Args:
-            function: Function at the level of a module, for work that is no run of a machine.
-        """
-        if self.client is None:
-            yield from ((number, function(item)) for number, item in enumerate(items))
-            return
-        from wm_drake.batch.cluster import map_on_cluster
-
-        yield from map_on_cluster(function, items, self.client)
-
-    def records(
-        self,
-        machine: "Machine",
-        cases: "Sequence[Case]",
-        keep: "Callable[[int, Record], None]",
-        what: str = "records",
-    ) -> None:
-        """Run cases on this computer and pass the number and the record of each to a function.
-
-        Records are too large for a ledger.
-        """
-        from wm_drake.batch import RunResult, simulate_many
-
-        cases = list(self._sampled(machine, cases))
-
-        def collect(run: RunResult) -> None:
-            assert run.record is not None
-            keep(run.number, run.record)
-
-        with progress_bar(len(cases), what) as report:
-            simulate_many(
-                machine,
-                cases,
-                measures=("extremes",),
-                histories=True,
-                workers=self.workers,
-                progress=report,
-                finished=collect,
-            )
-
-    @contextmanager
-    def progress(self, total: int, what: str = "runs") -> Iterator[Callable[..., None]]:
-        """Show one progress bar, which all calls of `simulate` in the block move together.
-
-        Args:
-            total: Number of runs or steps of the block.
-            what: Word beside the bar.
-
-        Yields:
-            Function to call with the number of finished steps, and with words to show beside it, if
-            the block does not simulate.
-        """
-        with progress_bar(total, what) as report:
-            self._report, self._reported = report, 0
-            try:
-                yield report
-            finally:
-                self._report = None
-
-    @contextmanager
-    def fraction(self, what: str) -> Iterator[Callable[[float], None]]:
-        """Show a progress bar in percent; yield the function to call with the finished fraction.
-
-        Calls of `simulate` in the block show no bar of their own.
-        """
-        with progress_bars([what]) as report:
-            self._report, self._reported = (lambda done: None), 0
-            try:
-                yield lambda done: report(0, done)
-            finally:
-                self._report = None
-
-    @contextmanager
-    def fractions(self, names: Sequence[str]) -> Iterator[Callable[[int, float], None]]:
-        """Show a bar in percent for each name; yield the function of number and fraction."""
-        with progress_bars(names) as report:
-            yield report
-
-    def _run(
-        self,
-        machine: "Machine",
-        measures: tuple[str, ...],
-        cases: "Iterable[Case]",
-        report: Callable[[int], None],
-    ) -> "xr.Dataset":
-        from wm_drake.batch import simulate_remembered
-        from wm_drake.batch.cluster import simulate_on_cluster
-
-        assert self.ledger is not None, "a study that runs cases is declared with has_runs=True"
-        run: Callable[..., xr.Dataset] = partial(simulate_remembered, workers=self.workers)
-        if self.client is not None:
-            run = partial(simulate_on_cluster, client=self.client)
-        sampled = self._sampled(machine, cases)
-        table = run(machine, sampled, self.ledger, measures=measures, progress=report)
-        self.runs += table.sizes["run"]
-        return table
-
-    def _sampled(self, machine: "Machine", cases: "Iterable[Case]") -> "Iterator[Case]":
-        """Yield cases, and keep a sample of them for `step_error`."""
-        for case in cases:
-            self.verify(machine, [case])
-            yield case
-
-    def verify(self, machine: "Machine", cases: "Iterable[Case]") -> None:
-        """Add cases to those of which a sample is run with half the step, after the study."""
-        from wm_drake.batch.verification import Sample
-
-        if self._sample is None:
-            self._sample = Sample()
-        for case in cases:
-            self._sample.add(machine, case)
-
-    def step_error(self) -> "StepError | None":
-        """Return the error of the steps of a sample of the cases; None without cases."""
-        from wm_drake.batch.verification import remembered_step_error
-
-        if self._sample is None:
-            return None
-        if self.ledger is None:
-            return self._sample.step_error()
-        return remembered_step_error(self._sample, self.ledger)
-
-
 @dataclass(frozen=True)
 class Order:
     """A study with all its options.
@@ -306,7 +125,7 @@ def run_study(name: str, machine: Any = None, *, quiet: bool = False, **options:
         >>> import wm_drake as wm
         >>> result = wm.run_study("drive", load=["middle"], quick=True, quiet=True)
         >>> list(result.tables())
-        ['thresholds', 'map', 'estimation']
+        ['map', 'estimation', 'thresholds', 'errors']
     """
     study = STUDIES.find(name)
     several = machine if isinstance(machine, (list, tuple)) else [machine]
@@ -396,7 +215,7 @@ def execute(order: Order) -> tuple[Result, Facts, tuple[str, ...]]:
         wall_s = time.perf_counter() - begin
         warned = (*about_machines, *_warnings(machines, friction_warnings), *not_converged)
         verified = "" if error is None else error.text
-        facts = Facts(order.command, wall_s, warned, step, integrator, verified)
+        facts = Facts(order.command, wall_s, warned, step, integrator, verified, executor.runs)
         files = _written(result, facts, order.run.out, run)
     return result, facts, files
 

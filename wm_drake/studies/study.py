@@ -7,14 +7,18 @@ machine, warns of what no fixed step resolves, opens the ledger, runs cases on a
 cluster with the step and the integrator of the machine, resumes, shows progress, ends on Ctrl-C,
 and writes the result folder, the JSON, the terminal tables, the page and its figures.
 
-A study has three parts, as in `studies/drive`:
+A study has four parts, as in `studies/drive`:
 
     options.py   class DriveOptions(Options) and DRIVE = Study(...), which `SHIPPED` below lists.
                  It is imported for `--help`, so it must not import Drake, pandas, scipy or
                  plotting; `imported` names the task.
-    study.py     class DriveTask(Task): checks the options and runs; class DriveResult(Result). Of
-                 a large study, both are in task.py.
-    page.py      the page: sections of pictures and tables, or a template `page.html` beside it.
+    study.py     the computation: functions that return labelled datasets, whose variables carry
+                 their quantities (`wm_drake.report.quantity`).
+    page.py      what is shown: a function that returns an `Answer` (`wm_drake.studies.answer`).
+                 Files, JSON, terminal, page and notebook follow from it.
+    task.py      class DriveTask(Task): checks the options and runs.
+
+Each imports only those above it.
 
 A task gets an `Executor` and calls it for tables of runs, as often as it needs: once for a plain
 study, many times for an adaptive one. So optimisers of libraries and bisections are written as
@@ -40,7 +44,7 @@ if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
 
     from wm_drake.parameters import MachineParameters
     from wm_drake.report.figure import Figure
-    from wm_drake.studies.run import Executor
+    from wm_drake.studies.executor import Executor
 
 
 def option(default: Any, help_text: str, metavar: str = "", flag: str = "", **limits: Any) -> Any:
@@ -109,9 +113,11 @@ class Facts:
         command: Command line or Python call.
         wall_s: Duration. [s]
         warnings: Warnings of the machine, without those of the result.
-        step: Step size of the compiled engine; 0 without a machine, or with several. [s]
-        integrator: Integrator of the compiled engine.
-        verified: What a sample of the runs gave with half the step; "" without runs.
+        step: Largest step of the compiled engine, as the machine has it; runs may take shorter
+            ones. 0 without a machine, or with several. [s]
+        integrator: Integrator of the compiled engine, as the machine has it.
+        verified: What a sample of the runs gave twice as fine; "" without runs.
+        runs: Number of runs.
     """
 
     command: str = ""
@@ -120,6 +126,7 @@ class Facts:
     step: float = 0.0
     integrator: str = ""
     verified: str = ""
+    runs: int = 0
 
     def rows(self) -> list[tuple[str, str]]:
         """Return the facts as pairs of word and text, for the end of a page."""
@@ -128,7 +135,7 @@ class Facts:
 
         step = f"{1e3 * self.step:g} ms, integrator {self.integrator}"
         return [
-            *([("Step", step)] if self.step else []),
+            *([("Largest step", step)] if self.step else []),
             *([("Check of the step", self.verified)] if self.verified else []),
             ("Versions", ", ".join(f"{name} {text}" for name, text in versions().items())),
             ("Sources", sources_version()),
@@ -315,18 +322,18 @@ class Study:
 
 SHIPPED = (
     "balancer.options:BALANCER",
-    "calibration.options:CALIBRATE",
-    "pareto.options:DESIGN",
+    "calibrate.options:CALIBRATE",
+    "design.options:DESIGN",
     "drive.options:DRIVE",
     "gasket.options:GASKET",
     "gasket_curves.options:GASKET_CURVES",
     "gasket_damping.options:GASKET_DAMPING",
     "gasket_geometry.options:GASKET_GEOMETRY",
     "modes.options:MODES",
-    "steady.options:RESPONSE",
+    "response.options:RESPONSE",
     "spin.options:SPIN",
     "spin_cycle.options:SPIN_CYCLE",
-    "spin_identification.options:SPIN_IDENTIFY",
+    "spin_identify.options:SPIN_IDENTIFY",
     "tolerance.options:TOLERANCE",
     "verdict.options:VERDICT",
 )

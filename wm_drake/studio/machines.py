@@ -123,6 +123,9 @@ NOT_MOVED = ("gravity",)
 ABOUT = {"mm": 50.0, "deg": 45.0}
 """Half width of the slider of a place or an angle, by display unit."""
 
+HALVINGS = 5
+"""How often the way to the end of a slider is halved until the machine allows the end."""
+
 LAST = ("bodies.", "frames.", "cabinet.", "imperfections.", "step")
 """Numbers that are listed behind all others."""
 
@@ -135,11 +138,12 @@ class Slider:
     """A number of a machine with a range, in which a page moves it.
 
     Attributes:
-        number: The number; of a vector, one of its entries; of a curve, its stiffness at rest.
+        number: The number; of a vector, one of its entries; of a curve, its nominal stiffness.
         low, high: Ends of the slider, in the display unit.
         allowed, usual: Ranges; None if there is no usual one.
         source: Where the value comes from.
         is_entry: Whether it is an entry of a vector.
+        needs: Why the machine allows no other value while all others stay, "" if it does.
     """
 
     number: Number
@@ -149,6 +153,7 @@ class Slider:
     usual: UsualRange | None
     source: str
     is_entry: bool
+    needs: str = ""
 
     @property
     def key(self) -> str:
@@ -178,6 +183,8 @@ class Slider:
             last = f"{parents[-2].rstrip('s')} {last.removeprefix('no. ')}"
         if parents and parents[0].endswith("_types"):  # the name of a type does not say its kind
             last = f"{parents[0].removesuffix('_types').replace('_', ' ')} {last}"
+        if self.needs:
+            group = f"{group}, without slider"
         if parents[:1] == ["frames"]:  # a name of a frame is no word
             last, label = f"{group}:", label.removeprefix("position ")
         return {
@@ -193,6 +200,7 @@ class Slider:
             "allowed": self._allowed_in_words(),
             "usual": f"{self.usual.low:g} to {self.usual.high:g}" if self.usual else "",
             "source": self.source,
+            "needs": self.needs,
         }
 
     def _allowed_in_words(self) -> str:
@@ -226,9 +234,9 @@ def _sliders(parameters: MachineParameters) -> Iterator[Slider]:
 
 
 def with_curves(parameters: MachineParameters) -> Iterator[tuple[str, Any, Unit]]:
-    """Yield key path, value [SI] and unit of each number; a curve is its stiffness at rest.
+    """Yield key path, value [SI] and unit of each number; a curve is its nominal stiffness.
 
-    A curve that is flat at rest and beyond has no stiffness and is left out.
+    That is the slope of its first 20 %. A curve that is flat everywhere is left out.
     """
     curves = set()
     for key, value, unit in quantities(parameters):
@@ -286,8 +294,30 @@ class OpenMachine:
             names = sdf_names(plant)
             keys = [f"bodies.{link}.{part}" for link in names.links for part in parts]
             keys += [f"frames.{name}" for name in names.movable_frames]
-            self._sliders.update(sliders_of(with_sdf_values(plant, self.parameters, keys)))
+            sliders = sliders_of(with_sdf_values(plant, self.parameters, keys))
+            possible = [self._possible(slider) for slider in sliders.values()]
+            possible.sort(key=lambda slider: bool(slider.needs))
+            self._sliders.update({slider.key: slider for slider in possible})
         return self._sliders
+
+    def _possible(self, slider: Slider) -> Slider:
+        """Return a slider of which both ends are allowed while all other numbers stay."""
+        value = slider.unit.from_si(float(slider.number.nominal or 0.0))
+        low, _ = self._possible_end(slider, value, slider.low)
+        high, needs = self._possible_end(slider, value, slider.high)
+        return replace(slider, low=low, high=high, needs="" if low < high else needs)
+
+    def _possible_end(self, slider: Slider, value: float, end: float) -> tuple[float, str]:
+        """Return the farthest allowed end on the way to one, which is halved, and what is wrong."""
+        message = ""
+        for _ in range(HALVINGS):
+            try:
+                step = (end - value) / slider.unit.from_si(1.0)
+                self.moved_by(self.parameters, slider.key, step)
+                return end, message
+            except InputError as error:
+                end, message = 0.5 * (end + value), error.problems[0].message
+        return value, message
 
     def preparation(self, parameters: MachineParameters) -> Preparation:
         """Return the preparation of runs with the step and the integrator of some parameters."""

@@ -9,19 +9,22 @@ from wm_drake.errors import InputError
 from wm_drake.parameters import Load, MachineParameters, SpinProfile, load_machine
 from wm_drake.simulation.balance import moments_of_load, rings_of
 from wm_drake.simulation.cases import Case
-from wm_drake.studies.balancer.page import BalancerResult, answer, facts_of, lock_below
+from wm_drake.studies.balancer.page import diverged
 from wm_drake.studies.balancer.study import (
     HOLD,
-    Curve,
-    Pair,
-    Release,
+    MASS,
+    PLACE,
+    base_of,
     capacities_of,
     capacity_of,
-    curve_of,
+    compared,
+    curves_of,
     from_release,
     is_within,
+    lock_below,
     locked,
     picked_up_from,
+    released,
     run_up,
     with_factors,
     without_rings,
@@ -31,29 +34,18 @@ RPM = np.pi / 30.0
 SPEEDS = RPM * np.array([100.0, 200.0, 300.0])
 
 
-def pair_of(free, held, mass=0.5, **factors):
-    """Return a pair with amplitudes in mm; the last one is that at the highest speed."""
-    curves = [
-        Curve(SPEEDS, 1e-3 * np.array(sizes[:-1]), 1e-3 * sizes[-1]) for sizes in (free, held)
-    ]
-    return Pair(mass, 0.0, *curves, **factors)
+def curves(*sizes):
+    """Return curves of runs with amplitudes in mm; the last one is that at the highest speed."""
+    values = 1e-3 * np.array(sizes)
+    data = {"amplitude": (("run", "from"), values[:, :-1]), "level": ("run", values[:, -1])}
+    return xr.Dataset(data, {"from": SPEEDS[: values.shape[1] - 1]})
 
 
-def findings_of(loads, releases=()):
-    parameters = load_machine("ball_rings")
-    base = loads[0]
-    return BalancerResult(
-        parameters,
-        2.0,
-        40.0,
-        tuple(loads),
-        base,
-        (base,),
-        tuple(releases),
-        base.locked,
-        {-0.16: 0.1, 0.16: 0.1},
-        0.235,
-        9,
+def loads_of(free, held, masses, is_within_capacity):
+    return compared(curves(*free), curves(*held)).assign(
+        mass=MASS.variable("run", masses),
+        place=PLACE.variable("run", np.zeros(len(masses))),
+        is_within_capacity=("run", is_within_capacity),
     )
 
 
@@ -138,8 +130,13 @@ def test_a_run_that_diverged_is_worse_than_any_other():
             "diverged": ("run", ["at 3 s", ""]),
         }
     )
-    assert np.isinf(curve_of(table, 0, SPEEDS[:1]).level)
-    assert curve_of(table, 1, SPEEDS[:1]) == Curve(SPEEDS[:1], np.array([2.0]), 4.0)
+    found = curves_of(table, run_up(4.0, 1.0))
+    assert np.isinf(found.level[0])
+    assert (found.amplitude.values[1], found.level[1]) == (2.0, 4.0)
+    both = compared(found, found)
+    assert both.is_larger_at_highest_speed.all()
+    assert both.worst_quotient.isnull().values.tolist() == [True, False]
+    assert both.pays_from.isnull().all()
 
 
 @pytest.mark.parametrize(
@@ -148,41 +145,32 @@ def test_a_run_that_diverged_is_worse_than_any_other():
         ((2.0, 2.0, 1.0, 0.1), (1.0, 1.0, 2.0, 2.0), 300.0),
         ((0.5, 2.0, 1.0, 0.1), (1.0, 1.0, 2.0, 2.0), 300.0),
         ((0.5, 0.5, 1.0, 0.1), (1.0, 1.0, 2.0, 2.0), 100.0),
-        ((2.0, 2.0, 1.0, 3.0), (1.0, 1.0, 2.0, 2.0), np.inf),
+        ((2.0, 2.0, 1.0, 3.0), (1.0, 1.0, 2.0, 2.0), np.nan),
     ],
 )
 def test_balls_pay_from_the_speed_above_which_they_are_never_worse(free, held, rpm):
-    assert pair_of(free, held).pays_from / RPM == pytest.approx(rpm)
+    pays_from = compared(curves(free), curves(held)).pays_from
+    np.testing.assert_allclose(pays_from / RPM, [rpm])
 
 
-def test_the_words_follow_the_numbers():
-    good = pair_of((4.0, 2.0, 1.0, 0.1), (1.0, 1.0, 2.0, 2.0))
-    beyond = pair_of((4.0, 2.0, 1.0, 3.0), (1.0, 1.0, 2.0, 2.0), mass=1.0)
-    releases = [
-        Release(200.0 * RPM, 3e-3, 2e-3, 1e-4, 2e-3),
-        Release(300.0 * RPM, 1e-3, 2e-3, 1e-4, 2e-3),
-    ]
-    found = findings_of([good, beyond], releases)
-    assert good.worst == (4.0, pytest.approx(100.0 * RPM))
-    assert lock_below(found) == pytest.approx(
-        300.0 * RPM
-    )  # the load beyond capacity does not count
-    text, facts = answer(found), dict(facts_of(found))
-    assert (
-        "lower the amplitude with 1 of 2 loads: with 0.5 kg at 0 mm from 2.0\u00a0mm to 0.10"
-        in text
-    )
-    assert "with 2 of 2 loads the largest amplitude is larger" in text
-    assert "Lock the balls below 300\u00a0rpm" in text
-    assert facts["Release"].startswith("at 300\u00a0rpm or above")
-    assert "are 1 of 2 loads, of which 3.0\u00a0mm to 3.0" in facts["Capacity"]
-    bad = findings_of([pair_of((4.0, 2.0, 1.0, 3.0), (1.0, 1.0, 2.0, 2.0))], releases[:1])
-    assert "No speed to release them" in answer(bad)
-    assert "none of the tried" in dict(facts_of(bad))["Release"]
-    assert bad.as_json()["lock_below_rpm"] is None
-    calm = findings_of([pair_of((0.5, 0.5, 1.0, 0.1), (1.0, 1.0, 2.0, 2.0))])
-    assert "larger with none of them" in answer(calm)
-    assert "Release" not in dict(facts_of(calm))
+def test_the_lock_holds_for_the_loads_that_the_balls_can_balance():
+    good, beyond = (4.0, 2.0, 1.0, 0.1), (4.0, 2.0, 1.0, 3.0)
+    held = (1.0, 1.0, 2.0, 2.0)
+    loads = loads_of([good, beyond], [held, held], [0.5, 1.0], [True, False])
+    assert loads.worst_quotient.values == pytest.approx(4.0)
+    assert loads.worst.values == pytest.approx(100.0 * RPM)
+    assert lock_below(loads) == pytest.approx(300.0 * RPM)
+    assert base_of(loads).mass == 0.5
+    assert np.isnan(lock_below(loads.assign(is_within_capacity=("run", [True, True]))))
+    none = loads.assign(is_within_capacity=("run", [False, False]))
+    assert np.isnan(lock_below(none))
+    assert base_of(none).mass == 0.5
+
+
+def test_a_release_is_judged_by_all_of_its_run():
+    found = released([20.0, 30.0], curves((3.0, 0.1), (1.0, 2.5)), curves((2.0, 2.0), (2.0, 2.0)))
+    assert found.is_larger.values.tolist() == [True, True]
+    assert found.after_free.values == pytest.approx([3e-3, 2.5e-3])
 
 
 @pytest.fixture(scope="module")
@@ -202,7 +190,7 @@ def test_balls_help_at_speed_and_hurt_in_the_run_up(result):
     (release,) = tables["releases"].itertuples()
     assert release.after_free_mm < release.after_locked_mm
     assert release.level_free_mm < 0.1 * release.level_locked_mm
-    assert result.failures() == []
+    assert result.failures() == ()
 
 
 def test_more_damping_passes_and_less_damping_changes_the_run_up(result):
@@ -211,6 +199,14 @@ def test_more_damping_passes_and_less_damping_changes_the_run_up(result):
     assert rings.peak_free_mm.nunique() == 2
     # the locked balls of both are the same run
     assert rings.peak_locked_mm.nunique() == 1
+
+
+def test_a_run_that_diverged_is_a_failure(result):
+    loads, rings, releases = (
+        result.labelled()[name].data for name in ("loads", "rings", "releases")
+    )
+    worse = loads.assign(level_free=loads.level_free.copy(data=[np.inf, 1.0]))
+    assert diverged(worse, rings, releases) == ("0.4 kg at 0 mm: a run diverged",)
 
 
 @pytest.mark.parametrize(

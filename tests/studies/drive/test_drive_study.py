@@ -49,15 +49,16 @@ def test_bisection_finds_planted_limits_and_says_what_is_out_of_range():
     machine = load_machine("motor")  # 2.2 N m at most
     needed = {"a": 0.5, "b": 1.37, "always": 1e-3, "never": 5.0}
     cases = [Case(name, Load(unbalances=()), PROFILE) for name in needed]
-    found = {t.load: t for t in find_thresholds(machine, cases, planted(needed))}
+    found = find_thresholds(machine, cases, planted(needed))
     for name in ("a", "b"):
-        assert found[name].caught_below < needed[name] <= found[name].passes_from
-        assert found[name].passes_from < 1.02 * found[name].caught_below
-        assert found[name].caught_speed == 11.0
-    assert found["always"].caught_below == 0.0
-    assert found["always"].passes_from == pytest.approx(0.022)
-    assert found["never"].caught_below == 2.2
-    assert np.isnan(found["never"].passes_from)
+        of = found.sel(load=name)
+        assert of.caught_below < needed[name] <= of.passes_from
+        assert of.passes_from < 1.02 * of.caught_below
+        assert of.caught == 11.0
+    assert found.caught_below.sel(load="always") == 0.0
+    assert found.passes_from.sel(load="always") == pytest.approx(0.022)
+    assert found.caught_below.sel(load="never") == 2.2
+    assert np.isnan(found.passes_from.sel(load="never"))
 
 
 def test_the_smallest_torque_is_the_largest_of_the_whirl():
@@ -72,12 +73,12 @@ def test_the_smallest_torque_is_the_largest_of_the_whirl():
     def run(cases, _what):
         return simulate_many(machine, cases, measures=MEASURES)
 
-    (found,) = find_thresholds(machine.parameters, [Case("c", unbalance(0.5), PROFILE)], run)
+    found = find_thresholds(machine.parameters, [Case("c", unbalance(0.5), PROFILE)], run)
     speeds = np.linspace(9.0, 16.0, 7001)
     x = 0.125 * speeds**2 / np.hypot(STIFFNESS - (MASS + 0.5) * speeds**2, DAMPING * speeds)
     largest = np.max(DAMPING * speeds * x**2) / 12.0
-    assert found.passes_from == pytest.approx(largest, rel=0.05)
-    assert found.caught_speed == pytest.approx(speeds[np.argmax(speeds * x**2)], rel=0.02)
+    assert found.passes_from.item() == pytest.approx(largest, rel=0.05)
+    assert found.caught.item() == pytest.approx(speeds[np.argmax(speeds * x**2)], rel=0.02)
 
 
 def test_a_map_scales_the_masses():
@@ -89,8 +90,8 @@ def test_a_map_scales_the_masses():
         [0.5, 1.0],
         planted(needed),
     )
-    np.testing.assert_allclose(found.unbalance, [0.2, 0.4])
-    np.testing.assert_array_equal(found.end_speed, [[11.0, 18.0, 18.0], [11.0, 11.0, 18.0]])
+    np.testing.assert_allclose(found.sum_of_mass_times_radius, [0.2, 0.4])
+    np.testing.assert_array_equal(found.end, [[11.0, 18.0, 18.0], [11.0, 11.0, 18.0]])
 
 
 def test_unbalance_is_the_part_of_torque_and_acceleration_that_goes_round():

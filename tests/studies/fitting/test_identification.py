@@ -319,3 +319,44 @@ def test_bad_input_is_told(make, message):
     with pytest.raises(InputError) as told:
         make()
     assert str(told.value).startswith(message)
+
+
+SPEED = np.linspace(-1.0, 1.0, 200)
+STV = (
+    Unknown("friction", 0.0, 20.0),
+    Unknown("transition", 0.001, 2.0, logarithmic=True),
+    Unknown("damping", 0.01, 100.2, logarithmic=True),
+)
+
+
+def stv(points):
+    friction, transition, damping = points.T[:, :, None]
+    return friction * np.clip(SPEED / transition, -1.0, 1.0) + damping * SPEED
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.1])
+@pytest.mark.parametrize(
+    ("friction", "transition"),
+    [
+        (0.13, 2.0),  # transition and damping within AT_BOUND of theirs
+        (0.13, 1.4),
+        (0.3, 1.0),  # the corner, where the fastest sample just has full friction
+        (0.0, 2.0),
+        (0.0, 1.0),
+        (14.0, 1.0),
+        (20.0, 1.5),
+        (20.0, 2.0),
+    ],
+)
+def test_wherever_a_search_ends_in_a_flat_valley_nothing_of_it_is_claimed(
+    friction, transition, noise
+):
+    """Measure a dashpot: friction that is never full is a dashpot too."""
+    values = 100.0 * SPEED + noise * np.random.default_rng(0).normal(size=SPEED.size)
+    problem = FitProblem(STV, (Measurement("dashpot", values),), stv)
+    end = problem.coordinates_of(np.array([friction, transition, 100.0 - friction / transition]))
+    fit = assess(problem, end, SearchLog(""))
+    for estimate in fit.estimates:
+        assert not estimate.determined
+        assert estimate.at_bound == ""
+        assert np.isnan([estimate.lower, estimate.upper]).all()

@@ -11,7 +11,6 @@ from wm_drake.parameters import SpinProfile, load_machine, with_value
 from wm_drake.report.figure import Area, Rule
 from wm_drake.studies.spin.comparison import (
     MOST_VARIANTS,
-    ComparisonResult,
     Variant,
     check_comparable,
     difference_table,
@@ -20,6 +19,7 @@ from wm_drake.studies.spin.comparison import (
 )
 from wm_drake.studies.spin.comparison_page import (
     COLOURS,
+    SpinComparisonResult,
     comparison_page,
     differences,
     different_parameters,
@@ -55,7 +55,7 @@ def table(variants):
 
 def page_of(variants, command=""):
     effect = effects(variants) if variants[1].name == "without gasket" else None
-    comparison = ComparisonResult(tuple(variants), difference_table(variants), effect)
+    comparison = SpinComparisonResult(tuple(variants), difference_table(variants), effect)
     return comparison_page(comparison, Facts(command))
 
 
@@ -64,6 +64,12 @@ def page(variants):
     files = Files(part="w")
     first = replace(variants[0], result=replace(variants[0].result, files=files))
     return page_of([first, variants[1]], "wm-drake spin --compare-gasket")
+
+
+def test_terminal_has_the_gap_of_each_case(variants, table):
+    shown = SpinComparisonResult(tuple(variants), table, None).terminal()
+    gap = "smallest gap 18.0 mm between tub shell and wall right, at 240 rpm (0.50 s)"
+    assert f"without gasket, back: {gap}" in shown
 
 
 def test_differences_of_planted_values(table, variants):

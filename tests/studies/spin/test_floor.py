@@ -12,7 +12,7 @@ from wm_drake.simulation.measures import measure
 from wm_drake.simulation.runs import simulate
 from wm_drake.studies.spin.floor import floor_figure, floor_section, floor_warnings, windows
 from wm_drake.studies.spin.page import spin_page
-from wm_drake.studies.spin.study import CaseResult, SpinResult
+from wm_drake.studies.spin.study import CaseResult, SpinRuns
 
 PROFILE = SpinProfile(
     time=(0.0, 6.0), speed=(5.0, 30.0), regions=(Region(name="low", begin=0.0, end=2.0),)
@@ -23,9 +23,7 @@ def spin_result(machine, parameters):
     """Return the result of a short run of the load `counter`."""
     case = Case("counter", parameters.loads["counter"], PROFILE, parameters=parameters)
     record = simulate(machine, case)
-    return SpinResult(
-        parameters, "compiled", 2.5e-3, (CaseResult(case, record, measure(record), 1.0),)
-    )
+    return SpinRuns(parameters, "compiled", (CaseResult(case, record, measure(record), 1.0),))
 
 
 @pytest.fixture(scope="module")

@@ -19,7 +19,7 @@ from wm_drake.report.scripts import packed_plotly
 from wm_drake.report.table import readable
 from wm_drake.studies.spin.figures import orbits_figure, revolution_starts, simplified_indices
 from wm_drake.studies.spin.page import amplitude_table, spin_page, warnings_of
-from wm_drake.studies.spin.study import CaseResult, Files, SpinResult
+from wm_drake.studies.spin.study import CaseResult, Files, SpinRuns
 from wm_drake.studies.spin.tables import (
     accelerations,
     differences,
@@ -47,14 +47,14 @@ def machine() -> MachineParameters:
 
 
 @pytest.fixture(scope="module")
-def result(machine: MachineParameters) -> SpinResult:
+def result(machine: MachineParameters) -> SpinRuns:
     return spin_result(
         machine, [case_result(machine, "middle"), case_result(machine, "back", size=0.01, gap=0.03)]
     )
 
 
 @pytest.fixture(scope="module")
-def page(result: SpinResult) -> str:
+def page(result: SpinRuns) -> str:
     return spin_page(result, Facts("wm-drake spin --set 'a=<b>'"))
 
 
@@ -138,7 +138,7 @@ def test_every_figure_says_what_it_shows(page: str) -> None:
 
 
 def test_mount_forces_and_accelerations_of_planted_motion(
-    result: SpinResult, machine: MachineParameters
+    result: SpinRuns, machine: MachineParameters
 ) -> None:
     (table,) = mount_force_tables(result)
     assert table.header[-1] == "RMS 300 to 400 rpm, N"
@@ -159,7 +159,7 @@ def test_mount_forces_and_accelerations_of_planted_motion(
 
 
 @pytest.mark.slow
-def test_detail_draws_the_vibration_of_every_load(result: SpinResult, page: str) -> None:
+def test_detail_draws_the_vibration_of_every_load(result: SpinRuns, page: str) -> None:
     assert page.count("drawn for this load only, that with the largest amplitude") == 1
     detailed = spin_page(replace(result, files=Files(detail=True)))
     assert detailed.count("Mount forces over time, load") == len(result.results)
@@ -215,6 +215,32 @@ def test_overlap_is_warned_of(machine: MachineParameters) -> None:
     assert page.index(answer) < page.index("1 case was run")  # the answer comes first
 
 
+@pytest.mark.parametrize(
+    ("gap", "size"), [(0.0187, "18.7 mm between"), (-0.0169, "−16.9 mm (they touch) between")]
+)
+@pytest.mark.usefixtures("without_drawing")
+def test_terminal_and_page_say_the_same_gap(
+    machine: MachineParameters, gap: float, size: str
+) -> None:
+    case = case_result(machine, gap=gap)
+    text = f"smallest gap {size} tub shell and wall right, at 240 rpm (0.50 s)"
+    result = spin_result(machine, [case])
+    assert f"{case.case.name}: {text}" in result.terminal()
+    assert text.removeprefix("smallest gap ") in spin_page(result)
+
+
+@pytest.mark.usefixtures("without_drawing")
+def test_page_says_the_steps_that_the_runs_took(machine: MachineParameters) -> None:
+    cases = [case_result(machine), case_result(machine), case_result(machine)]
+    shorter = {"integrator": "multistep", "step_s": 1.25e-3}
+    cases[1] = replace(cases[1], record=cases[1].record.assign_attrs(shorter))
+    words = (
+        "steps of up to 2.5 ms with controlled error, samples every 5 ms; "
+        "multistep, steps of 1.25 ms, samples every 5 ms"
+    )
+    assert words in spin_page(spin_result(machine, cases))
+
+
 def test_names_cannot_inject_markup(machine: MachineParameters) -> None:
     evil = "<script>alert('$x$')</script>"
     parameters = machine.model_copy(
@@ -233,7 +259,7 @@ def test_names_cannot_inject_markup(machine: MachineParameters) -> None:
 
 
 def test_amplitude_table_has_only_measured_rows_that_match_a_case(
-    result: SpinResult, machine: MachineParameters
+    result: SpinRuns, machine: MachineParameters
 ) -> None:
     table = amplitude_table(result)
     assert list(table.columns) == ["load", "gasket", "source", *machine.sensors]
@@ -296,7 +322,7 @@ def test_percent_difference_row_by_hand(machine: MachineParameters) -> None:
     assert "The largest difference is −90 %, at sensor Zf" in page
 
 
-def test_same_result_gives_the_same_page(result: SpinResult, page: str) -> None:
+def test_same_result_gives_the_same_page(result: SpinRuns, page: str) -> None:
     footer = re.compile(r"<footer>.*?</footer>", re.DOTALL)  # has the date
     again = spin_page(result, Facts("wm-drake spin --set 'a=<b>'"))
     assert footer.sub("", again) == footer.sub("", page) != page

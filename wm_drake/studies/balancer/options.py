@@ -36,7 +36,7 @@ BALANCER = Study(
     "balancer",
     "Say from which speed rings of balls pay, and where they hurt.",
     BalancerOptions,
-    imported("wm_drake.studies.balancer.study:BalancerTask"),
+    imported("wm_drake.studies.balancer.task:BalancerTask"),
     quick={
         "mass": "0.4 kg",
         "place": "0,110 mm",

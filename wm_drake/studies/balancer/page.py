@@ -1,39 +1,27 @@
-"""Show the study of rings of balls: the answer in words, curves, tables, CSV and JSON."""
+"""Show the study of rings of balls: the answer in words, curves and tables."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any
+import itertools
+from collections.abc import Callable, Iterator
 
 import numpy as np
-import pandas as pd
+import xarray as xr
 
 from wm_drake.parameters import MachineParameters
 from wm_drake.report import figure as fig
-from wm_drake.report.formatting import GM_PER_KGM, MM_PER_M, RPM_PER_RAD_S, number, plain
-from wm_drake.report.page import Picture, Section, SectionedPage, picture
-from wm_drake.report.table import Column, Table, table_of
-from wm_drake.report.terminal import Printed
-from wm_drake.studies.balancer.study import SWING, Curve, Pair, Release, is_within, picked_up_from
-from wm_drake.studies.study import Facts, Result
-
-COLUMNS = {
-    "mass_kg": Column("mass", "kg", 2),
-    "place_mm": Column("place", "mm", 0),
-    "unbalance_gm": Column("unbalance", "g\u00a0m", 0),
-    "ball_mass_percent": Column("ball mass", "%", 0),
-    "damping_percent": Column("race damping", "%", 0),
-    "peak_free_mm": Column("largest, free", "mm", 1),
-    "peak_locked_mm": Column("largest, locked", "mm", 1),
-    "worst_quotient": Column("worst quotient", decimals=1),
-    "worst_rpm": Column("at", "rpm", 0),
-    "pays_from_rpm": Column("free balls pay from", "rpm", 0),
-    "level_free_mm": Column("highest speed, free", "mm", 2),
-    "level_locked_mm": Column("highest speed, locked", "mm", 2),
-    "release_rpm": Column("released at", "rpm", 0),
-    "after_free_mm": Column("largest after it, free", "mm", 1),
-    "after_locked_mm": Column("largest after it, locked", "mm", 1),
-}
-"""Columns of the tables by their names in CSV files."""
+from wm_drake.report.labelled import LabelledTable
+from wm_drake.report.quantity import SPEED, Quantity, shown, text_of
+from wm_drake.studies.answer import Answer, Part, Plot
+from wm_drake.studies.balancer.study import (
+    AMPLITUDE,
+    BALL_MASS,
+    DAMPING,
+    LEVEL,
+    PAYS_FROM,
+    PEAK,
+    PLACE,
+    SWING,
+    base_of,
+)
 
 MODEL = (
     "Free and locked balls have the same mass; locked ones are evenly spread around the drum and "
@@ -44,197 +32,161 @@ MODEL = (
 """How the study compares."""
 
 
-@dataclass(frozen=True)
-class BalancerResult(Result):
-    """Result of the study.
+def balancer_answer(
+    parameters: MachineParameters,
+    numbers: xr.Dataset,
+    loads: xr.Dataset,
+    rings: xr.Dataset,
+    releases: xr.Dataset,
+) -> Answer:
+    """Return the answer of the study.
 
-    Attributes:
-        rate, high: Rate of the run-up, and its end. [rad/s^2, rad/s]
-        loads: Over unbalance mass and place.
-        base: The load of the other runs: the largest mass of `loads` that the balls can balance, in
-            the middle of the places.
-        rings: Over ball mass and damping, with the load of `base`.
-        releases: At different speeds, with the load of `base`.
-        plain: Curve of the load of `base` in the machine without rings.
-        capacities: Largest first moment of the balls in each plane, by its place. [kg m, m]
-        radius: Radius at which the unbalance lies. [m]
+    Args:
+        numbers: As of `numbers_of` in `wm_drake.studies.balancer.study`.
+        loads: As of `Trials.loads` there, with the amplitudes `without_rings` of the load with
+            which rings are varied.
+        rings, releases: As of the methods of `Trials`.
     """
-
-    machine: MachineParameters
-    rate: float
-    high: float
-    loads: tuple[Pair, ...]
-    base: Pair
-    rings: tuple[Pair, ...]
-    releases: tuple[Release, ...]
-    plain: Curve
-    capacities: dict[float, float]
-    radius: float
-    runs: int
-
-    @property
-    def capacity(self) -> float:
-        """Return the first moment of all balls, side by side. [kg m]"""
-        return sum(self.capacities.values())
-
-    def can_balance(self, pair: Pair) -> bool:
-        """Return whether the balls in each plane can cancel the share of a load there."""
-        return is_within(self.capacities, pair.mass * self.radius, pair.y)
-
-    def tables(self) -> dict[str, pd.DataFrame]:
-        """Return loads, rings, releases, and the curves of the load with which rings are varied."""
-        return {
-            "loads": loads_frame(self),
-            "rings": rings_frame(self),
-            "releases": releases_frame(self),
-            "curve": curve_frame(self),
-        }
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the findings for JSON."""
-        shown = {
-            "machine": self.machine.name,
-            "rate_rpm_per_s": RPM_PER_RAD_S * self.rate,
-            "highest_speed_rpm": RPM_PER_RAD_S * self.high,
-            "capacity_gm": GM_PER_KGM * self.capacity,
-            "picked_up_from_rpm": RPM_PER_RAD_S * picked_up_from(self.machine),
-            "answer": answer(self),
-            "lock_below_rpm": RPM_PER_RAD_S * lock_below(self),
-            **{name: frame.to_dict("records") for name, frame in self.tables().items()},
-            "runs": self.runs,
-        }
-        return plain(shown)
-
-    def terminal(self) -> Printed:
-        """Yield the answer, then the loads."""
-        yield answer(self)
-        for word, text in facts_of(self):
-            yield f"{word}: {text}"
-        yield loads_table(self).terminal("Free and locked balls")
-
-    def page(self, facts: Facts) -> str:
-        """Return the page."""
-        made = [
-            ("Machine", self.machine.name),
-            ("Runs", f"{self.runs} in {facts.wall_s:.0f} s"),
-            ("Run-up", f"{number(RPM_PER_RAD_S * self.rate, 0)} rpm/s to {_rpm(self.high)}"),
-            *facts.rows(),
-        ]
-        return SectionedPage(
-            f"Rings of balls of machine {self.machine.name}",
-            answer(self),
-            [
-                Section("curve", "Over the drum speed", (curve_picture(self),)),
-                Section("loads", "Unbalance and its place", (loads_picture(self),)),
-                Section("rings", "Mass of the balls and damping", (rings_picture(self),)),
-                Section("each", "Each load", tables=(loads_table(self),)),
-                Section("each-ring", "Each ball mass and damping", tables=(rings_table(self),)),
-                Section("releases", "Release of locked balls", tables=(releases_table(self),)),
-            ],
-            made,
-            self.machine,
-            facts.warnings,
-            method=MODEL,
-            advice=Section("answer", "In short", facts=facts_of(self)),
-        ).html()
-
-    def failures(self) -> list[str]:
-        """Return a line for each pair with a run that diverged."""
-        return [
-            f"{_load(pair)}: a run diverged"
-            for pair in (*self.loads, *self.rings)
-            if not np.isfinite([pair.free.level, pair.locked.level]).all()
-        ]
+    base = base_of(loads)
+    load, curve = load_text(base), base[["free", "locked", "without_rings"]]
+    worse = ("is_larger_at_highest_speed", "alarm")
+    each = LabelledTable(
+        "loads",
+        loads.drop_dims("from"),
+        "Free and locked balls",
+        "Each unbalance with free and with locked balls: largest amplitude of the run-up, largest "
+        "quotient of free over locked with its speed, speed from which free balls pay, amplitude "
+        "at the highest speed.",
+        marked=worse,
+        is_in_terminal=True,
+    )
+    about_rings = f"The same with {load}, over ball mass and race damping in parts of the file."
+    each_ring = LabelledTable("rings", rings, "Rings", about_rings, marked=worse)
+    release = LabelledTable(
+        "releases",
+        releases,
+        "Releases",
+        f"Runs with {load} that begin at a speed, with the balls evenly spread, as if they were "
+        f"locked before: largest amplitude from {SWING:g} s on, and at the highest speed. The tub "
+        "starts at rest; its first swing is left out.",
+        marked=("is_larger", "alarm"),
+    )
+    parts = (
+        Part("Over the drum speed", (curve_plot(base), LabelledTable("curve", curve))),
+        Part("Unbalance and its place", (loads_plot(loads),)),
+        Part("Mass of the balls and damping", (rings_plot(loads, rings, numbers),)),
+        Part("Each load", (each,)),
+        Part("Each ball mass and damping", (each_ring,)),
+        Part("Release of locked balls", (release, LabelledTable("numbers", numbers))),
+    )
+    return Answer(
+        f"Rings of balls of machine {parameters.name}",
+        summary(numbers, loads),
+        parameters,
+        parts,
+        (("Run-up", f"{text_of(numbers.rate)} to {text_of(numbers.highest_speed)}"),),
+        MODEL,
+        short=Part("In short", facts=facts_of(numbers, loads, rings, releases)),
+        diverged=diverged(loads, rings, releases),
+    )
 
 
-def lock_below(f: BalancerResult) -> float:
-    """Return the speed from which free balls pay with each load that they can balance. [rad/s]
+def diverged(loads: xr.Dataset, rings: xr.Dataset, releases: xr.Dataset) -> tuple[str, ...]:
+    """Return a line for each pair of runs of which one diverged."""
+    names: tuple[tuple[xr.Dataset, Callable[[xr.Dataset], str]], ...] = (
+        (loads, load_text),
+        (rings, _ring),
+        (releases, lambda run: f"release at {text_of(run.release)}"),
+    )
+    return tuple(
+        f"{name(run)}: a run diverged"
+        for data, name in names
+        for run in _runs(data)
+        if not np.isfinite([run.level_free.item(), run.level_locked.item()]).all()
+    )
 
-    It is NaN if they do not pay with one of them, or can balance none.
-    """
-    speeds = [pair.pays_from for pair in f.loads if f.can_balance(pair)]
-    return max(speeds) if speeds and np.isfinite(speeds).all() else float("nan")
 
-
-def answer(f: BalancerResult) -> str:
+def summary(numbers: xr.Dataset, loads: xr.Dataset) -> str:
     """Return the answer in a few sentences."""
-    hurt = [pair for pair in f.loads if pair.free.peak > pair.locked.peak]
-    pays = [pair for pair in f.loads if pair.free.level < pair.locked.level]
-    high, count = _rpm(f.high), len(f.loads)
-    base = f.base
+    hurt = loads.isel(run=(loads.peak_free > loads.peak_locked).values)
+    pays = loads.isel(run=~loads.is_larger_at_highest_speed.values)
+    count, base = loads.sizes["run"], base_of(loads)
     sentences = [
-        f"At {high}, free balls lower the amplitude with {len(pays)} of {count} loads: with "
-        f"{_load(base)} from {_mm(base.locked.level)} to {_mm(base.free.level)}."
+        f"At {text_of(numbers.highest_speed)}, free balls lower the amplitude with "
+        f"{pays.sizes['run']} of {count} loads: with {load_text(base)} from "
+        f"{_size(base.level_locked)} to {_size(base.level_free)}."
     ]
-    if hurt:
-        worst = max(hurt, key=lambda pair: pair.free.peak - pair.locked.peak)
+    if hurt.sizes["run"]:
+        worst = hurt.isel(run=int(np.nan_to_num(hurt.peak_free - hurt.peak_locked).argmax()))
         sentences.append(
-            f"In the run-up they hurt: with {len(hurt)} of {count} loads the largest amplitude is "
-            f"larger, with {_load(worst)} {_mm(worst.free.peak)} in place of "
-            f"{_mm(worst.locked.peak)}."
+            f"In the run-up they hurt: with {hurt.sizes['run']} of {count} loads the largest "
+            f"amplitude is larger, with {load_text(worst)} {_size(worst.peak_free)} in place of "
+            f"{_size(worst.peak_locked)}."
         )
     else:
         sentences.append("In the run-up they make the largest amplitude larger with none of them.")
-    speed = lock_below(f)
-    if np.isfinite(speed):
+    if numbers.lock_below.notnull():
         sentences.append(
-            f"Lock the balls below {_rpm(speed)} and release them there: from there on free balls "
-            "have the smaller amplitude with every load that they can balance."
+            f"Lock the balls below {text_of(numbers.lock_below)} and release them there: from "
+            "there on free balls have the smaller amplitude with every load that they can balance."
         )
     else:
         sentences.append("No speed to release them suits every load that they can balance.")
     return " ".join(sentences)
 
 
-def facts_of(f: BalancerResult) -> list[tuple[str, str]]:
+def facts_of(
+    numbers: xr.Dataset, loads: xr.Dataset, rings: xr.Dataset, releases: xr.Dataset
+) -> list[tuple[str, str]]:
     """Return the rest of the answer as pairs of word and text."""
-    worst = max(f.loads, key=lambda pair: pair.worst[0])
-    quotient, speed = worst.worst
-    rows = [
-        ("Worst", f"{number(quotient)} times as much at {_rpm(speed)}, with {_load(worst)}"),
-        ("Picked up", _pick_up_text(f)),
-        ("Capacity", _capacity_text(f)),
-        ("Mass of the balls, damping", _rings_text(f)),
-    ]
-    if f.releases:
-        rows.append(("Release", _release_text(f)))
-    change = 100.0 * (f.plain.peak / f.base.locked.peak - 1.0)
-    rows.append(
+    worst = loads.isel(run=int(loads.worst_quotient.fillna(-1.0).values.argmax()))
+    base, peak = base_of(loads), numbers.peak_without_rings
+    change = Quantity("", BALL_MASS.unit, 1).text(peak / base.peak_locked - 1.0)
+    return [
+        (
+            "Worst",
+            f"{text_of(worst.worst_quotient)} times as much at {text_of(worst.worst)}, with "
+            f"{load_text(worst)}",
+        ),
+        ("Picked up", _pick_up_text(numbers, loads)),
+        ("Capacity", _capacity_text(numbers, loads)),
+        ("Mass of the balls, damping", _rings_text(rings, numbers)),
+        ("Release", _release_text(releases)),
         (
             "Without rings",
-            f"largest amplitude {_mm(f.plain.peak)} with {_load(f.base)}, {number(change)} % "
-            f"from that of locked balls; at {_rpm(f.high)} {_mm(f.plain.level)}",
-        )
-    )
-    return rows
+            f"largest amplitude {text_of(peak)} with {load_text(base)}, {change} from that of "
+            f"locked balls; at {text_of(numbers.highest_speed)} "
+            f"{text_of(numbers.level_without_rings)}",
+        ),
+    ]
 
 
-def _pick_up_text(f: BalancerResult) -> str:
+def _pick_up_text(numbers: xr.Dataset, loads: xr.Dataset) -> str:
     """Return from which speed the drum carries the balls round, and what that means."""
-    speed = picked_up_from(f.machine)
+    speed = numbers.picked_up_from
     if not np.isfinite(speed):
         return "the races have no damping, so no drag carries the balls round"
-    text = f"the drum carries the balls round from {_rpm(speed)} (m g R/d)"
-    peak = f.base.locked.peak_speed
+    text = f"the drum carries the balls round from {text_of(speed)} (m g R/d)"
+    peak = _speed_of_peak(base_of(loads).locked)
     if speed < peak:
         return (
-            f"{text}, below the resonance at {_rpm(peak)}, where they add to the unbalance; less "
-            "damping picks them up later"
+            f"{text}, below the resonance at {SPEED.text(peak)}, where they add to the unbalance; "
+            "less damping picks them up later"
         )
-    return f"{text}, above the resonance at {_rpm(peak)}"
+    return f"{text}, above the resonance at {SPEED.text(peak)}"
 
 
-def _capacity_text(f: BalancerResult) -> str:
+def _capacity_text(numbers: xr.Dataset, loads: xr.Dataset) -> str:
     """Return what the balls can balance, and what is beyond it."""
-    heaviest = f.capacity / f.radius
-    text = f"{number(GM_PER_KGM * f.capacity, 0)} g m, that of {number(heaviest, 2)} kg at the wall"
-    beyond = [pair for pair in f.loads if not f.can_balance(pair)]
-    if not beyond:
+    text = f"{text_of(numbers.capacity)}, that of {text_of(numbers.heaviest)} at the wall"
+    beyond = loads.isel(run=~loads.is_within_capacity.values)
+    if not beyond.sizes["run"]:
         return f"{text}; no load is beyond it in the plane of a ring"
-    levels = [pair.free.level for pair in beyond]
+    levels = beyond.level_free
     return (
-        f"{text}; beyond it, in the plane of a ring, are {len(beyond)} of {len(f.loads)} loads, of "
-        f"which {_mm(min(levels))} to {_mm(max(levels))} remain at {_rpm(f.high)}"
+        f"{text}; beyond it, in the plane of a ring, are {beyond.sizes['run']} of "
+        f"{loads.sizes['run']} loads, of which {_size(levels.min())} to {_size(levels.max())} "
+        f"remain at {text_of(numbers.highest_speed)}"
     )
 
 
@@ -242,255 +194,141 @@ HARMLESS = 1.02
 """Largest amplitude with free balls over that with locked ones, up to which they do not hurt."""
 
 
-def _rings_text(f: BalancerResult) -> str:
+def _rings_text(rings: xr.Dataset, numbers: xr.Dataset) -> str:
     """Return which variants of the rings pay at the highest speed and do not hurt in the run-up."""
-    paying = [pair for pair in f.rings if pair.free.level < pair.locked.level]
-    if not paying:
+    paying = rings.isel(run=~rings.is_larger_at_highest_speed.values)
+    if not paying.sizes["run"]:
         return "no variant lowers the amplitude at the highest speed"
-    calm = min(pair.free.level for pair in paying)
-    good = [
-        pair
-        for pair in paying
-        if pair.free.peak <= HARMLESS * pair.locked.peak and pair.free.level <= 2.0 * calm
-    ]
-    if not good:
-        mildest = min(paying, key=lambda pair: pair.free.peak)
-        return f"every variant that pays hurts; least {_ring(mildest)}, {_mm(mildest.free.peak)}"
-    best = min(good, key=lambda pair: pair.pays_from)
+    good = paying.isel(
+        run=(
+            (paying.peak_free <= HARMLESS * paying.peak_locked)
+            & (paying.level_free <= 2.0 * paying.level_free.min())
+        ).values
+    )
+    if not good.sizes["run"]:
+        mildest = paying.isel(run=int(paying.peak_free.values.argmin()))
+        return f"every variant that pays hurts; least {_ring(mildest)}, {_size(mildest.peak_free)}"
+    best = good.isel(run=int(good.pays_from.fillna(np.inf).values.argmin()))
     return (
-        f"{len(good)} of {len(f.rings)} variants do not hurt in the run-up and balance the load at "
-        f"{_rpm(f.high)}; of them {_ring(best)} pays from {_rpm(best.pays_from)} on, with "
-        f"{_mm(best.free.peak)} in the run-up"
+        f"{good.sizes['run']} of {rings.sizes['run']} variants do not hurt in the run-up and "
+        f"balance the load at {text_of(numbers.highest_speed)}; of them {_ring(best)} pays from "
+        f"{text_of(best.pays_from)} on, with {_size(best.peak_free)} in the run-up"
     )
 
 
-def _release_text(f: BalancerResult) -> str:
+def _release_text(releases: xr.Dataset) -> str:
     """Return the lowest release after which free balls are never worse than locked ones."""
-    good = [r.free <= r.locked and r.free_level < r.locked_level for r in f.releases]
-    if not good[-1]:
+    good = ~releases.is_larger & (releases.level_free < releases.level_locked)
+    bad = np.flatnonzero(~good)
+    first = bad[-1] + 1 if len(bad) else 0
+    if first == releases.sizes["run"]:
         return "none of the tried releases is without a larger amplitude than that of locked balls"
-    bad = [at for at, is_good in enumerate(good) if not is_good]
-    first = f.releases[bad[-1] + 1 if bad else 0]
+    release = releases.isel(run=first)
     return (
-        f"at {_rpm(first.speed)} or above, in runs that begin there: {_mm(first.free)} at most, "
-        f"locked {_mm(first.locked)}"
+        f"at {text_of(release.release)} or above, in runs that begin there: "
+        f"{_size(release.after_free)} at most, locked {_size(release.after_locked)}"
     )
 
 
-def _mm(value: float) -> str:
-    """Return a length as text; `value` in m."""
-    decimals = 1 if value >= 1e-3 else 2
-    return f"{number(MM_PER_M * value, decimals)}\u00a0mm"
+def _size(amplitude: xr.DataArray) -> str:
+    """Return an amplitude as text, with the digits of a sentence."""
+    return AMPLITUDE.text(amplitude)
 
 
-def _rpm(value: float) -> str:
-    """Return a speed as text; `value` in rad/s."""
-    return f"{number(RPM_PER_RAD_S * value, 0)}\u00a0rpm"
+def _speed_of_peak(curve: xr.DataArray) -> float:
+    """Return the begin of the range of speed with the largest amplitude of a curve. [rad/s]"""
+    return float(curve["from"][int(curve.values.argmax())])
 
 
-def _load(pair: Pair) -> str:
-    return f"{pair.mass:g} kg at {number(MM_PER_M * pair.y, 0)} mm"
+def _runs(data: xr.Dataset) -> list[xr.Dataset]:
+    return [data.isel(run=run) for run in range(data.sizes["run"])]
 
 
-def _ring(pair: Pair) -> str:
-    return f"{100.0 * pair.ball_mass:g} % ball mass and {100.0 * pair.damping:g} % damping"
+def load_text(load: xr.Dataset) -> str:
+    """Return a load in words: mass and place."""
+    return f"{text_of(load.mass)} at {text_of(load.place)}"
 
 
-def _numbers(pair: Pair) -> dict[str, float]:
-    """Return the numbers of a pair by column."""
-    quotient, speed = pair.worst
-    pays_from = pair.pays_from
-    return {
-        "peak_free_mm": MM_PER_M * pair.free.peak,
-        "peak_locked_mm": MM_PER_M * pair.locked.peak,
-        "worst_quotient": quotient,
-        "worst_rpm": RPM_PER_RAD_S * speed,
-        "pays_from_rpm": RPM_PER_RAD_S * pays_from if np.isfinite(pays_from) else np.nan,
-        "level_free_mm": MM_PER_M * pair.free.level,
-        "level_locked_mm": MM_PER_M * pair.locked.level,
+def _ring(ring: xr.Dataset) -> str:
+    return f"{text_of(ring.ball_mass)} ball mass and {text_of(ring.damping)} damping"
+
+
+def curve_plot(base: xr.Dataset) -> Plot:
+    """Return amplitude over speed of the load with which rings are varied."""
+    styles: dict[str, tuple[str, str, fig.Dash]] = {
+        "free": ("free balls", fig.OURS, ""),
+        "locked": ("locked balls", fig.MEASURED, ""),
+        "without_rings": ("without rings", fig.QUIET, "dashed"),
     }
-
-
-def loads_frame(f: BalancerResult) -> pd.DataFrame:
-    """Return the numbers of each load."""
-    return pd.DataFrame(
-        [
-            {
-                "mass_kg": pair.mass,
-                "place_mm": MM_PER_M * pair.y,
-                "unbalance_gm": GM_PER_KGM * pair.mass * f.radius,
-                **_numbers(pair),
-            }
-            for pair in f.loads
-        ]
-    )
-
-
-def rings_frame(f: BalancerResult) -> pd.DataFrame:
-    """Return the numbers of each ball mass and damping."""
-    return pd.DataFrame(
-        [
-            {
-                "ball_mass_percent": 100.0 * pair.ball_mass,
-                "damping_percent": 100.0 * pair.damping,
-                **_numbers(pair),
-            }
-            for pair in f.rings
-        ]
-    )
-
-
-def releases_frame(f: BalancerResult) -> pd.DataFrame:
-    """Return the amplitudes after each release."""
-    return pd.DataFrame(
-        [
-            {
-                "release_rpm": RPM_PER_RAD_S * r.speed,
-                "after_free_mm": MM_PER_M * r.free,
-                "after_locked_mm": MM_PER_M * r.locked,
-                "level_free_mm": MM_PER_M * r.free_level,
-                "level_locked_mm": MM_PER_M * r.locked_level,
-            }
-            for r in f.releases
-        ]
-    )
-
-
-def curve_frame(f: BalancerResult) -> pd.DataFrame:
-    """Return amplitude over speed of the load with which rings are varied."""
-    return pd.DataFrame(
-        {
-            "from_rpm": RPM_PER_RAD_S * f.base.free.speeds,
-            "free_mm": MM_PER_M * f.base.free.amplitudes,
-            "locked_mm": MM_PER_M * f.base.locked.amplitudes,
-            "without_rings_mm": MM_PER_M * f.plain.amplitudes,
-        }
-    )
-
-
-def loads_table(f: BalancerResult) -> Table:
-    """Return the numbers of each load."""
-    caption = (
-        "Each unbalance with free and with locked balls: largest amplitude of the run-up, largest "
-        "quotient of free over locked with its speed, speed from which free balls pay, amplitude "
-        "at the highest speed."
-    )
-    return table_of(loads_frame(f), caption, COLUMNS, _alarms(f.loads))
-
-
-def rings_table(f: BalancerResult) -> Table:
-    """Return the numbers of each ball mass and damping."""
-    caption = f"The same with {_load(f.base)}, over ball mass and race damping in parts of the file"
-    return table_of(rings_frame(f), f"{caption}.", COLUMNS, _alarms(f.rings))
-
-
-def releases_table(f: BalancerResult) -> Table:
-    """Return the amplitudes after each release."""
-    caption = (
-        f"Runs with {_load(f.base)} that begin at a speed, with the balls evenly spread, as if "
-        f"they were locked before: largest amplitude from {SWING:g} s on, and at the highest "
-        "speed. The tub starts at rest; its first swing is left out."
-    )
-    kinds = ["alarm" if r.free > r.locked else "" for r in f.releases]
-    return table_of(releases_frame(f), caption, COLUMNS, kinds)
-
-
-def _alarms(pairs: Sequence[Pair]) -> list[str]:
-    return ["alarm" if not pair.free.level < pair.locked.level else "" for pair in pairs]
-
-
-def curve_picture(f: BalancerResult) -> Picture:
-    """Return amplitude over speed of the load with which rings are varied."""
-    marks: list[fig.Mark] = []
-    for name, curve, color in (
-        ("free balls", f.base.free, fig.OURS),
-        ("locked balls", f.base.locked, fig.MEASURED),
-    ):
-        marks.append(_line(curve, color=color, key=name))
-    marks.append(_line(f.plain, color=fig.QUIET, key="without rings", dash="dashed"))
-    if np.isfinite(f.base.pays_from):
-        at = RPM_PER_RAD_S * f.base.pays_from
-        marks.append(
-            fig.Rule(at, "y", dash="dotted", color=fig.QUIET, key="free balls pay from here")
-        )
+    speeds = shown(base["from"])
+    marks: list[fig.Mark] = [
+        fig.Line(speeds, shown(base[name]), color=color, key=key, dash=dash)
+        for name, (key, color, dash) in styles.items()
+    ]
+    if base.pays_from.notnull():
+        at, key = shown(base.pays_from).item(), "free balls pay from here"
+        marks.append(fig.Rule(at, "y", dash="dotted", color=fig.QUIET, key=key))
     panel = fig.Panel(
         marks=tuple(marks),
-        x=fig.Axis(label="drum speed, rpm"),
-        y=fig.Axis(label="amplitude, mm", is_log=True),
+        x=fig.Axis(label=SPEED.label),
+        y=fig.Axis(label=AMPLITUDE.label, is_log=True),
     )
-    caption = (
-        f"Largest amplitude of all sensors in ranges of 25 rpm of the run-up, with {_load(f.base)}."
+    peaks = [
+        f"{_size(base[f'peak_{name}'])} at {SPEED.text(_speed_of_peak(base[name]))}"
+        for name in ("free", "locked")
+    ]
+    return Plot(
+        fig.Figure(panels=(panel,), height=340.0),
+        f"Free balls: largest amplitude {peaks[0]}; locked balls: {peaks[1]}.",
+        "Largest amplitude of all sensors in ranges of 25 rpm of the run-up, with "
+        f"{load_text(base)}.",
     )
-    free, held = f.base.free, f.base.locked
-    words = (
-        f"Free balls: largest amplitude {_mm(free.peak)} at {_rpm(free.peak_speed)}; locked "
-        f"balls: {_mm(held.peak)} at {_rpm(held.peak_speed)}."
-    )
-    return picture(fig.Figure(panels=(panel,), height=340.0), words, caption)
 
 
-def _line(curve: Curve, **style: Any) -> fig.Line:
-    return fig.Line(RPM_PER_RAD_S * curve.speeds, MM_PER_M * curve.amplitudes, **style)
-
-
-QUANTITIES: tuple[tuple[str, Callable[[Curve], float]], ...] = (
-    ("largest amplitude of the run-up, mm", lambda curve: curve.peak),
-    ("amplitude at the highest speed, mm", lambda curve: curve.level),
-)
-"""Panels of the pictures over loads and rings."""
-
-
-def loads_picture(f: BalancerResult) -> Picture:
+def loads_plot(loads: xr.Dataset) -> Plot:
     """Return both amplitudes over the place of the unbalance, a line for each mass."""
+    styles: dict[str, fig.Dash] = {"free": "", "locked": "dashed"}
     panels = []
-    for label, value in QUANTITIES:
+    for name, quantity in (("peak", PEAK), ("level", LEVEL)):
         marks: list[fig.Mark] = []
-        for index, mass in enumerate(dict.fromkeys(pair.mass for pair in f.loads)):
-            of_mass = [pair for pair in f.loads if pair.mass == mass]
-            places = [MM_PER_M * pair.y for pair in of_mass]
-            color = fig.COLOURS[index % len(fig.COLOURS)]
-            styles: tuple[tuple[str, fig.Dash], ...] = (("free", ""), ("locked", "dashed"))
-            for name, dash in styles:
-                sizes = [MM_PER_M * value(getattr(pair, name)) for pair in of_mass]
-                key = f"{mass:g} kg, {name}"
-                marks.append(
-                    fig.Line(places, sizes, color=color, dash=dash, symbol="circle", key=key)
-                )
-        x = fig.Axis(label="place of the unbalance along the drum, mm")
-        y = fig.Axis(label=label, is_log=label == QUANTITIES[1][0])
-        panels.append(fig.Panel(marks=tuple(marks), x=x, y=y))
-    caption = (
+        for color, (_, of_mass) in zip(_colors(), loads.groupby("mass"), strict=False):
+            for balls, dash in styles.items():
+                key = f"{text_of(of_mass.mass[0])}, {balls}"
+                x, y = shown(of_mass.place), shown(of_mass[f"{name}_{balls}"])
+                marks.append(fig.Line(x, y, color=color, dash=dash, symbol="circle", key=key))
+        x_axis = fig.Axis(label=PLACE.named("place of the unbalance along the drum").label)
+        y_axis = fig.Axis(label=quantity.label, is_log=quantity is LEVEL)
+        panels.append(fig.Panel(marks=tuple(marks), x=x_axis, y=y_axis))
+    hurt = int((loads.peak_free > loads.peak_locked).sum())
+    return Plot(
+        fig.Figure(panels=fig.in_grid(panels, 2), height=320.0),
+        f"Free balls make the largest amplitude larger with {hurt} of {loads.sizes['run']} loads.",
         "Over the place of the unbalance, to the rear from mid-depth of the drum. Where a full "
-        "line is above the dashed one of its colour, free balls hurt."
+        "line is above the dashed one of its colour, free balls hurt.",
     )
-    hurt = sum(pair.free.peak > pair.locked.peak for pair in f.loads)
-    words = f"Free balls make the largest amplitude larger with {hurt} of {len(f.loads)} loads."
-    return picture(fig.Figure(panels=fig.in_grid(panels, 2), height=320.0), words, caption)
 
 
-def rings_picture(f: BalancerResult) -> Picture:
+def rings_plot(loads: xr.Dataset, rings: xr.Dataset, numbers: xr.Dataset) -> Plot:
     """Return both amplitudes and the speed of release over damping, a line for each ball mass."""
     panels = []
-    masses = list(dict.fromkeys(pair.ball_mass for pair in f.rings))
-    values: list[tuple[str, Callable[[Pair], float]]] = [
-        (label, lambda pair, value=value: MM_PER_M * value(pair.free))  # type: ignore[misc]
-        for label, value in QUANTITIES
-    ]
-    values.append(("free balls pay from, rpm", lambda pair: RPM_PER_RAD_S * pair.pays_from))
-    for label, read in values:
+    for name, quantity in (("peak_free", PEAK), ("level_free", LEVEL), ("pays_from", PAYS_FROM)):
         marks: list[fig.Mark] = []
-        for index, mass in enumerate(masses):
-            of_mass = [pair for pair in f.rings if pair.ball_mass == mass]
-            x = [100.0 * pair.damping for pair in of_mass]
-            y = np.array([read(pair) for pair in of_mass])
-            y[~np.isfinite(y)] = np.nan
-            color, key = fig.COLOURS[index % len(fig.COLOURS)], f"ball mass {100.0 * mass:g} %"
+        for color, (_, of_mass) in zip(_colors(), rings.groupby("ball_mass"), strict=False):
+            y = shown(of_mass[name].where(np.isfinite(of_mass[name])))
+            key = f"ball mass {text_of(of_mass.ball_mass[0])}"
+            x = shown(of_mass.damping)
             marks.append(fig.Line(x, y, color=color, symbol="circle", key=key))
-        y_axis = fig.Axis(label=label, is_log=label == QUANTITIES[1][0])
-        x_axis = fig.Axis(label="race damping, %", is_log=True)
+        y_axis = fig.Axis(label=quantity.label, is_log=quantity is LEVEL)
+        x_axis = fig.Axis(label=DAMPING.label, is_log=True)
         panels.append(fig.Panel(marks=tuple(marks), x=x_axis, y=y_axis))
-    caption = (
-        f"With {_load(f.base)}, over the damping of the races and the mass of the balls, in parts "
-        "of the machine file. A point is missing where free balls do not pay."
+    return Plot(
+        fig.Figure(panels=fig.in_grid(panels, 3), height=300.0),
+        _rings_text(rings, numbers),
+        f"With {load_text(base_of(loads))}, over the damping of the races and the mass of the "
+        "balls, in parts of the machine file. A point is missing where free balls do not pay.",
     )
-    return picture(fig.Figure(panels=fig.in_grid(panels, 3), height=300.0), _rings_text(f), caption)
+
+
+def _colors() -> Iterator[str]:
+    """Return colours of lines, again and again."""
+    return itertools.cycle(fig.COLOURS)

@@ -11,29 +11,24 @@ must release them somewhere: further runs begin at such a speed, with the balls 
 """
 
 import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from wm_drake.elements.ball_ring import BallRing
-from wm_drake.engines.compiled.step_check import check_step
-from wm_drake.errors import input_error
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import Load, MachineParameters, SpinProfile, Unbalance, with_values
 from wm_drake.parameters.spin import Region
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Unit
+from wm_drake.parameters.units import Share, Unit
+from wm_drake.report.formatting import number
+from wm_drake.report.quantity import HIDDEN, SPEED, Quantity
 from wm_drake.simulation.balance import in_planes, rings_of
 from wm_drake.simulation.cases import Case
-from wm_drake.simulation.steps import checked_step
-from wm_drake.studies.balancer.options import BalancerOptions
-from wm_drake.studies.inputs import quantities_of
-from wm_drake.studies.run import Executor
-from wm_drake.studies.study import Result, Task
+from wm_drake.studies.executor import Executor
 
 MEASURES = ("amplitudes in regions",)
 """Measures of `simulate_many` that the study needs."""
@@ -48,85 +43,20 @@ SWING, SETTLE = 2.0, 5.0
 """Time after a release in which the tub, at rest before, swings and is not measured; time at the
 speed of the release before the run-up goes on. [s]"""
 
-RPM, PART = Unit("rad/s", "rpm"), Unit("dimensionless", "percent")
-MOST_VALUES = 24
-"""Largest number of values of an option."""
-
-
-@dataclass(frozen=True)
-class Curve:
-    """Amplitude over drum speed in a run-up.
-
-    Attributes:
-        speeds: Begin of each range of speed. (n,) [rad/s]
-        amplitudes: Largest of all sensors in each range. (n,) [m]
-        level: The same at the highest speed. [m]
-    """
-
-    speeds: FloatArray
-    amplitudes: FloatArray
-    level: float
-
-    @property
-    def peak(self) -> float:
-        """Return the largest amplitude of all ranges. [m]"""
-        return float(self.amplitudes.max())
-
-    @property
-    def peak_speed(self) -> float:
-        """Return the begin of its range of speed. [rad/s]"""
-        return float(self.speeds[int(np.argmax(self.amplitudes))])
-
-
-@dataclass(frozen=True)
-class Pair:
-    """One case with free and with locked balls.
-
-    Attributes:
-        mass: Unbalance mass. [kg]
-        y: Its place along the drum. [m]
-        free, locked: Curves.
-        ball_mass, damping: Factors on the numbers of the rings.
-    """
-
-    mass: float
-    y: float
-    free: Curve
-    locked: Curve
-    ball_mass: float = 1.0
-    damping: float = 1.0
-
-    @property
-    def worst(self) -> tuple[float, float]:
-        """Return the largest quotient of free over locked, and its range of speed. [1, rad/s]"""
-        quotients = self.free.amplitudes / self.locked.amplitudes
-        at = int(np.nanargmax(quotients))
-        return float(quotients[at]), float(self.free.speeds[at])
-
-    @property
-    def pays_from(self) -> float:
-        """Return the speed from which free balls pay; infinity if they do not. [rad/s]"""
-        free, locked = (np.append(c.amplitudes, c.level) for c in (self.free, self.locked))
-        worse = np.flatnonzero(~(free < locked))
-        first = worse[-1] + 1 if len(worse) else 0
-        return float(self.free.speeds[first]) if first < len(self.free.speeds) else float("inf")
-
-
-@dataclass(frozen=True)
-class Release:
-    """A run that begins at a speed, at which balls that were locked and evenly spread are released.
-
-    Attributes:
-        speed: Speed of the release. [rad/s]
-        free, locked: Largest amplitude after the first swing, free and still locked. [m]
-        free_level, locked_level: The same at the highest speed. [m]
-    """
-
-    speed: float
-    free: float
-    locked: float
-    free_level: float
-    locked_level: float
+MM, MOMENT = Unit("m", "mm"), Unit("kg*m", "g*m")
+RATE = Quantity("rate of the run-up", Unit("rad/s^2", "rpm/s"), 0)
+MASS = Quantity("mass", Unit("kg", "kg"), form="{:g}".format)
+PLACE = Quantity("place", MM, 0)
+UNBALANCE = Quantity("unbalance", MOMENT, 0)
+CAPACITY = Quantity("first moment of all balls, side by side", MOMENT, 0)
+BALL_MASS = Quantity("ball mass", Share(), form="{:g}".format)
+DAMPING = Quantity("race damping", Share(), form="{:g}".format)
+AMPLITUDE = Quantity("amplitude", MM, form=lambda value: number(value, 1 if value >= 1.0 else 2))
+PEAK = Quantity("largest amplitude of the run-up", MM, 1)
+LEVEL = Quantity("amplitude at the highest speed", MM, 2)
+QUOTIENT = Quantity("worst quotient", decimals=1)
+PAYS_FROM = SPEED.named("free balls pay from")
+PICKED_UP = SPEED.named("drum carries the balls round from")
 
 
 def run_up(high: float, rate: float) -> SpinProfile:
@@ -137,7 +67,7 @@ def run_up(high: float, rate: float) -> SpinProfile:
     """
     edges = np.append(np.arange(WINDOW, high - 0.5 * WINDOW, WINDOW), high)
     regions = [
-        Region(name=f"from_{RPM.from_si(low):.0f}", begin=low / rate, end=top / rate)
+        Region(name=f"from_{SPEED.number(low)}", begin=low / rate, end=top / rate)
         for low, top in itertools.pairwise(edges)
     ]
     return _held([(0.0, 0.0), (high / rate, high)], regions)
@@ -241,17 +171,72 @@ def with_factors(
     return with_values(parameters, values)
 
 
-def curve_of(table: xr.Dataset, run: int, speeds: FloatArray) -> Curve:
-    """Return the curve of a run.
+def curves_of(table: xr.Dataset, profile: SpinProfile) -> xr.Dataset:
+    """Return the largest amplitude of all sensors in each range of speed, and at the end.
 
     Args:
-        table: Runs with the regions of `run_up`.
-        speeds: Begin of each range. [rad/s]
+        table: Runs of the profile, which has a region for each range and a last one for its end.
+
+    Returns:
+        Over `run` and the begin of each range, `from` [rad/s]: `amplitude`; over `run`: `level` at
+        the highest speed [m]. Both are infinite for a run that diverged.
     """
-    sizes = table.region_amplitude.values[run].max(axis=-1)
-    failed = table.diverged.values[run] != ""
+    sizes = table.region_amplitude.values.max(axis=-1)
+    failed = table.diverged.values[:, None] != ""
     sizes = np.where(failed | np.isnan(sizes), np.inf, sizes)
-    return Curve(speeds, sizes[:-1], float(sizes[-1]))
+    begins = [profile.speed_at(region.begin) for region in profile.regions[:-1]]
+    return xr.Dataset(
+        {
+            "amplitude": AMPLITUDE.variable(("run", "from"), sizes[:, :-1]),
+            "level": LEVEL.variable("run", sizes[:, -1]),
+        },
+        {"from": SPEED.named("from").variable("from", begins)},
+    )
+
+
+def compared(free: xr.Dataset, held: xr.Dataset) -> xr.Dataset:
+    """Return free balls against locked ones.
+
+    Args:
+        free, held: As of `curves_of`, of the same number of runs.
+
+    Returns:
+        Over `run`: the largest amplitudes of the run-up, `peak_free` and `peak_locked` [m];
+        `worst_quotient` of free over locked in a range, and the begin of that range, `worst`
+        [rad/s]; the speed from which free balls pay, `pays_from`, NaN if they do not [rad/s];
+        `level_free` and `level_locked` at the highest speed [m]; `is_larger_at_highest_speed`.
+    """
+    speeds, (levels, amplitudes) = (
+        free["from"].values,
+        ([curves[name].values for curves in (free, held)] for name in ("level", "amplitude")),
+    )
+    with np.errstate(invalid="ignore"):  # both runs diverged
+        quotients = amplitudes[0] / amplitudes[1]
+    runs, worst = np.arange(len(quotients)), np.nan_to_num(quotients, nan=-1.0).argmax(axis=1)
+    sizes = [np.column_stack(pair) for pair in zip(amplitudes, levels, strict=True)]
+    numbers = {
+        "peak_free": (PEAK.named("largest, free"), amplitudes[0].max(axis=1)),
+        "peak_locked": (PEAK.named("largest, locked"), amplitudes[1].max(axis=1)),
+        "worst_quotient": (QUOTIENT, quotients[runs, worst]),
+        "worst": (SPEED.named("at"), speeds[worst]),
+        "pays_from": (PAYS_FROM, [pays_from(speeds, *pair) for pair in zip(*sizes, strict=True)]),
+        "level_free": (LEVEL.named("highest speed, free"), levels[0]),
+        "level_locked": (LEVEL.named("highest speed, locked"), levels[1]),
+    }
+    data = xr.Dataset({name: q.variable("run", values) for name, (q, values) in numbers.items()})
+    return data.assign(is_larger_at_highest_speed=("run", ~(levels[0] < levels[1])))
+
+
+def pays_from(speeds: FloatArray, free: FloatArray, held: FloatArray) -> float:
+    """Return the speed from which free balls pay; NaN if they do not. [rad/s]
+
+    Args:
+        speeds: Begin of each range.
+        free, held: Amplitudes in the ranges, and at the highest speed. [m]
+    """
+    worse = np.flatnonzero(~(free < held))
+    first = worse[-1] + 1 if len(worse) else 0
+    return float(speeds[first]) if first < len(speeds) else np.nan
 
 
 @dataclass(frozen=True)
@@ -273,14 +258,61 @@ class Trials:
         """Return one point mass at the wall. [kg, m]"""
         return Load(unbalances=(Unbalance(mass=mass, radius=self.radius, y=y),))
 
-    def pairs(self, points: Sequence[tuple[float, float, float, float]], what: str) -> list[Pair]:
-        """Return the pair of each point: mass [kg], place [m], factors on ball mass and damping."""
+    def loads(self, masses: Sequence[float], places: Sequence[float]) -> xr.Dataset:
+        """Return free against locked balls over unbalance masses and places. [kg, m]
+
+        Returns:
+            As of `compared`, with `mass`, `place`, `unbalance`, and whether it `is_within_capacity`
+            of the balls; `free` and `locked`, amplitudes over `from`. [kg, m, kg m, m]
+        """
+        points = [(mass, y, 1.0, 1.0) for mass in masses for y in places]
+        capacities = capacities_of(self.machine.parameters)
+        mass, y, *_ = np.array(points).T
+        within = [is_within(capacities, m * self.radius, p) for m, p, *_ in points]
+        names = xr.Dataset(
+            {
+                "mass": MASS.variable("run", mass),
+                "place": PLACE.variable("run", y),
+                "unbalance": UNBALANCE.variable("run", mass * self.radius),
+                "is_within_capacity": ("run", within, {HIDDEN: True}),
+            }
+        )
+        return names.merge(self._pairs(points, "loads"))
+
+    def rings(
+        self, load: xr.Dataset, ball_masses: Sequence[float], dampings: Sequence[float]
+    ) -> xr.Dataset:
+        """Return free against locked balls over factors on the mass of balls and on the damping.
+
+        Args:
+            load: One of `loads`.
+
+        Returns:
+            As of `compared`, with `ball_mass` and `damping`.
+        """
+        mass, y = load.mass.item(), load.place.item()
+        points = [(mass, y, b, d) for b in ball_masses for d in dampings]
+        *_, ball_mass, damping = np.array(points).T
+        names = xr.Dataset(
+            {
+                "ball_mass": BALL_MASS.variable("run", ball_mass),
+                "damping": DAMPING.variable("run", damping),
+            }
+        )
+        return names.merge(self._pairs(points, "rings").drop_dims("from"))
+
+    def _pairs(self, points: Sequence[tuple[float, float, float, float]], what: str) -> xr.Dataset:
+        """Return free against locked balls at points, with their curves.
+
+        Args:
+            points: Mass [kg], place [m], factors on ball mass and damping.
+        """
         parameters, profile = self.machine.parameters, run_up(self.high, self.rate)
         free, held = list[Case](), dict[str, Case]()
         names = []
         for mass, y, ball_mass, damping in points:
             changed = with_factors(parameters, ball_mass, damping)
-            load, name = self.load(mass, y), f"{mass:g} kg at {1e3 * y:g} mm"
+            load, name = self.load(mass, y), f"{mass:g} kg at {PLACE.values(y):g} mm"
             free.append(
                 Case(f"{name}, balls {ball_mass:g}, {damping:g}", load, profile, True, changed)
             )
@@ -289,145 +321,117 @@ class Trials:
         plain = build_machine(without_rings(parameters))
         of_free = self.executor.simulate(self.machine, MEASURES, free, f"{what}, free balls")
         of_held = self.executor.simulate(plain, MEASURES, held.values(), f"{what}, locked balls")
-        speeds = np.array([profile.speed_at(region.begin) for region in profile.regions[:-1]])
         place = {name: at for at, name in enumerate(held)}
-        return [
-            Pair(
-                mass,
-                y,
-                curve_of(of_free, run, speeds),
-                curve_of(of_held, place[names[run]], speeds),
-                ball_mass,
-                damping,
-            )
-            for run, (mass, y, ball_mass, damping) in enumerate(points)
-        ]
+        curves = curves_of(of_free, profile)
+        of_locked = curves_of(of_held, profile).isel(run=[place[name] for name in names])
+        return compared(curves, of_locked).assign(free=curves.amplitude, locked=of_locked.amplitude)
 
-    def plain(self, mass: float, y: float) -> Curve:
-        """Return the curve of a load in the machine without rings. [kg, m]"""
+    def plain(self, load: xr.Dataset) -> xr.Dataset:
+        """Return the curve of one of `loads` in the machine without rings, as of `curves_of`."""
         profile = run_up(self.high, self.rate)
         machine = build_machine(without_rings(self.machine.parameters))
-        cases = [Case("without rings", self.load(mass, y), profile)]
+        at = self.load(load.mass.item(), load.place.item())
+        cases = [Case("without rings", at, profile)]
         table = self.executor.simulate(machine, MEASURES, cases, "without rings")
-        speeds = np.array([profile.speed_at(region.begin) for region in profile.regions[:-1]])
-        return curve_of(table, 0, speeds)
+        return curves_of(table, profile).isel(run=0)
 
-    def releases(self, mass: float, y: float, speeds: Iterable[float]) -> list[Release]:
-        """Return the releases of a load at speeds. [kg, m, rad/s]"""
-        parameters, load, speeds = self.machine.parameters, self.load(mass, y), list(speeds)
+    def releases(self, load: xr.Dataset, speeds: Sequence[float]) -> xr.Dataset:
+        """Return runs that begin at a speed, at which balls locked before are released.
+
+        Args:
+            load: One of `loads`.
+            speeds: Speeds of the releases. [rad/s]
+
+        Returns:
+            Over the runs: speed of the `release` [rad/s], largest amplitude after the first swing,
+            `after_free` and still locked, `after_locked`, the same at the highest speed,
+            `level_free` and `level_locked` [m], and whether it `is_larger`.
+        """
+        parameters, at = self.machine.parameters, self.load(load.mass.item(), load.place.item())
         angles = {
             f"elements.{name}.start_angles": spread(ring)
             for name, ring in rings_of(parameters).items()
         }
         begun = with_values(parameters, angles)
         plain = build_machine(without_rings(parameters))
-        profiles = [from_release(speed, self.high, self.rate) for speed in speeds]
-        free = [
-            Case(f"released {RPM.from_si(s):g}", load, p, True, begun)
-            for s, p in zip(speeds, profiles, strict=True)
-        ]
-        held = [
-            Case(f"locked {RPM.from_si(s):g}", locked(load, parameters), p)
-            for s, p in zip(speeds, profiles, strict=True)
-        ]
+        profiles = {
+            SPEED.values(speed).item(): from_release(speed, self.high, self.rate)
+            for speed in speeds
+        }
+        free = [Case(f"released {s:g}", at, p, True, begun) for s, p in profiles.items()]
+        held = [Case(f"locked {s:g}", locked(at, parameters), p) for s, p in profiles.items()]
         tables = (
             self.executor.simulate(self.machine, MEASURES, free, "releases"),
             self.executor.simulate(plain, MEASURES, held, "still locked"),
         )
-        sizes = [table.region_amplitude.values.max(axis=-1) for table in tables]
-        return [
-            Release(s, float(a.max()), float(b.max()), float(a[-1]), float(b[-1]))
-            for s, a, b in zip(speeds, *sizes, strict=True)
-        ]
+        curves = [curves_of(table, next(iter(profiles.values()))) for table in tables]
+        return released(speeds, *curves)
 
 
-class BalancerTask(Task):
-    """The study with checked options."""
-
-    def __init__(self, options: BalancerOptions, machine: Machine) -> None:
-        """Check the rings, the values and the speeds."""
-        self.options, self.machine = options, machine
-        parameters = machine.parameters
-        self.rings = rings_of(parameters)
-        if not self.rings:
-            raise input_error(
-                f"machine '{parameters.name}' has no element of kind ball_ring; allowed is a "
-                "machine with rings of balls, such as the shipped machine 'ball_rings'",
-                key="elements",
-            )
-        radii = [u.radius for load in parameters.loads.values() for u in load.unbalances]
-        if not radii:
-            raise input_error("has no load with a point mass, whose radius is used", key="loads")
-        self.radius = radii[0]
-        self.masses = _values(options.mass, Unit("kg", "kg"), "--mass")
-        self.places = _values(options.place, Unit("m", "mm"), "--place", True)
-        self.ball_masses = _values(options.ball_mass, PART, "--ball-mass")
-        self.dampings = _values(options.damping, PART, "--damping")
-        self.rate = _values(options.rate, Unit("rad/s^2", "rpm/s"), "--rate")[0]
-        self.high = max(parameters.profile.speed)
-        if options.high is not None:
-            self.high = _values(options.high, RPM, "--to")[0]
-        if self.high < 4.0 * WINDOW * (1.0 - 1e-9):  # 100 rpm, in rad/s, is rounded
-            raise input_error(f"is below {RPM.from_si(4.0 * WINDOW):g} rpm", where="--to")
-        self.release = _values(options.release, RPM, "--release")
-        if max(self.release) >= self.high:
-            raise input_error(
-                f"is not below the highest speed, {RPM.from_si(self.high):g} rpm", where="--release"
-            )
-        step = checked_step(parameters, None)
-        for ball_mass in self.ball_masses:
-            for damping in self.dampings:
-                changed = with_factors(parameters, ball_mass, damping)
-                check_step(machine.set_up(parameters=changed), step)
-
-    @property
-    def identity(self) -> dict[str, Any]:
-        """Return what determines the runs beside the machine."""
-        high, rate = RPM.from_si(self.high), RPM.from_si(self.rate)
-        return {"run-up": f"to {high:g} rpm at {rate:g} rpm/s"}
-
-    def run(self, executor: Executor) -> Result:
-        """Run loads, rings and releases."""
-        from wm_drake.studies.balancer.page import BalancerResult
-
-        parameters = self.machine.parameters
-        trials = Trials(self.machine, executor, self.high, self.rate, self.radius)
-        points = [(mass, y, 1.0, 1.0) for mass in self.masses for y in self.places]
-        loads = trials.pairs(points, "loads")
-        capacities = capacities_of(parameters)
-        y = self.places[len(self.places) // 2]
-        possible = [m for m in self.masses if is_within(capacities, m * self.radius, y)]
-        mass = max(possible, default=min(self.masses))  # of the load with which rings are varied
-        base = next(pair for pair in loads if (pair.mass, pair.y) == (mass, y))
-        grid = [(mass, y, b, d) for b in self.ball_masses for d in self.dampings]
-        rings = trials.pairs(grid, "rings")
-        releases = trials.releases(mass, y, self.release)
-        plain = trials.plain(mass, y)
-        return BalancerResult(
-            parameters,
-            self.rate,
-            self.high,
-            tuple(loads),
-            base,
-            tuple(rings),
-            tuple(releases),
-            plain,
-            capacities,
-            self.radius,
-            executor.runs,
-        )
-
-
-def _values(text: str, unit: Unit, option: str, is_place: bool = False) -> tuple[float, ...]:
-    """Return different values of an option, rising.
+def released(speeds: Sequence[float], free: xr.Dataset, held: xr.Dataset) -> xr.Dataset:
+    """Return releases, as of `Trials.releases`.
 
     Args:
-        text, unit, option: As for `quantities_of`.
-        is_place: Whether the values may be 0 and below.
+        speeds: Speeds of the releases. [rad/s]
+        free, held: As of `curves_of`, with one range.
     """
-    values = tuple(sorted(set(quantities_of(text, unit, option))))
-    if len(values) > MOST_VALUES:
-        raise input_error(f"has {len(values)} values; allowed are {MOST_VALUES}", where=option)
-    if not is_place and not values[0] > 0.0:
-        raise input_error(f"'{text}' is not above 0", where=option)
-    return values
+    levels = [curves.level.values for curves in (free, held)]
+    after = [np.maximum(c.amplitude.values[:, 0], c.level.values) for c in (free, held)]
+    numbers = {
+        "release": (SPEED.named("released at"), speeds),
+        "after_free": (PEAK.named("largest after it, free"), after[0]),
+        "after_locked": (PEAK.named("largest after it, locked"), after[1]),
+        "level_free": (LEVEL.named("highest speed, free"), levels[0]),
+        "level_locked": (LEVEL.named("highest speed, locked"), levels[1]),
+    }
+    data = xr.Dataset({name: q.variable("run", values) for name, (q, values) in numbers.items()})
+    return data.assign(is_larger=("run", after[0] > after[1]))
+
+
+def base_of(loads: xr.Dataset) -> xr.Dataset:
+    """Return the load with which rings are varied.
+
+    It is the largest mass that the balls can balance in the middle of the places; the smallest one
+    if they can balance none.
+    """
+    places = np.unique(loads.place)
+    middle = loads.isel(run=loads.place.values == places[len(places) // 2])
+    possible = middle.isel(run=middle.is_within_capacity.values)
+    if possible.sizes["run"]:
+        return possible.isel(run=int(possible.mass.values.argmax()))
+    return middle.isel(run=int(middle.mass.values.argmin()))
+
+
+def lock_below(loads: xr.Dataset) -> float:
+    """Return the speed from which free balls pay with each load that they can balance. [rad/s]
+
+    It is NaN if they do not pay with one of them, or can balance none.
+    """
+    speeds = loads.pays_from.values[loads.is_within_capacity.values]
+    return float(speeds.max()) if len(speeds) else np.nan
+
+
+def numbers_of(trials: Trials, loads: xr.Dataset, plain: xr.Dataset) -> xr.Dataset:
+    """Return the run-up, what the balls can do, and the machine without rings, as single numbers.
+
+    Args:
+        loads, plain: As of `Trials.loads` and `Trials.plain`.
+
+    Returns:
+        `rate` [rad/s^2], `highest_speed`, `picked_up_from`, `lock_below` [rad/s], `capacity`
+        [kg m], `heaviest`, the unbalance mass at the wall of that moment [kg]; `peak_without_rings`
+        and `level_without_rings` [m].
+    """
+    parameters = trials.machine.parameters
+    capacity = sum(capacities_of(parameters).values())
+    numbers = {
+        "rate": (RATE, trials.rate),
+        "highest_speed": (SPEED.named("highest speed"), trials.high),
+        "capacity": (CAPACITY, capacity),
+        "heaviest": (Quantity("mass of it at the wall", MASS.unit, 2), capacity / trials.radius),
+        "picked_up_from": (PICKED_UP, picked_up_from(parameters)),
+        "lock_below": (SPEED.named("lock the balls below"), lock_below(loads)),
+        "peak_without_rings": (AMPLITUDE, plain.amplitude.max()),
+        "level_without_rings": (AMPLITUDE, plain.level),
+    }
+    return xr.Dataset({name: q.variable((), value) for name, (q, value) in numbers.items()})

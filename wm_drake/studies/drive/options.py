@@ -37,7 +37,7 @@ DRIVE = Study(
     "drive",
     "Find the weakest motor that passes every critical speed, and estimate the unbalance.",
     DriveOptions,
-    imported("wm_drake.studies.drive.study:DriveTask"),
+    imported("wm_drake.studies.drive.task:DriveTask"),
     quick={"load": ("middle",), "torques": 2, "unbalances": 2, "loads": 3},
     adapt=_with_motor,
 )

@@ -14,16 +14,12 @@ does: m r = |T_1 - J w'_1| / g. An appliance knows T from its current and w' fro
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 import xarray as xr
 
-from wm_drake.engines.compiled.step_check import drum_inertia
 from wm_drake.errors import input_error
-from wm_drake.model.machine import Machine
 from wm_drake.parameters import (
     Load,
     MachineParameters,
@@ -34,11 +30,9 @@ from wm_drake.parameters import (
 )
 from wm_drake.parameters.drive import TorqueLimit, motor_of
 from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import Unit
+from wm_drake.report.quantity import SPEED, Quantity
 from wm_drake.simulation.cases import Case
-from wm_drake.studies.drive.options import DriveOptions
-from wm_drake.studies.inputs import selected_cases
-from wm_drake.studies.run import Executor
-from wm_drake.studies.study import Result, Task
 
 MEASURES = ("drive",)
 """Measures of `simulate_many` that the study needs."""
@@ -58,70 +52,20 @@ RAMP, HOLD = 10.0, 12.0
 Runs = Callable[[Iterable[Case], str], xr.Dataset]
 """Function that runs cases and returns the table of their measures; the text says what for."""
 
+TORQUE, MOMENT = Unit("N*m", "N*m"), Unit("kg*m", "g*m")
 
-@dataclass(frozen=True)
-class Threshold:
-    """Smallest torque limit of a load.
-
-    Attributes:
-        load: Name of the load.
-        caught_below: Largest limit found at which the drum does not pass; 0 if there is none in the
-            range. At the motor's shaft. [N m]
-        passes_from: Smallest limit found at which it passes; NaN if not even the largest one does.
-            [N m]
-        caught_speed, caught_torque: Where it is caught at `caught_below`, torque at the drum; NaN
-            if it is not caught. [rad/s, N m]
-    """
-
-    load: str
-    caught_below: float
-    passes_from: float
-    caught_speed: float
-    caught_torque: float
-
-
-@dataclass(frozen=True)
-class TorqueMap:
-    """Whether the drum passes, over torque limit and unbalance.
-
-    Attributes:
-        load: Name of the load whose masses are scaled.
-        torques: Limits at the motor's shaft. (t,) [N m]
-        factors: Factors on the masses. (u,)
-        unbalance: Sum of mass times radius of each. (u,) [kg m]
-        end_speed: Speed at the end of the profile. (u, t) [rad/s]
-        caught_speed: Where it is caught; NaN if it is not. (u, t) [rad/s]
-    """
-
-    load: str
-    torques: FloatArray
-    factors: FloatArray
-    unbalance: FloatArray
-    end_speed: FloatArray
-    caught_speed: FloatArray
-
-
-@dataclass(frozen=True)
-class Estimation:
-    """Unbalance estimated from the drive at a low constant speed, against the planted one.
-
-    Attributes:
-        speed: Speed of the hold. [rad/s]
-        planted: Size of the vector sum of mass times radius of each random load. (n,) [kg m]
-        estimated: The same, from torque and speed. (n,) [kg m]
-        from_torque, from_speed: The parts T_1 / g and J w'_1 / g alone, in size. (n,) [kg m]
-    """
-
-    speed: float
-    planted: FloatArray
-    estimated: FloatArray
-    from_torque: FloatArray
-    from_speed: FloatArray
-
-    @property
-    def errors(self) -> FloatArray:
-        """Return estimated less planted unbalance. (n,) [kg m]"""
-        return self.estimated - self.planted
+CAUGHT_BELOW = Quantity("does not pass with, at the motor", TORQUE, 3)
+PASSES_FROM = Quantity("passes with, at the motor", TORQUE, 3)
+CAUGHT_SPEED = Quantity("stays at", SPEED.unit, 0)
+CAUGHT_TORQUE = Quantity("mean torque there, at the drum", TORQUE, 2)
+TORQUE_LIMIT = Quantity("torque limit at the motor", TORQUE, 3)
+END_SPEED = Quantity("speed at the end", SPEED.unit, 0)
+UNBALANCE = Quantity("unbalance, sum of mass times radius", MOMENT, 1)
+PLANTED = Quantity("planted unbalance", MOMENT, 1)
+ESTIMATED = Quantity("estimated unbalance", MOMENT, 1)
+FROM_TORQUE = Quantity("estimated from torque alone", MOMENT, 1)
+FROM_SPEED = Quantity("estimated from speed alone", MOMENT, 1)
+ERROR = Quantity("error", MOMENT, 1)
 
 
 def motor_with_limit(parameters: MachineParameters) -> tuple[MotorDrive, TorqueLimit]:
@@ -156,11 +100,17 @@ def passes(table: xr.Dataset, profile: SpinProfile) -> np.ndarray:
     return np.asarray(table.drive_end_speed.values >= PASSES * profile.speed[-1])
 
 
-def find_thresholds(
-    parameters: MachineParameters, loads: Sequence[Case], run: Runs
-) -> tuple[Threshold, ...]:
-    """Return the smallest torque limit of each load by bisection; all loads run side by side."""
-    largest = motor_with_limit(parameters)[1].torque
+def find_thresholds(parameters: MachineParameters, loads: Sequence[Case], run: Runs) -> xr.Dataset:
+    """Return the smallest torque limit of each load by bisection; all loads run side by side.
+
+    Returns:
+        Over `load`: `caught_below`, largest limit found at which the drum does not pass, 0 if there
+        is none in the range; `passes_from`, smallest limit found at which it passes, NaN if not
+        even the largest one does [N m at the motor's shaft]; `caught_speed` [rad/s] and
+        `caught_mean_torque_at_drum` [N m], where it is caught at `caught_below`, NaN if it is not.
+    """
+    motor, limit = motor_with_limit(parameters)
+    largest = limit.torque
     count, profile = len(loads), loads[0].profile
     low, high = np.full(count, largest / RANGE), np.full(count, largest)
     caught = np.full((count, 2), np.nan)
@@ -199,9 +149,17 @@ def find_thresholds(
         good = tried(middle, open_ends, "bisection")
         for i in open_ends:
             (high if good[i] else low)[i] = middle[i]
-    return tuple(
-        Threshold(case.name, float(low[i]), float(high[i]), *map(float, caught[i]))
-        for i, case in enumerate(loads)
+    return xr.Dataset(
+        {
+            "caught_below": CAUGHT_BELOW.variable("load", low),
+            "passes_from": PASSES_FROM.variable("load", high),
+            "passes_from_at_drum": PASSES_FROM.named("passes with, at the drum").variable(
+                "load", motor.belt_ratio * high
+            ),
+            "caught": CAUGHT_SPEED.variable("load", caught[:, 0]),
+            "caught_mean_torque_at_drum": CAUGHT_TORQUE.hidden("load", caught[:, 1]),
+        },
+        {"load": [case.name for case in loads]},
     )
 
 
@@ -211,8 +169,14 @@ def torque_map(
     torques: Sequence[float],
     factors: Sequence[float],
     run: Runs,
-) -> TorqueMap:
-    """Return whether the drum passes over torque limits and factors on the masses of a load."""
+) -> xr.Dataset:
+    """Return where the drum passes, over torque limits and factors on the masses of a load.
+
+    Returns:
+        Over `mass_factor` and `torque_limit` (at the motor's shaft) [N m]: `end`, speed at the
+        end of the profile, `caught`, where the drum is caught, NaN if it is not [rad/s], and
+        `sum_of_mass_times_radius` of the load [kg m].
+    """
     machines = [with_torque(parameters, torque) for torque in torques]
     loads = [scaled(case.load, factor) for factor in factors]
     cases = [
@@ -221,13 +185,19 @@ def torque_map(
         for torque, machine in zip(torques, machines, strict=True)
     ]
     table, shape = run(cases, "map"), (len(factors), len(torques))
-    return TorqueMap(
-        case.name,
-        np.array(torques),
-        np.array(factors),
-        np.array([sum(u.mass * u.radius for u in load.unbalances) for load in loads]),
-        table.drive_end_speed.values.reshape(shape),
-        table.drive_caught_speed.values.reshape(shape),
+    unbalance = [sum(u.mass * u.radius for u in load.unbalances) for load in loads]
+    dims = ("mass_factor", "torque_limit")
+    return xr.Dataset(
+        {
+            "sum_of_mass_times_radius": UNBALANCE.variable("mass_factor", unbalance),
+            "end": END_SPEED.variable(dims, table.drive_end_speed.values.reshape(shape)),
+            "caught": CAUGHT_SPEED.variable(dims, table.drive_caught_speed.values.reshape(shape)),
+        },
+        {
+            "load": case.name,
+            "mass_factor": list(factors),
+            "torque_limit": TORQUE_LIMIT.variable("torque_limit", torques),
+        },
     )
 
 
@@ -240,12 +210,17 @@ def scaled(load: Load, factor: float) -> Load:
 
 def estimate_unbalance(
     parameters: MachineParameters, speed: float, loads: Sequence[Load], run: Runs, inertia: float
-) -> Estimation:
+) -> xr.Dataset:
     """Return the unbalance of loads as the drive sees it at a constant speed.
 
     Args:
         speed: Speed of the hold, reached by a ramp. [rad/s]
         inertia: Inertia of drum and rotor about the axis, without load. [kg m^2]
+
+    Returns:
+        Over the random loads: `planted`, size of the vector sum of mass times radius, `estimated`
+        from torque and speed, their difference `error`, and the parts T_1 / g and J w'_1 / g
+        alone, in size [kg m]. Attribute `speed` [rad/s].
     """
     profile = SpinProfile(time=(0.0, RAMP, RAMP + HOLD), speed=(0.0, speed, speed))
     cases = [
@@ -261,12 +236,32 @@ def estimate_unbalance(
         abs(sum(u.mass * u.radius * np.exp(1j * u.phase) for u in load.unbalances))
         for load in loads
     ]
-    return Estimation(
-        speed,
-        np.array(planted),
-        np.abs(torque - inertia * acceleration) / g,
-        np.abs(torque) / g,
-        inertia * np.abs(acceleration) / g,
+    estimated = np.abs(torque - inertia * acceleration) / g
+    numbers = {
+        "planted": (PLANTED, planted),
+        "estimated": (ESTIMATED, estimated),
+        "error": (ERROR, estimated - planted),
+        "from_torque_alone": (FROM_TORQUE, np.abs(torque) / g),
+        "from_speed_alone": (FROM_SPEED, inertia * np.abs(acceleration) / g),
+    }
+    return xr.Dataset(
+        {name: q.variable("random_load", v) for name, (q, v) in numbers.items()},
+        attrs={"speed": speed},
+    )
+
+
+def estimation_errors(estimation: xr.Dataset) -> xr.Dataset:
+    """Return number of loads, bias, RMS and 95 % quantile of the errors. [kg m]"""
+    errors = estimation.error.values
+    numbers = {
+        "mean_planted": ("mean planted", np.mean(estimation.planted.values)),
+        "bias": ("bias", np.mean(errors)),
+        "rms": ("RMS", np.sqrt(np.mean(errors**2))),
+        "p95": ("95 % below", np.quantile(np.abs(errors), 0.95)),
+    }
+    return xr.Dataset(
+        {"loads": Quantity("random loads", decimals=0).variable((), len(errors))}
+        | {name: ERROR.named(words).variable((), value) for name, (words, value) in numbers.items()}
     )
 
 
@@ -292,47 +287,3 @@ def random_loads(count: int, seed: int, places: Load) -> list[Load]:
         )
         for _ in range(count)
     ]
-
-
-class DriveTask(Task):
-    """The study with checked options."""
-
-    def __init__(self, options: DriveOptions, machine: Machine) -> None:
-        """Check the drive, the loads and the profile."""
-        self.options, self.machine = options, machine
-        motor_with_limit(machine.parameters)
-        self.cases = selected_cases(machine.parameters, options.load, True, options.profile)
-        if not self.cases[0].profile.speed[-1] > 0.0:
-            raise input_error(
-                "the last speed of the profile is 0; allowed is a profile that ends at the speed "
-                "that the drum must reach",
-                key="profile",
-            )
-
-    @property
-    def identity(self) -> dict[str, Any]:
-        """Return what determines the runs beside the machine."""
-        return {"profile": self.cases[0].profile, "seed": str(self.options.seed)}
-
-    def run(self, executor: Executor) -> Result:
-        """Find thresholds, draw the map for the load that needs most, and estimate unbalance."""
-        from wm_drake.studies.drive.page import DriveResult
-
-        options, parameters = self.options, self.machine.parameters
-        run = partial(executor.simulate, self.machine, MEASURES)
-        thresholds = find_thresholds(parameters, self.cases, run)
-        needs = [np.nan_to_num(threshold.passes_from, nan=9e9) for threshold in thresholds]
-        worst = max(range(len(needs)), key=needs.__getitem__)
-        largest = motor_with_limit(parameters)[1].torque
-        top = min(needs[worst], largest)
-        torques = (top * np.linspace(0.25, 2.0, options.torques)).tolist()
-        factors = np.linspace(0.25, 1.5, options.unbalances).tolist()
-        grid = torque_map(parameters, self.cases[worst], torques, factors, run)
-        estimation = None
-        if options.loads:
-            inertia = drum_inertia(self.machine.set_up())
-            loads = random_loads(options.loads, options.seed, self.cases[0].load)
-            speed = options.speed * np.pi / 30.0
-            estimation = estimate_unbalance(parameters, speed, loads, run, inertia)
-        profile = self.cases[0].profile
-        return DriveResult(parameters, profile, thresholds, grid, estimation, executor.runs)

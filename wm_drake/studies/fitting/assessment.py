@@ -26,6 +26,9 @@ DIFFERENCE = 1e-3
 FLAT_SIDE = 0.1
 """Effect of a step to one side by that of a step to the other, below which that side is flat."""
 
+SAME = 1e-9
+"""Singular value, by the largest, of effects of unknowns below which they are the same."""
+
 RESOLUTION = 1e-4
 """Errors below this part of the measured values cannot be separated from those of integration."""
 
@@ -60,11 +63,9 @@ def assess(problem: FitProblem, point: FloatArray, log: SearchLog) -> Fit:
     """
     residuals = problem.residuals(point[None])[0]
     jacobian, evaluated = central_differences(problem, point, residuals)
-    bound = _bounds_hit(problem, point, jacobian)
+    bound = _bounds_hit(point, _spread(problem, residuals, jacobian))
     free = np.flatnonzero(bound == 0)
-    variance = _variances(problem, residuals, jacobian[:, free])
-    resolution = np.maximum(variance, _resolution(problem) ** 2)
-    spread = _Spread(jacobian[:, free], variance, resolution)
+    spread = _spread(problem, residuals, jacobian[:, free])
     p = len(problem.unknowns)
     slope = _slopes(problem, point)[free]
     covariance = np.full((p, p), np.nan)
@@ -104,11 +105,16 @@ def evaluated(problem: FitProblem) -> Fit:
     )
 
 
-def _bounds_hit(problem: FitProblem, point: FloatArray, jacobian: FloatArray) -> IndexArray:
-    """Return which unknowns are at their lower (-1) or upper (1) bound; 0 for unseen ones."""
+def _bounds_hit(point: FloatArray, spread: "_Spread") -> IndexArray:
+    """Return which unknowns are at their lower (-1) or upper (1) bound; 0 for undetermined ones.
+
+    Args:
+        point: Where the search ended (p,), in coordinates.
+        spread: Spread of all unknowns. What it does not determine is at a bound by chance: the
+            search may end anywhere in a flat valley.
+    """
     bound = np.where(point < AT_BOUND, -1, np.where(point > 1.0 - AT_BOUND, 1, 0))
-    unseen = WIDEST * np.linalg.norm(jacobian, axis=0) < float(rmse(_resolution(problem)))
-    return np.where(unseen, 0, bound)  # an unseen unknown is at a bound by chance
+    return np.where(spread.resolved_deviation > WIDEST, 0, bound)
 
 
 def central_differences(
@@ -117,8 +123,9 @@ def central_differences(
     """Return the derivatives of the residuals by the unknowns, in unit coordinates.
 
     They are one-sided at a bound. They are also one-sided at a corner, where a step to one side has
-    nearly no effect: the friction force of a damper that just does not slip is such a corner. The
-    data do not limit the unknown to that side, and a mean of both sides would claim that they do.
+    nearly no effect that the other unknowns cannot take back: the friction force of a damper that
+    just does not slip is such a corner. The data do not limit the unknown to that side, and a mean
+    of both sides would claim that they do.
     The step to that side is long, because a short one shows the errors of integration instead.
 
     Args:
@@ -146,12 +153,17 @@ def central_differences(
 def _flat_sides(
     point: FloatArray, residuals: FloatArray, above: FloatArray, below: FloatArray
 ) -> FloatArray:
-    """Return for each unknown the side, 1 or -1, where a step has nearly no effect; 0 if none."""
-    upwards = np.linalg.norm(above - residuals, axis=1)
-    downwards = np.linalg.norm(below - residuals, axis=1)
-    side = np.where(
-        upwards < FLAT_SIDE * downwards, 1.0, np.where(downwards < FLAT_SIDE * upwards, -1.0, 0.0)
-    )
+    """Return for each unknown the side, 1 or -1, where a step has nearly no effect; 0 if none.
+
+    Of an effect only that part counts which no change of the other unknowns has.
+    """
+    side = np.zeros(len(point))
+    for k in range(len(point)):
+        others = np.delete(above - below, k, axis=0)
+        steps = np.stack([above[k], below[k]]) - residuals
+        remaining = steps - steps @ np.linalg.pinv(others, rcond=SAME) @ others
+        upwards, downwards = np.linalg.norm(remaining, axis=1)
+        side[k] = float(upwards < FLAT_SIDE * downwards) - float(downwards < FLAT_SIDE * upwards)
     at_bound = (point < DIFFERENCE) | (point > 1.0 - DIFFERENCE)
     return np.where(at_bound, 0.0, side)
 
@@ -198,6 +210,12 @@ class _Spread:
                     )
                 )
         return tuple(undetermined)
+
+
+def _spread(problem: FitProblem, residuals: FloatArray, jacobian: FloatArray) -> _Spread:
+    """Return the spread of the unknowns whose derivatives are given."""
+    variance = _variances(problem, residuals, jacobian)
+    return _Spread(jacobian, variance, np.maximum(variance, _resolution(problem) ** 2))
 
 
 def _estimates(

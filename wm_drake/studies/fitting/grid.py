@@ -1,4 +1,4 @@
-"""Grid search of [B] section 3.1.2, and a bounded Nelder-Mead search to compare with.
+"""Grid search of [B] section 3.1.2.
 
 The first grid covers the region. Each further grid is centred at the best point so far. Its spacing
 is halved only if the last grid gave no better point; otherwise the grid moves on with the same
@@ -9,7 +9,6 @@ optimum. This is a pattern search; it ends when the spacing is as fine as demand
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize
 
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.fitting.problem import Problem
@@ -80,25 +79,3 @@ def _offsets(size: int) -> FloatArray:
     """Return the points of a grid with spacing 1 around its centre, one row per point."""
     along = [np.arange(POINTS_PER_AXIS) - POINTS_PER_AXIS // 2] * size
     return np.stack(np.meshgrid(*along, indexing="ij"), axis=-1).reshape(-1, size).astype(float)
-
-
-def simplex_search(problem: Problem, stop: float) -> Optimum:
-    """Minimize the cost by scipy's Nelder-Mead method, from near the middle of the region.
-
-    This method needs no derivatives; envelopes have kinks.
-
-    Args:
-        problem: A problem whose unknowns have no priors: the region is the unit cube.
-        stop: The search ends when the costs at the corners of the simplex differ by less than this,
-            and the corners by less than 0.1 % of the region.
-    """
-    search, size = Search(problem), len(problem.unknowns)
-    simplex = np.vstack([np.full(size, 0.4), 0.4 + 0.25 * np.eye(size)])
-    end = minimize(
-        lambda point: float(search.costs(point[None])[0]),
-        np.full(size, 0.5),
-        method="Nelder-Mead",
-        bounds=[(0.0, 1.0)] * size,
-        options={"fatol": stop, "xatol": 1e-3, "initial_simplex": simplex},
-    )
-    return Optimum(end.x, float(end.fun), int(end.nfev))

@@ -4,9 +4,7 @@ Coarse differences of the smooth residuals pass a kink at which fine ones would 
 """
 
 import itertools
-from collections.abc import Callable
 
-import cma
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 
@@ -28,19 +26,10 @@ START_SPREAD = 0.7
 """Standard deviation of random starts around the first one, in prior deviations."""
 
 DRAWS = 24
-"""Usual number of points that are drawn for a random start or a hop; the best one is used.
+"""Usual number of points that are drawn for a random start; the best one is used.
 
 This costs less than one Jacobian and saves several of them.
 """
-
-HOP_SPREAD = 0.3
-"""Standard deviation of the points of a hop around the best one so far, in prior deviations."""
-
-OUTSIDE = 10.0
-"""Cost of a point at a distance of one prior deviation beyond the bounds."""
-
-POLISH = 10
-"""Limit of iterations of least squares after CMA-ES or a hop."""
 
 
 def start_number(
@@ -88,12 +77,7 @@ def smooth_jacobian(
     return np.nan_to_num((smooth[1:] - smooth[0]).T / steps)
 
 
-def least_squares_search(
-    search: Search[AnyProblem],
-    start: FloatArray,
-    iterations: int,
-    seed: int = 0,  # noqa: ARG001
-) -> Optimum:
+def least_squares_search(search: Search[AnyProblem], start: FloatArray, iterations: int) -> Optimum:
     """Search from one start by the Gauss-Newton method in a trust region (scipy's trf).
 
     When the method stops, it is started again from there with another difference step, until no
@@ -102,7 +86,6 @@ def least_squares_search(
     Args:
         start: (p,) point where it starts.
         iterations: Limit of iterations.
-        seed: Not used, because the method has no random part.
     """
     before, problem = search.evaluations, search.problem
     inside = 1e-6 * (problem.upper - problem.lower)
@@ -132,72 +115,3 @@ def _gauss_newton(
     limits = {"xtol": 1e-4, "ftol": 1e-3, "gtol": 1e-6, "max_nfev": iterations}
     bounds = (search.problem.lower, search.problem.upper)
     return least_squares(residuals, start, jac=slopes, bounds=bounds, **limits)
-
-
-def basin_hopping_search(
-    search: Search[PriorProblem], start: FloatArray, iterations: int, seed: int = 0
-) -> Optimum:
-    """Search by basin hopping: least squares from the start, then from the end of each hop.
-
-    A hop goes to the best of some points that are drawn around the best point so far [Wales and
-    Doye, J. Phys. Chem. A 101, 5111 (1997)]. Only a lower cost is accepted.
-
-    Args:
-        start: (p,) point where it starts.
-        iterations: Number of hops.
-    """
-    before = search.evaluations
-    generator = np.random.default_rng(seed)
-    best = least_squares_search(search, start, 2 * POLISH)
-    for _ in range(iterations):
-        hopped = best_near(search, best.point, HOP_SPREAD, generator)
-        best = min(best, least_squares_search(search, hopped, POLISH), key=lambda end: end.cost)
-    return Optimum(best.point, best.cost, search.evaluations - before)
-
-
-def evolution_search(
-    search: Search[PriorProblem], start: FloatArray, iterations: int, seed: int = 0
-) -> Optimum:
-    """Search by CMA-ES from one start, then by least squares from its end point.
-
-    CMA-ES: [Hansen, The CMA Evolution Strategy: A Tutorial, 2016]. The first points are drawn from
-    the normal distribution around the start that the slopes there give to the quantities, so that
-    combinations which the data determine well are changed by small steps. A point beyond the bounds
-    is evaluated at the nearest one within, and costs more by `OUTSIDE` times the square of the
-    distance.
-
-    Args:
-        start: (p,) point where it starts.
-        iterations: Limit of generations.
-    """
-    before = search.evaluations
-    options = {
-        "popsize": DRAWS,
-        "seed": seed + 1,  # 0 would mean a seed from the clock
-        "maxiter": iterations,
-        "verbose": -9,
-        "tolfun": 1e-2,
-        "tolx": 1e-3,
-    }
-    slopes = smooth_jacobian(search, start)
-    spread = np.linalg.cholesky(np.linalg.inv(slopes.T @ slopes + np.eye(len(start))))
-    best, least = start, np.inf
-    strategy = cma.CMAEvolutionStrategy([0.0] * len(start), START_SPREAD, options)
-    while not strategy.stop():
-        drawn = strategy.ask()
-        proposed = start + np.array(drawn) @ spread.T
-        points = search.clipped(proposed)
-        costs = search.costs(points)
-        if costs.min() < least:
-            best, least = points[int(np.argmin(costs))], float(costs.min())
-        strategy.tell(drawn, (costs + OUTSIDE * np.sum((proposed - points) ** 2, axis=1)).tolist())
-    end = least_squares_search(search, best, POLISH)
-    return Optimum(end.point, end.cost, search.evaluations - before)
-
-
-METHODS: dict[str, Callable[[Search[PriorProblem], FloatArray, int, int], Optimum]] = {
-    "least-squares": least_squares_search,
-    "basin-hopping": basin_hopping_search,
-    "evolution": evolution_search,
-}
-"""Search methods by name; arguments: search, start, iterations, seed."""

@@ -1,16 +1,20 @@
 """What the pages of all fits share: values with intervals, what is not determined, the search."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 
 from wm_drake.parameters.units import Unit
 from wm_drake.report.figure import Axis, Figure, Line, Panel
 from wm_drake.report.formatting import MISSING, number
+from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.page import Picture, picture
+from wm_drake.report.quantity import Quantity, quantity_of, shown
 from wm_drake.report.table import Table, line
+from wm_drake.studies.answer import Part, Plot
 from wm_drake.studies.fitting.fit import Estimate, Fit
 
 FixedNumber: TypeAlias = tuple[str, float, Unit]
@@ -136,3 +140,93 @@ def search_facts(fit: Fit) -> list[tuple[str, str]]:
         ),
         *(("Note", note) for note in fit.log.notes),
     ]
+
+
+def fit_parts(
+    fit: Fit, error: Quantity, planted: Mapping[str, float] | None = None
+) -> tuple[Part, ...]:
+    """Return the parts of an answer that every fit has: values, correlations, errors, search.
+
+    Args:
+        error: Quantity of the data, of which the RMSE is one.
+        planted: True values of the unknowns, of a virtual experiment. [SI]
+    """
+    values = LabelledTable(
+        "estimates",
+        estimates_of(fit, planted),
+        "Estimated values",
+        "Estimated values with 95 % confidence intervals. There is no interval if the value is at "
+        "a bound, or if the data do not determine it.",
+        is_in_terminal=True,
+    )
+    correlations = LabelledTable(
+        "correlations", correlations_of(fit), "Correlations", "Correlations of the errors of the "
+        "estimates.", across="with"
+    )  # fmt: skip
+    rmse = error.named("RMSE")
+    errors = xr.Dataset(
+        {
+            "rmse": rmse.variable("test", [test.rmse for test in fit.tests]),
+            "rmse_normalised": Quantity("RMSE by the largest value", decimals=4).variable(
+                "test", [test.normalised for test in fit.tests]
+            ),
+        },
+        {"test": [test.name for test in fit.tests]},
+    )
+    of_tests = LabelledTable(
+        "errors", errors, "Errors", "What the fit misses of each measured curve."
+    )
+    history = xr.Dataset(
+        {"least_rmse": rmse.named("least RMSE").variable("round", fit.log.history)},
+        {"round": np.arange(1, len(fit.log.history) + 1)},
+    )
+    return (
+        Part("Estimated values", (values,), remarks=undetermined_sentences(fit)),
+        Part("Correlations", (correlations,)),
+        Part("Errors of the fit", (of_tests,)),
+        Part("Search", (_history_plot(history), LabelledTable("search", history))),
+    )
+
+
+def estimates_of(fit: Fit, planted: Mapping[str, float] | None = None) -> xr.Dataset:
+    """Return value, interval, unit, bounds and remark over the unknowns.
+
+    The numbers are in the unit for reading of each unknown, which the variable `unit` names: their
+    units differ.
+    """
+    rows = pd.DataFrame(estimate_rows(fit))
+    rows["remark"] = [_remark(estimate) for estimate in fit.estimates]
+    rows["unit"] = [text.replace("*", " ") for text in rows["unit"]]
+    words = {"value": "value", "lower_95": "95 % from", "upper_95": "95 % to"}
+    if planted is not None:
+        units = {unknown.name: unknown.unit for unknown in fit.problem.unknowns}
+        rows["planted"] = [units[name].from_si(planted[name]) for name in rows["unknown"]]
+    data = rows.set_index("unknown").to_xarray()
+    for name, text in words.items():
+        data[name].attrs = Quantity(text).attributes()
+    return data
+
+
+def correlations_of(fit: Fit) -> xr.Dataset:
+    """Return the correlations of the errors of the unknowns."""
+    deviation = np.sqrt(np.diag(fit.covariance))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        correlation = fit.covariance / np.outer(deviation, deviation)
+    names = [unknown.name for unknown in fit.problem.unknowns]
+    quantity = Quantity("correlation", decimals=2)
+    return xr.Dataset(
+        {"correlation": quantity.variable(("unknown", "with"), correlation)},
+        {"unknown": names, "with": names},
+    )
+
+
+def _history_plot(history: xr.Dataset) -> Plot:
+    rounds, least = history["round"].values, shown(history.least_rmse)
+    curve = Line(rounds, np.maximum(least, 1e-300), symbol="circle", size=5.0)
+    x = Axis(label="round of the search")
+    y = Axis(label=quantity_of(history.least_rmse).label, is_log=True)
+    return Plot(
+        Figure(panels=(Panel(marks=(curve,), x=x, y=y),), height=180.0),
+        "Smallest RMSE after each round of the search.",
+        "Smallest RMSE that was found up to the end of each round of the search.",
+    )

@@ -63,32 +63,3 @@ class Posterior:
         direction. The number of values above 1 is the number of directions that the data determine.
         """
         return np.asarray(np.linalg.svd(self.slopes, compute_uv=False))
-
-
-def least_needed_out(
-    slopes: FloatArray, point: FloatArray, count: int
-) -> tuple[np.ndarray, FloatArray]:
-    """Choose the unknowns that stay free, in the linearised fit.
-
-    At its minimum the cost is a quadratic function with the curvature H = J^T J + 1. If coordinate
-    i goes to 0 and the others follow, it rises by x_i^2 / (2 (H^-1)_ii). The one with the least
-    rise goes first.
-
-    Args:
-        slopes: (n, p) derivatives J of the residuals with respect to the coordinates.
-        point: (p,) coordinates x of the minimum.
-        count: Number of coordinates that stay free.
-
-    Returns:
-        Indices of those, rising (count,), and their values at the minimum without the others
-        (count,).
-    """
-    kept, x = np.arange(len(point)), np.array(point)
-    curvature = slopes.T @ slopes + np.eye(len(point))
-    while len(kept) > count:
-        covariance = np.linalg.inv(curvature)
-        out = int(np.argmin(x**2 / np.diag(covariance)))
-        x = x - covariance[:, out] / covariance[out, out] * x[out]
-        kept, x = np.delete(kept, out), np.delete(x, out)
-        curvature = np.delete(np.delete(curvature, out, axis=0), out, axis=1)
-    return kept, x

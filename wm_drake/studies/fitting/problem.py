@@ -224,34 +224,6 @@ class PriorProblem(Problem):
 
 
 @dataclass(frozen=True, eq=False)
-class NormProblem(Problem):
-    """Problem of the sum of the 2-norms of the residuals of some groups, as [B] Eq. (2), (3).
-
-    Attributes:
-        evaluate: Points (k, p), in SI -> residuals (k, n); NaN where the model fails.
-        curves: Group and columns of each measured curve; curves of a group follow each other.
-    """
-
-    unknowns: tuple[Unknown, ...]
-    evaluate: Evaluate
-    curves: tuple[tuple[str, slice], ...]
-
-    def evaluated(self, coordinates: FloatArray) -> Residuals:
-        """Return the residuals at points (k, p)."""
-        residuals = self.evaluate(self.points_at(coordinates))
-        return Residuals(residuals, residuals)
-
-    def costs(self, residuals: FloatArray, coordinates: FloatArray) -> FloatArray:  # noqa: ARG002
-        """Return the sum of the norms (k,); infinite where the model fails."""
-        costs = np.zeros(len(residuals))
-        for group in dict.fromkeys(name for name, _ in self.curves):
-            parts = [where for name, where in self.curves if name == group]
-            columns = residuals[:, parts[0].start : parts[-1].stop]
-            costs += [float(np.linalg.norm(row)) for row in columns]
-        return np.where(np.isnan(costs), np.inf, costs)
-
-
-@dataclass(frozen=True, eq=False)
 class Measurement:
     """Measured values of one test.
 

@@ -131,9 +131,9 @@ def level_zero_text(zero: LevelZero, words: Words) -> str:
     size = f"up to {number(abs(change), 1)} % ({where})"
     if zero.tables == "linear":
         return (
-            "Level 0 of this study is not the machine: its stiffness tables are replaced by their "
-            f"slopes at rest, as in [B], so responses at level 0 differ by {size}. With --tables "
-            "scaled, level 0 is the machine."
+            "Level 0 of this study is not the machine: its stiffness tables are replaced by the "
+            f"slopes of their first 20 %, as in [B], so responses at level 0 differ by {size}. "
+            "With --tables scaled, level 0 is the machine."
         )
     (_, _), deviation = zero.largest("scaled")
     is_machine = abs(deviation) < SAME_PERCENT
@@ -144,8 +144,8 @@ def level_zero_text(zero: LevelZero, words: Words) -> str:
         f"{number(abs(deviation), 1)} %, because of the bounds of the factors."
     )
     return (
-        f"{first} With the slopes at rest in place of stiffness tables (--tables linear, as in "
-        f"[B]), responses at level 0 differ from it by {size}."
+        f"{first} With the slopes of their first 20 % in place of stiffness tables (--tables "
+        f"linear, as in [B]), responses at level 0 differ from it by {size}."
     )
 
 

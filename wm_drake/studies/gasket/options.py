@@ -50,8 +50,9 @@ class GasketOptions(Options):
     tables: str = option(
         "scaled",
         "Treatment of a stiffness that is given as a table. scaled: multiply its forces by the "
-        "level, so that level 0 is the machine. linear: replace it by its slope at rest times the "
-        "level, as in [B]. The page shows how much both differ at level 0.",
+        "level, so that level 0 is the machine. linear: replace it by the slope of a line "
+        "through its first 20 % times the level, as in [B]. The page shows how much both differ at "
+        "level 0.",
     )
     published: tuple[Path, ...] = option(
         (),

@@ -131,8 +131,8 @@ class LevelZero:
     """Responses of the machine and of level 0 of all factors with each treatment of tables.
 
     A stiffness may be a table. The study can scale its forces, and level 0 is the machine; or it
-    can replace the table by its slope at rest, as [B] does, and level 0 is another machine where
-    the table hardens.
+    can replace the table by the slope of its first 20 %, as [B] does, and level 0 is another
+    machine where the table hardens.
 
     Attributes:
         tables: Treatment of tables in the study, one of `TABLES`.

@@ -586,6 +586,6 @@ def factors(levels: Sequence[FactorLevels], words: Words) -> Table:
     )
     caption = (
         "Factors and their levels. All keys of a factor change together. For a stiffness that is "
-        "given as a table, the value is its slope at rest."
+        "given as a table, the value is the slope of a line through its first 20 %."
     )
     return Table(caption, header, tuple(groups), text_columns=2)

@@ -26,6 +26,7 @@ from wm_drake.parameters import (
 from wm_drake.simulation.cases import Case, is_as_measured
 from wm_drake.studies.doe.coding import MODELS
 from wm_drake.studies.doe.design import DESIGNS, Design, make_design, read_design
+from wm_drake.studies.executor import Executor
 from wm_drake.studies.gasket.options import GasketOptions
 from wm_drake.studies.gasket.page import GasketResult
 from wm_drake.studies.gasket.proposal import (
@@ -47,7 +48,7 @@ from wm_drake.studies.gasket.screening import (
 from wm_drake.studies.gasket.study import GasketTrials, Run, run_level_zero
 from wm_drake.studies.gasket.surface import Check, Setting, run_check, surfaces
 from wm_drake.studies.inputs import existing_file, pairs_of, selected_cases
-from wm_drake.studies.run import Executor, machine_text
+from wm_drake.studies.run import machine_text
 from wm_drake.studies.study import Task
 
 

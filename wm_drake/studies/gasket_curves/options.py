@@ -34,7 +34,7 @@ GASKET_CURVES = Study(
     "curves",
     "Compute the six curves of a gasket from its drawing, for a machine file.",
     CurvesOptions,
-    imported("wm_drake.studies.gasket_curves.study:CurvesTask"),
+    imported("wm_drake.studies.gasket_curves.task:CurvesTask"),
     quick={"points": 2, "elements": 6, "around": 3, "radial": "4 mm", "axial": "8 mm"},
     has_runs=False,
     group="gasket",

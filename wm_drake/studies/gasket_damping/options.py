@@ -20,10 +20,12 @@ class GasketDampingOptions(Options):
         "87 N mm s/deg", "Torsional damping C_T of the virtual experiment.", "VALUE"
     )
     seed: int = option(0, "Seed of the noise of the virtual experiment.", "N", ge=0, le=2**32 - 1)
-    mesh: float = option(
-        0.1,
-        "Spacing at which the grid search ends, in percent of the region (0 to 0.05 N s/mm, 0 to "
-        "200 N mm s/deg).",
+    mesh: float | None = option(
+        None,
+        "Also search by the grids of [B] section 3.1.2, with the surface of its distance, until "
+        "this spacing in percent of the region (0 to 0.05 N s/mm, 0 to 200 N mm s/deg). A grid "
+        "moves on to a better point, and is halved where there is none; [B] halves it in each "
+        "round and stops when the distance falls by less than 0.02.",
         "PERCENT",
         ge=1e-3,
         le=25.0,
@@ -34,7 +36,6 @@ GASKET_DAMPING = Study(
     "gasket-damping",
     "Find the gasket damping for which computed and measured envelopes agree best.",
     GasketDampingOptions,
-    imported("wm_drake.studies.gasket_damping.study:GasketDampingTask"),
-    quick={"mesh": 20.0},
+    imported("wm_drake.studies.gasket_damping.task:GasketDampingTask"),
     has_runs=False,
 )

@@ -1,12 +1,11 @@
 """Identification of the gasket damping C_L and C_T from measured envelopes, [B] section 3.1.2."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
-import pandas as pd
 import xarray as xr
 
 from wm_drake.batch import RunResult, simulate_many
@@ -25,22 +24,14 @@ from wm_drake.parameters.machine import OUTPUT_PERIOD
 from wm_drake.parameters.recorded import ChannelUse, read_recording, resampled
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
-from wm_drake.report.terminal import say
+from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.displacements import smooth_envelope
-from wm_drake.simulation.records import Record, read_measured
+from wm_drake.simulation.records import read_measured
 from wm_drake.simulation.runs import simulate
-from wm_drake.studies.fitting.grid import Round, grid_search, simplex_search
-from wm_drake.studies.fitting.jackknife import Interval, jackknife_interval
-from wm_drake.studies.fitting.problem import NormProblem, Unknown
-from wm_drake.studies.fitting.search import Optimum
-from wm_drake.studies.gasket_damping.options import GasketDampingOptions
+from wm_drake.studies.fitting.grid import grid_search
+from wm_drake.studies.fitting.problem import FAILED, FitProblem, Measurement, Unknown
 from wm_drake.studies.inputs import existing_file
-from wm_drake.studies.run import Executor
-from wm_drake.studies.study import Facts, Result, Task
-
-if TYPE_CHECKING:
-    from rich.table import Table
 
 UNKNOWNS = ("C_L", "C_T")
 
@@ -48,14 +39,8 @@ LOWER = np.array([0.0, 0.0])
 UPPER = np.array([50.0, 0.2 * 180.0 / np.pi])
 """Upper bounds of [B]: 0.05 N s/mm for C_L and 200 N mm s/deg for C_T. [N s/m, N m s/rad]"""
 
-STOP = 0.02
-"""Gain of the objective below which the bounded search ends ([B] section 3.1.2). [mm]"""
-
-MESH = 1e-3
-"""Default spacing of the finest grid, as a part of the region."""
-
-AGREEMENT = 0.01
-"""Largest difference of the two optima in each unknown, as a part of the region, if they agree."""
+STARTS, SCREENED = 3, 8
+"""Searches by least squares at most, and points from which all but the first of them start."""
 
 WINDOW = (10.0, 50.0)
 """Time interval that is compared ([B] section 3.1.2). [s]"""
@@ -68,9 +53,6 @@ LOADS = ("middle", "counter")
 NOISE = 1e-4
 """Standard deviation of the noise at each sample of a virtual experiment; an assumption. [m]"""
 
-MM_PER_M = 1e3
-LENGTH = Unit("m", "mm")
-
 UNITS = (Unit("N*s/m", "N*s/mm"), Unit("N*m*s/rad", "N*mm*s/deg"))
 """SI units and printed units of C_L and C_T."""
 
@@ -78,121 +60,35 @@ Measured: TypeAlias = Mapping[str, xr.DataArray]
 """Displacements (time, sensor), sampled every 5 ms, by load. [m]"""
 
 
+LENGTH = Unit("m", "mm")
+ENVELOPE = Quantity("envelope", LENGTH, 1)
+APART = Quantity("difference of envelopes", LENGTH, 3)
+DISTANCE = Quantity("distance", LENGTH, 2)
+DAMPING = {
+    "C_L": Quantity("C_L", UNITS[0], 4),
+    "C_T": Quantity("C_T", UNITS[1], 1),
+}
+SPACING = Quantity("spacing", Unit("dimensionless", "%"))
+PERCENT = Quantity("", Unit("dimensionless", "%"), 1)
+
+
 @dataclass(frozen=True)
-class Damping(Result):
-    """Result of an identification of C_L and C_T.
+class Comparison:
+    """Measured displacements and those computed with the fitted damping.
 
     Attributes:
-        parameters: Machine before the search.
-        grid: Optimum of the grid search, its point in SI. [N s/m, N m s/rad]
-        scipy: Optimum of the bounded search of scipy, its point in SI. [N s/m, N m s/rad]
-        rounds: The grids of the grid search.
-        truth: True values of a virtual experiment; None for a measurement. [N s/m, N m s/rad]
-        at_best: Computed record at the better optimum, by load.
-        interval: Confidence interval of the better of the two optima; None if there are too few
-            curves. [N s/m, N m s/rad]
+        computed: Displacements (time, sensor), by load. [m]
+        truth: True damping of a virtual experiment; None for a measurement. [N s/m, N m s/rad]
     """
 
-    parameters: MachineParameters
-    grid: Optimum
-    scipy: Optimum
     measured: Measured
-    rounds: tuple[Round, ...] = ()
-    truth: FloatArray | None = None
-    at_best: Mapping[str, Record] = field(default_factory=dict)
-    interval: Interval | None = None
-    float_format: ClassVar[str] = "%.9g"
+    computed: Measured
+    truth: FloatArray | None
 
     @property
-    def better(self) -> Optimum:
-        """The search that found the smaller distance; the grid search if both found the same."""
-        return min((self.grid, self.scipy), key=lambda search: search.cost)
-
-    @property
-    def searches_agree(self) -> bool:
-        """Whether the optima of both searches differ by at most `AGREEMENT`."""
-        difference = np.abs(self.grid.point - self.scipy.point) / (UPPER - LOWER)
-        return bool(np.all(difference <= AGREEMENT))
-
-    def tables(self) -> dict[str, pd.DataFrame]:
-        """Return every point of the grid search with its distance."""
-        from wm_drake.studies.gasket_damping.page import points_table
-
-        return {"objective": points_table(self)}
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the result for JSON, in the units of [B]."""
-
-        def plain(search: Optimum) -> dict[str, Any]:
-            return {
-                **_named(search.point),
-                "objective_mm": search.cost,
-                "evaluations": search.evaluations,
-            }
-
-        interval = self.interval
-        ends = [] if interval is None else [_named(interval.low), _named(interval.high)]
-        return {
-            "units": {"C_L": "N s/mm", "C_T": "N mm s/deg"},
-            "virtual_experiment": self.truth is not None,
-            "planted": None if self.truth is None else _named(self.truth),
-            "best": plain(self.better)
-            | {"search": "grid" if self.better is self.grid else "scipy"},
-            "searches_agree": self.searches_agree,
-            "grid": plain(self.grid)
-            | {"rounds": len(self.rounds), "mesh_percent": 100.0 * self.rounds[-1].spacing},
-            "scipy": plain(self.scipy),
-            "interval_95": {name: [end[name] for end in ends] for name in UNKNOWNS}
-            if ends
-            else None,
-        }
-
-    def terminal(self) -> "list[Table | str]":
-        """Return the summary."""
-        from wm_drake.studies.gasket_damping.page import summary
-
-        return [summary(self)]
-
-    def page(self, facts: Facts) -> str:
-        """Return the page."""
-        from wm_drake.studies.gasket_damping.page import gasket_damping_page
-
-        return gasket_damping_page(self, facts)
-
-
-def in_units_of_paper(damping: FloatArray) -> FloatArray:
-    """Return C_L and C_T (..., 2) in the units of [B]. [N s/mm, N mm s/deg]"""
-    return damping * np.array([unit.from_si(1.0) for unit in UNITS])
-
-
-def _named(damping: FloatArray) -> dict[str, float]:
-    return dict(zip(UNKNOWNS, in_units_of_paper(damping).tolist(), strict=True))
-
-
-class GasketDampingTask(Task):
-    """The study with checked options."""
-
-    def __init__(self, options: GasketDampingOptions, machine: Machine) -> None:
-        """Check the machine, and read the records or the true values of the virtual experiment."""
-        self.options, self.machine = options, machine
-        run_up_of(machine.parameters)
-        self.records, self.truth = read_records(machine.parameters, options.record), None
-        if not options.record:
-            self.truth = planted_damping(
-                machine.parameters, options.planted_linear, options.planted_torsional
-            )
-
-    def run(self, executor: Executor) -> Damping:  # noqa: ARG002
-        """Identify the damping, from the records or from a virtual experiment."""
-        records = self.records
-        if self.truth is not None:
-            say(
-                "No measured records were given. The Drake engine runs a virtual experiment with "
-                "other damping values and noise.",
-                err=True,
-            )
-            records = virtual_experiment(self.machine.parameters, self.truth, self.options.seed)
-        return identify_damping(self.machine, records, self.truth, self.options.mesh / 100.0)
+    def source(self) -> str:
+        """What the measured displacements are."""
+        return "measured records" if self.truth is None else "virtual experiment"
 
 
 def read_records(parameters: MachineParameters, entries: Sequence[str]) -> dict[str, xr.DataArray]:
@@ -252,41 +148,91 @@ def planted_damping(parameters: MachineParameters, linear: str, torsional: str) 
     return np.array([changed.gasket.damping_x, changed.gasket.rotational_damping_x])
 
 
-def identify_damping(
-    machine: Machine, measured: Measured, truth: FloatArray | None = None, mesh: float = MESH
-) -> Damping:
-    """Identify C_L and C_T from measured displacements.
-
-    Args:
-        measured: Displacements of its sensors, by load.
-        truth: True values if `measured` is from `virtual_experiment`. [N s/m, N m s/rad]
-        mesh: Spacing at which the grid search ends, as a part of the region.
+def damping_problem(machine: Machine, measured: Measured) -> FitProblem:
+    """Return the problem of C_L and C_T: a curve for each load and sensor, its smooth envelope. [m]
 
     Raises:
         InputError: the machine has no gasket, or its profile ends before the window.
     """
-    model = EnvelopeModel(machine, measured)
-    problem = damping_problem(model)
-    grid, rounds = grid_search(problem, mesh)
-    scipy = simplex_search(problem, STOP)
-    grid, scipy = (replace(end, point=problem.points_at(end.point)) for end in (grid, scipy))
-    result = Damping(machine.parameters, grid, scipy, measured, rounds, truth)
-    best = result.better.point
-    at_best = {case.name: simulate(machine, case) for case in model.cases(best)}
-    return replace(result, at_best=at_best, interval=jackknife_interval(problem, best))
-
-
-def damping_problem(model: "EnvelopeModel") -> NormProblem:
-    """Return the problem of C_L and C_T: the distance [B] Eq. (2), (3) of the envelopes. [mm]
-
-    It is the sum over the loads of the 2-norm of envelope differences. The norm includes the upper
-    and lower envelopes of all sensors at all samples in the window.
-    """
+    envelopes = {load: envelopes_of(displacement) for load, displacement in measured.items()}
+    curves = tuple(
+        Measurement(f"{load} {sensor}", curve.values, correlated=True)
+        for load, of_load in envelopes.items()
+        for sensor, curve in zip(of_load.sensor.values, of_load.T, strict=True)
+    )
     unknowns = tuple(
         Unknown(name, float(lower), float(upper), unit)
         for name, lower, upper, unit in zip(UNKNOWNS, LOWER, UPPER, UNITS, strict=True)
     )
-    return NormProblem(unknowns, model, tuple(model.curves))
+    loads, size = tuple(measured), sum(len(curve.values) for curve in curves)
+    run_up_of(machine.parameters)  # refuses a machine without gasket, and a short profile
+
+    def computed(points: FloatArray) -> FloatArray:
+        values = np.full((len(points), len(loads), size // len(loads)), np.nan)
+        cases = [case for point in points for case in cases_at(machine.parameters, point, loads)]
+
+        def keep(run: RunResult) -> None:
+            if not run.diverged and run.record is not None:
+                envelope = envelopes_of(run.record.displacement)
+                values[divmod(run.number, len(loads))] = envelope.values.T.ravel()
+
+        simulate_many(machine, cases, measures=("extremes",), histories=True, finished=keep)
+        return values.reshape(len(points), size)
+
+    return FitProblem(unknowns, curves, computed)
+
+
+def cases_at(
+    parameters: MachineParameters, damping: FloatArray, loads: Sequence[str]
+) -> list[Case]:
+    """Return a case for each load, with a damping C_L, C_T. [N s/m, N m s/rad]"""
+    changed, profile = with_damping(parameters, damping), run_up_of(parameters)
+    return [Case(load, changed.loads[load], profile, parameters=changed) for load in loads]
+
+
+@dataclass(frozen=True, eq=False)
+class DistanceProblem(FitProblem):
+    """Problem of `damping_problem` with the distance of [B] Eq. (2), (3) as cost. [m]
+
+    It is the sum over the loads of the 2-norm of the differences of the upper and lower envelopes
+    of all sensors. The lower envelope is the upper one with the other sign.
+    """
+
+    def costs(self, residuals: FloatArray, coordinates: FloatArray) -> FloatArray:  # noqa: ARG002
+        """Return the distances (k,); infinite where the model fails."""
+        squares: dict[str, FloatArray] = {}
+        for where, curve in zip(self.slices, self.measurements, strict=True):
+            apart = np.abs(residuals[:, where])
+            apart = np.where(apart >= FAILED * curve.largest, np.inf, apart)
+            load = curve.name.rpartition(" ")[0]
+            both = 2.0 * np.sum(np.square(apart), axis=1)
+            squares[load] = squares.get(load, np.zeros(len(residuals))) + both
+        return np.sum(np.sqrt(list(squares.values())), axis=0)
+
+
+def grid_of_paper(problem: FitProblem, mesh: float) -> xr.Dataset:
+    """Search by the grids of [B] section 3.1.2.
+
+    Args:
+        mesh: Spacing at which the search ends, as a part of the region.
+
+    Returns:
+        Over the points of all grids: `round`, `spacing` as a part of the region, `C_L`, `C_T` and
+        `objective`, the distance [m].
+    """
+    of_paper = DistanceProblem(problem.unknowns, problem.measurements, problem.evaluate)
+    rounds = grid_search(of_paper, mesh)[1]
+    counts = [len(grid.points) for grid in rounds]
+    points = np.concatenate([grid.points for grid in rounds])
+    spacing = np.repeat([grid.spacing for grid in rounds], counts)
+    return xr.Dataset(
+        {
+            "round": ("point", np.repeat(np.arange(1, len(rounds) + 1), counts)),
+            "spacing": SPACING.variable("point", spacing),
+            **{n: DAMPING[n].variable("point", points[:, k]) for k, n in enumerate(UNKNOWNS)},
+            "objective": DISTANCE.variable("point", np.concatenate([g.values for g in rounds])),
+        }
+    )
 
 
 def virtual_experiment(
@@ -319,61 +265,16 @@ def with_damping(parameters: MachineParameters, damping: FloatArray) -> MachineP
     )
 
 
-class EnvelopeModel:
-    """Differences of computed and measured envelopes as a function of C_L and C_T.
+def envelopes_of(displacement: xr.DataArray) -> xr.DataArray:
+    """Return the upper smooth envelopes (time, sensor) in the window. [m]
 
-    The envelopes are those of the analytic signal (`smooth_envelope`).
-
-    Attributes:
-        profile: Its profile, cut after the window.
-        curves: Load and columns of each curve: upper and lower envelope of a sensor with a load.
+    They are those of the analytic signal (`smooth_envelope`): a line from peak to peak jumps where
+    a small peak appears.
     """
-
-    def __init__(self, machine: Machine, measured: Measured) -> None:
-        """Compute the measured envelopes.
-
-        Raises:
-            InputError: the machine has no gasket, or its profile ends before the window.
-        """
-        self.machine = machine
-        self.profile = run_up_of(machine.parameters)
-        self._targets = {load: _envelopes(displacement) for load, displacement in measured.items()}
-        self.curves, end = list[tuple[str, slice]](), 0
-        for load, (sides, samples, sensors) in ((k, v.shape) for k, v in self._targets.items()):
-            for _ in range(sensors):
-                self.curves.append((load, slice(end, end + sides * samples)))
-                end += sides * samples
-
-    def cases(self, damping: FloatArray) -> list[Case]:
-        """Return one case for each load, with a damping C_L, C_T. [N s/m, N m s/rad]"""
-        changed = with_damping(self.machine.parameters, damping)
-        return [
-            Case(load, changed.loads[load], self.profile, parameters=changed)
-            for load in self._targets
-        ]
-
-    def __call__(self, points: FloatArray) -> FloatArray:
-        """Return the differences (k, n) at points (k, 2); NaN where a run diverges. [mm]"""
-        differences = np.full((len(points), self.curves[-1][1].stop), np.nan)
-        cases = [case for damping in points for case in self.cases(damping)]
-
-        def keep(run: RunResult) -> None:
-            if not run.diverged and run.record is not None:
-                point, load = run.number // len(self._targets), run.case.name
-                parts = [where for name, where in self.curves if name == load]
-                columns = slice(parts[0].start, parts[-1].stop)
-                apart = _envelopes(run.record.displacement) - self._targets[load]
-                differences[point, columns] = MM_PER_M * np.moveaxis(apart, 2, 0).ravel()
-
-        simulate_many(self.machine, cases, measures=("extremes",), histories=True, finished=keep)
-        return differences
-
-
-def _envelopes(displacement: xr.DataArray) -> FloatArray:
-    """Return the upper and lower smooth envelopes (2, time, sensor) in the window. [m]"""
     whole = smooth_envelope(xr.Dataset({"displacement": displacement}))
-    upper = whole.sel(time=slice(WINDOW[0] - 1e-9, WINDOW[1] + 1e-9)).values
-    return np.stack([upper, -upper])
+    first, last = np.rint(np.array(WINDOW) / OUTPUT_PERIOD)
+    compared = OUTPUT_PERIOD * np.arange(first, last + 1)  # runs may have closer samples
+    return whole.sel(time=compared, method="nearest")
 
 
 def run_up_of(parameters: MachineParameters) -> SpinProfile:

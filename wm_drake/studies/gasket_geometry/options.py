@@ -46,7 +46,7 @@ GASKET_GEOMETRY = Study(
     "gasket-geometry",
     "Vary the drawing of a gasket: wall, folds, hardness; find the largest gap.",
     GeometryOptions,
-    imported("wm_drake.studies.gasket_geometry.study:GeometryTask"),
+    imported("wm_drake.studies.gasket_geometry.task:GeometryTask"),
     quick={
         "drawings": 6,
         "fresh": 2,

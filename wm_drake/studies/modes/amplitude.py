@@ -19,11 +19,11 @@ import numpy as np
 from scipy.linalg import LinAlgWarning, lu_factor, lu_solve
 
 from wm_drake.model.machine import Setup
-from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.types import ComplexArray, FloatArray
 from wm_drake.studies.modes.linearisation import Spectrum
 from wm_drake.studies.modes.shapes import Mode
-from wm_drake.studies.steady.balance import HarmonicBalance
-from wm_drake.studies.steady.series import Series
+from wm_drake.studies.response.balance import HarmonicBalance
+from wm_drake.studies.response.series import Series
 from wm_drake.studies.threads import on_one_thread
 
 SMALLEST_AMPLITUDE = 1e-5
@@ -169,7 +169,11 @@ class _Free:
 
 
 def _follow(
-    balance: HarmonicBalance, value: complex, vector: FloatArray, name: str, amplitudes: FloatArray
+    balance: HarmonicBalance,
+    value: complex,
+    vector: ComplexArray,
+    name: str,
+    amplitudes: FloatArray,
 ) -> AmplitudeMode:
     free = _Free(balance)
     amplitude = min(SMALLEST_AMPLITUDE, float(amplitudes[0]))

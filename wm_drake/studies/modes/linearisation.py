@@ -18,7 +18,7 @@ from wm_drake.engines.compiled.slopes import SlopedDerivative
 from wm_drake.errors import input_error
 from wm_drake.model.machine import Setup
 from wm_drake.parameters import MachineParameters
-from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.types import ComplexArray, FloatArray
 
 SLOWEST = 2.0 * np.pi * 0.01
 """Least angular frequency of a mode. [rad/s]
@@ -41,15 +41,15 @@ class Spectrum:
     """Oscillating eigenvalues of a matrix A in rising order of size, one of each conjugate pair.
 
     Attributes:
-        values: (m,) complex [1/s]
+        values: Eigenvalues. (m,) [1/s]
         right: Right eigenvectors as columns. (n, m)
         left: Left eigenvectors as rows; row i times column j of `right` is 1 if i is j, else 0.
             (m, n)
     """
 
-    values: FloatArray
-    right: FloatArray
-    left: FloatArray
+    values: ComplexArray
+    right: ComplexArray
+    left: ComplexArray
 
     def first(self, count: int) -> "Spectrum":
         """Return the slowest motions."""

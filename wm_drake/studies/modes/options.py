@@ -20,6 +20,6 @@ MODES = Study(
     "modes",
     "Compute natural modes, critical speeds, and how each number of the machine moves them.",
     ModesOptions,
-    imported("wm_drake.studies.modes.study:ModesTask"),
+    imported("wm_drake.studies.modes.task:ModesTask"),
     has_runs=False,
 )

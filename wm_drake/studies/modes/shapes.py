@@ -8,7 +8,7 @@ import numpy as np
 
 from wm_drake.engines.trajectory import COORDINATES
 from wm_drake.model.scene import Gap, Scene
-from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.types import ComplexArray, FloatArray
 from wm_drake.report.formatting import MM_PER_M, number, shape_name
 from wm_drake.studies.modes.linearisation import Spectrum
 
@@ -24,6 +24,15 @@ NAMES = {
 
 Angles about x, y, z as in records; sway to the sides, fore-aft along the drum axis, bounce up and
 down."""
+
+FORWARD, BACKWARD = "forward whirl", "backward whirl"
+"""Names of roll and yaw together as the drum turns: its axis goes round with the drum or against
+it. A fast drum has no other: forward whirl rises with the speed (nutation), backward whirl falls
+(precession)."""
+
+WHIRL = 0.5
+"""Least part of roll and yaw together in a whirl, of the smaller one in the larger, and of the area
+of their ellipse in that of a circle."""
 
 ANGLE_ARM = 0.25
 """Length that converts angles to displacements in a mode shape: about the radius of the tub. [m]"""
@@ -55,7 +64,7 @@ class Mode:
     eigenvalue: complex
     frequency_hz: float
     damping_ratio: float
-    shape: FloatArray
+    shape: ComplexArray
     participation: FloatArray
     strain_energy: FloatArray
     dissipation: FloatArray
@@ -93,7 +102,7 @@ def modes_of(spectrum: Spectrum, wrench_slopes: FloatArray) -> list[Mode]:
     return modes
 
 
-def shape_of(vector: FloatArray) -> FloatArray:
+def shape_of(vector: ComplexArray) -> ComplexArray:
     """Return the motion of the tub in an eigenvector; the largest component becomes 1. (6,)"""
     weight = np.repeat([ANGLE_ARM, 1.0], 3)
     tub = vector[_POSITIONS]
@@ -124,8 +133,33 @@ def names_of(shares: FloatArray) -> list[str]:
     return [NAMES[COORDINATES[coordinate]] for coordinate in choices[best]]
 
 
+def names_at_speed(spectrum: Spectrum) -> list[str]:
+    """Return a name for each mode of a turning drum, from its shape at this speed.
+
+    A mode has the name of a coordinate, as at standstill, or is a whirl of roll and yaw.
+    """
+    shares = participation(spectrum)
+    names = names_of(shares)
+    for index, (roll, _, yaw, *_) in enumerate(shares):
+        circular = _circularity(spectrum.right[0, index], spectrum.right[2, index])
+        is_whirl = roll + yaw > WHIRL and min(roll, yaw) > WHIRL * max(roll, yaw)
+        if is_whirl and abs(circular) > WHIRL:
+            names[index] = FORWARD if circular > 0.0 else BACKWARD
+    return names
+
+
+def _circularity(roll: complex, yaw: complex) -> float:
+    """Return the area of the ellipse of roll and yaw over time, 1 for a circle with the drum.
+
+    The drum turns from z to x, so that on a forward circle the roll follows the yaw by a quarter of
+    a turn.
+    """
+    size = abs(roll) ** 2 + abs(yaw) ** 2
+    return float(2.0 * np.imag(roll.conjugate() * yaw) / size) if size else 0.0
+
+
 def energies(
-    value: complex, vector: FloatArray, wrench_slopes: FloatArray
+    value: complex, vector: ComplexArray, wrench_slopes: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return the strain energy of each element and the energy that it dissipates. (elements,)
 

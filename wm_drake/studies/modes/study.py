@@ -9,24 +9,18 @@ import pandas as pd
 import xarray as xr
 
 from wm_drake.batch import simulate_many
+from wm_drake.engines.trajectory import COORDINATES
 from wm_drake.errors import input_error
 from wm_drake.model.build import AnyMachine, machine_of
 from wm_drake.model.machine import Machine
-from wm_drake.model.replay import Motion
-from wm_drake.model.scene import REPLAY_RATE
 from wm_drake.parameters import Load, MachineParameters
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Unit
 from wm_drake.simulation.cases import case_of
-from wm_drake.studies.inputs import quantities_of
 from wm_drake.studies.modes.amplitude import AmplitudeMode, amplitude_modes
 from wm_drake.studies.modes.campbell import Campbell, CriticalSpeed, campbell, critical_speeds
 from wm_drake.studies.modes.linearisation import MODES, Linearisation, Spectrum, check_fixed_cabinet
-from wm_drake.studies.modes.options import ModesOptions
 from wm_drake.studies.modes.sensitivity import Sensitivity, numbers_of, sensitivities
-from wm_drake.studies.modes.shapes import ANGLE_ARM, Mode, modes_of
-from wm_drake.studies.run import Executor
-from wm_drake.studies.study import Result, Task
+from wm_drake.studies.modes.shapes import Mode, modes_of, names_at_speed
 from wm_drake.studies.threads import on_one_thread
 
 STUCK, SLIDING, AMPLITUDE = "stuck", "sliding", "amplitude"
@@ -87,6 +81,7 @@ class MachineModes(NaturalModes):
         elements: Names of the elements on the tub, in the order of the shares of a mode.
         over_amplitude: Each mode over its amplitude.
         diagrams: Campbell diagram of `STUCK` and `SLIDING`.
+        names: Name of each mode of these at each speed, from its shape there.
         critical: Critical speeds of each.
         sensitivities: Of each, for a drum that stands still.
         run_up: Peaks of the machine's own run-up, one run a load: `critical_speed` and `amplitude`
@@ -98,9 +93,15 @@ class MachineModes(NaturalModes):
     elements: list[str]
     over_amplitude: list[AmplitudeMode]
     diagrams: dict[str, Campbell]
+    names: dict[str, list[list[str]]]
     critical: dict[str, list[CriticalSpeed]]
     sensitivities: dict[str, list[Sensitivity]]
     run_up: xr.Dataset | None
+
+    def name_at(self, linearisation: str, mode: int, speed: float) -> str:
+        """Return the name of a mode at the nearest speed of its diagram. [rad/s]"""
+        nearest = int(np.argmin(np.abs(self.diagrams[linearisation].speed - speed)))
+        return self.names[linearisation][nearest][mode]
 
     @property
     def critical_speeds(self) -> FloatArray:
@@ -109,16 +110,7 @@ class MachineModes(NaturalModes):
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return a row for each mode of each linearisation, in units for reading."""
-        from wm_drake.studies.modes.page import modes_frame
-
         return modes_frame(self)
-
-    def plot(self) -> Any:
-        """Return the Campbell diagram, drawn with matplotlib; a notebook shows it."""
-        from wm_drake.report.drawing import matplotlib_of
-        from wm_drake.studies.modes.figures import campbell_figure
-
-        return matplotlib_of(campbell_figure(self))
 
     def _repr_html_(self) -> str:
         """Return the table of modes for a notebook."""
@@ -179,7 +171,7 @@ def modes(
     amplitudes = np.union1d(AMPLITUDES, amplitude)
     over = amplitude_modes(setup, spectra[STUCK], natural[STUCK], amplitudes)
     progress(0.3)
-    diagrams = _diagrams(linear, spectra, max(parameters.profile.speed))
+    diagrams = _diagrams(linear, spectra, parameters.profile.highest_speed)
     progress(0.4)
     bars = _sensitivities(machine, load, gasket, spectra, lambda part: progress(0.4 + 0.5 * part))
     peaks = None
@@ -198,6 +190,10 @@ def modes(
         linear[STUCK].names,
         over,
         diagrams,
+        {
+            name: [[mode.name for mode in natural[name]], *map(names_at_speed, diagram.spectra[1:])]
+            for name, diagram in diagrams.items()
+        },
         {name: critical_speeds(diagram, ORDERS) for name, diagram in diagrams.items()},
         bars,
         peaks,
@@ -303,53 +299,25 @@ def _sensitivities(
     }
 
 
-class ModesTask(Task):
-    """The study with checked options."""
-
-    def __init__(self, options: ModesOptions, machine: Machine) -> None:
-        """Read the amplitude."""
-        self.options, self.machine = options, machine
-        self.amplitude = quantities_of(options.amplitude, Unit("m", "mm"), "--amplitude")[0]
-
-    def run(self, executor: Executor) -> Result:
-        """Compute the modes and, with `--replay`, their animations."""
-        from wm_drake.studies.modes.page import ModesResult
-
-        with executor.fraction("modes") as progress:
-            result = modes(
-                self.machine,
-                self.options.load,
-                gasket=not self.options.no_gasket,
-                amplitude=self.amplitude,
-                run_up=True,
-                progress=progress,
-            )
-        return ModesResult(result, _replays(result) if self.options.replay else {})
-
-
-def _replays(result: MachineModes) -> dict[str, str]:
-    """Return the page of the animation of each sliding mode."""
-    from wm_drake.model.replay import replay_page
-
-    return {
-        mode.name: replay_page(result.parameters, mode_motion(mode), title=mode.name)
-        for mode in result.modes[SLIDING]
-    }
-
-
-SHOWN_AMPLITUDE = 0.03
-"""Largest displacement of a shown mode, with angles times 0.25 m. [m]"""
-
-PERIOD, PERIODS = 1.5, 2
-"""Time of a shown cycle, slower than it is, and number of cycles. [s]"""
-
-
-def mode_motion(mode: Mode) -> Motion:
-    """Return the motion of a mode that neither grows nor decays; the drum stands still."""
-    time = np.arange(0.0, PERIODS * PERIOD, 1.0 / REPLAY_RATE)
-    turns = np.exp(2j * np.pi * time / PERIOD)
-    weight = np.repeat([ANGLE_ARM, 1.0], 3)
-    shape = mode.shape * (SHOWN_AMPLITUDE / np.max(np.abs(mode.shape * weight)))
-    motion = np.real(np.outer(turns, shape))
-    still = np.zeros(len(time))
-    return Motion(time, np.column_stack([motion, still]), still)
+def modes_frame(result: MachineModes) -> pd.DataFrame:
+    """Return the modes with shapes, participation and shares of the elements."""
+    rows = []
+    for name in (STUCK, SLIDING):
+        for mode in result.modes[name]:
+            row: dict[str, Any] = {
+                "linearisation": name,
+                "mode": mode.name,
+                "frequency_Hz": mode.frequency_hz,
+                "damping_ratio": mode.damping_ratio,
+            }
+            for coordinate, value in zip(COORDINATES, mode.shape, strict=True):
+                unit = "rad" if coordinate in COORDINATES[:3] else "m"
+                row[f"shape_{coordinate}_real_{unit}"] = value.real
+                row[f"shape_{coordinate}_imag_{unit}"] = value.imag
+            for coordinate, share in zip(COORDINATES, mode.participation, strict=True):
+                row[f"participation_{coordinate}"] = share
+            for kind in ("strain_energy", "dissipation"):
+                for element, share in zip(result.elements, getattr(mode, kind), strict=True):
+                    row[f"{kind} {element}"] = share
+            rows.append(row)
+    return pd.DataFrame(rows)

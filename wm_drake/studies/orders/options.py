@@ -33,7 +33,7 @@ ORDERS = Study(
     "orders",
     "Compute waterfall and order map of the signals of a record.",
     OrdersOptions,
-    imported("wm_drake.studies.orders.study:OrdersTask"),
+    imported("wm_drake.studies.orders.task:OrdersTask"),
     has_runs=False,
     group="record",
     has_machine=False,

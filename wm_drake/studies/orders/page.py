@@ -1,18 +1,22 @@
 """Page of the orders of a record: waterfall and order map of each signal."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report import figure as fig
-from wm_drake.report.formatting import RPM_PER_RAD_S, number
+from wm_drake.report.formatting import RPM_PER_RAD_S, number, plain
 from wm_drake.report.page import Section, SectionedPage, picture
 from wm_drake.report.table import Column, Group, Row, Table
+from wm_drake.simulation.netcdf import netcdf_bytes
 from wm_drake.simulation.orders import REVOLUTIONS
 from wm_drake.simulation.records import versions
 from wm_drake.studies.orders.study import Orders
-from wm_drake.studies.study import Facts
+from wm_drake.studies.study import Facts, Result
 
 WATERFALL_LINES = 40
 """Largest number of spectra of a waterfall."""
@@ -20,6 +24,47 @@ WATERFALL_LINES = 40
 
 MAP_COLUMNS = 400
 """Largest number of columns of an order map."""
+
+
+@dataclass(frozen=True)
+class OrdersResult(Result):
+    """Maps of the signals of a file, as they are shown."""
+
+    orders: Orders
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Return amplitudes of some orders over time."""
+        columns: dict[str, FloatArray] = {
+            "time_s": self.orders.orders.time.values,
+            "speed_rpm": RPM_PER_RAD_S * self.orders.orders.speed.values,
+        }
+        for order in self.orders.shown_orders():
+            values = self.orders.at_order(order)
+            for index, name in enumerate(self.orders.signals.names):
+                columns[f"order {order:g} {name}, {self.orders.signals.unit}"] = values[:, index]
+        return {"orders": pd.DataFrame(columns)}
+
+    def write(self, folder: Path) -> None:
+        """Write the table, and the whole map as netCDF."""
+        super().write(folder)
+        maps = self.orders.orders.assign_coords(signal=self.orders.signals.names)
+        maps.name, maps.attrs["units"] = "amplitude", self.orders.signals.unit
+        (folder / "orders.nc").write_bytes(netcdf_bytes(maps.to_dataset()))
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the table by columns."""
+        columns = self.tables()["orders"].to_dict("list")
+        signals = self.orders.signals
+        about = {"file": signals.source, "unit": signals.unit, "signals": signals.names}
+        return about | {"orders": plain(columns)}
+
+    def terminal(self) -> list[str]:
+        """Return a sentence about the largest component."""
+        return [summary(self.orders)]
+
+    def page(self, facts: Facts) -> str:
+        """Return the page."""
+        return orders_page(self.orders, facts)
 
 
 def orders_page(result: Orders, facts: Facts) -> str:

@@ -3,10 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import pandas as pd
 import xarray as xr
 from scipy.integrate import cumulative_trapezoid
 
@@ -24,14 +22,8 @@ from wm_drake.parameters.recorded import (
 from wm_drake.parameters.recorded import SPEED as DRUM_SPEED
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit, factor_of, plain_unit
-from wm_drake.report.formatting import RPM_PER_RAD_S, plain
-from wm_drake.simulation.netcdf import netcdf_bytes
 from wm_drake.simulation.orders import REVOLUTIONS, frequency_map, order_map
 from wm_drake.simulation.records import read_measured
-from wm_drake.studies.inputs import channel_names, existing_file
-from wm_drake.studies.orders.options import OrdersOptions
-from wm_drake.studies.run import Executor
-from wm_drake.studies.study import Facts, Result, Task
 
 SHOWN_ORDERS = (0.5, 1.0, 2.0, 3.0)
 """Orders of the table and of the CSV file."""
@@ -58,7 +50,7 @@ class Signals:
 
 
 @dataclass(frozen=True)
-class Orders(Result):
+class Orders:
     """Order map and frequency map of signals, as `wm_drake.simulation.orders` returns them."""
 
     signals: Signals
@@ -73,59 +65,6 @@ class Orders(Result):
     def at_order(self, order: float) -> FloatArray:
         """Return the amplitude of the nearest order of the map. (times, signals)"""
         return np.asarray(self.orders.sel(order=order, method="nearest").values)
-
-    def tables(self) -> dict[str, pd.DataFrame]:
-        """Return amplitudes of some orders over time."""
-        columns: dict[str, FloatArray] = {
-            "time_s": self.orders.time.values,
-            "speed_rpm": RPM_PER_RAD_S * self.orders.speed.values,
-        }
-        for order in self.shown_orders():
-            values = self.at_order(order)
-            for index, name in enumerate(self.signals.names):
-                columns[f"order {order:g} {name}, {self.signals.unit}"] = values[:, index]
-        return {"orders": pd.DataFrame(columns)}
-
-    def write(self, folder: Path) -> None:
-        """Write the table, and the whole map as netCDF."""
-        super().write(folder)
-        maps = self.orders.assign_coords(signal=self.signals.names)
-        maps.name, maps.attrs["units"] = "amplitude", self.signals.unit
-        (folder / "orders.nc").write_bytes(netcdf_bytes(maps.to_dataset()))
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the table by columns."""
-        columns = self.tables()["orders"].to_dict("list")
-        signals = self.signals
-        about = {"file": signals.source, "unit": signals.unit, "signals": signals.names}
-        return about | {"orders": plain(columns)}
-
-    def terminal(self) -> list[str]:
-        """Return a sentence about the largest component."""
-        from wm_drake.studies.orders.page import summary
-
-        return [summary(self)]
-
-    def page(self, facts: Facts) -> str:
-        """Return the page."""
-        from wm_drake.studies.orders.page import orders_page
-
-        return orders_page(self, facts)
-
-
-class OrdersTask(Task):
-    """Orders of the signals of a file."""
-
-    def __init__(self, options: OrdersOptions) -> None:
-        """Read the file."""
-        file = existing_file(options.file, "FILE")
-        names, unit = channel_names(options)
-        self.signals = read_signals(file, names, unit)
-        self.highest = options.highest
-
-    def run(self, executor: Executor) -> Orders:  # noqa: ARG002
-        """Compute the maps."""
-        return orders_of(self.signals, self.highest)
 
 
 def read_signals(path: Path, names: ChannelNames | None = None, unit: str = "") -> Signals:
@@ -164,14 +103,14 @@ def _of_record(path: Path) -> Signals:
     record = read_measured(path, dimensions)
     names = [str(name) for name in record.sensor.values]
     columns = dict(zip(names, 1e3 * record.displacement.values.T, strict=True))
-    channels = Synchronous(path, record.time.values, columns)
+    channels = Synchronous(path, record.time.values, {**columns, "": record.drum_angle.values})
     if not np.all(np.diff(channels.time) > 0.0):
         raise input_error("needs at least three samples in rising time", where=str(path))
     even = evenly(channels)
     if len(even.time) != len(channels.time):
         raise input_error("its time has gaps", where=str(path))
     values = np.stack([even.values[name] for name in names], axis=1)
-    return Signals(path.name, names, "mm", even.time, record.drum_angle.values, values)
+    return Signals(path.name, names, "mm", even.time, even.values[""], values)
 
 
 def _speed_and_signals(recording: Recording) -> tuple[Signal, dict[str, Signal]]:

@@ -44,7 +44,7 @@ RIG = tuple(
         kind,
         about,
         options,
-        partial(imported("wm_drake.studies.rig.study:RigTask"), kind),
+        partial(imported("wm_drake.studies.rig.task:RigTask"), kind),
         has_runs=False,
         group="rig",
         has_machine=False,

@@ -1,8 +1,10 @@
 """Page and tables of a bench test."""
 
+import json
 from collections import Counter
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, TypeAlias
+from dataclasses import dataclass
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -10,6 +12,7 @@ import pandas as pd
 from wm_drake.report.formatting import MISSING, MM_PER_M, number
 from wm_drake.report.page import Picture, Section, SectionedPage, picture
 from wm_drake.report.table import Column, Table, line, table_of
+from wm_drake.report.terminal import Printed
 from wm_drake.rigs import ForceLoop, RigRun
 from wm_drake.rigs.run import stroke_points
 from wm_drake.studies.rig.figures import (
@@ -20,10 +23,7 @@ from wm_drake.studies.rig.figures import (
     time_figure,
 )
 from wm_drake.studies.rig.units import DEG_PER_RAD, units_of
-from wm_drake.studies.study import Facts
-
-if TYPE_CHECKING:
-    from wm_drake.studies.rig.study import RigResult
+from wm_drake.studies.study import Facts, Result
 
 SAMPLES_KEPT = 4
 """Step between the samples of a loop that are written to its file."""
@@ -104,11 +104,11 @@ def loop_table(loop: ForceLoop) -> pd.DataFrame:
     return pd.DataFrame({head: values[::SAMPLES_KEPT] for head, values in columns.items()})
 
 
-Printed: TypeAlias = tuple[Sequence[float], str] | None
+PrintedErrors: TypeAlias = tuple[Sequence[float], str] | None
 """Errors that [A] prints of the tests, and a sentence on them; None without."""
 
 
-def measures_table(run: RigRun, printed: Printed = None) -> pd.DataFrame:
+def measures_table(run: RigRun, printed: PrintedErrors = None) -> pd.DataFrame:
     """Return the quantities derived from each loop, with units in the column names.
 
     All values are in SI except frequency, amplitude, loss angle and the printed errors of [A].
@@ -132,7 +132,7 @@ def measures_table(run: RigRun, printed: Printed = None) -> pd.DataFrame:
     return frame.assign(printed_rmse=printed[0]) if printed else frame
 
 
-def measures_shown(run: RigRun, printed: Printed = None) -> Table:
+def measures_shown(run: RigRun, printed: PrintedErrors = None) -> Table:
     """Return the quantities derived from each loop, in units for reading."""
     caption = (
         "Quantities derived from each loop. Energy: area of the loop. Equivalent damping: "
@@ -237,3 +237,50 @@ def _summary(run: RigRun) -> str:
         f"The energy per cycle ranges from {number(min(energies), 2)} to "
         f"{number(max(energies), 2)} mJ."
     )
+
+
+@dataclass(frozen=True)
+class RigResult(Result):
+    """Result of a bench test.
+
+    Attributes:
+        massless: Its loops without masses; None if it has none.
+        beyond: Sentences on tables that the motions leave.
+        printed: Errors that [A] prints of these tests, and a sentence on them; None without.
+    """
+
+    run: RigRun
+    massless: RigRun | None = None
+    beyond: Sequence[str] = ()
+    printed: tuple[Sequence[float], str] | None = None
+    float_format: ClassVar[str] = "%.9g"
+    page = rig_page
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Return each loop, what is derived from the loops, and the effect of masses."""
+        loops = {loop_file(loop).removesuffix(".csv"): loop_table(loop) for loop in self.run.loops}
+        shown = {"measures": measures_table(self.run, self.printed), **loops}
+        if self.massless is not None:
+            shown["masses"] = masses_table(self.run, self.massless)
+        return shown
+
+    def as_json(self) -> dict[str, Any]:
+        """Return what is derived from the loops for JSON: of one loop, or a list of several."""
+        text = measures_table(self.run, self.printed).to_json(orient="records", double_precision=15)
+        rows = json.loads(text)
+        shown = rows[0] if len(rows) == 1 else {"loops": rows}
+        return {"component": self.run.title, **shown}
+
+    def terminal(self) -> Printed:
+        """Return what is derived from the loops, and the effect of masses."""
+        table = measures_shown(self.run, self.printed).terminal(self.run.title)
+        return [table, *([self.effect] if self.effect else [])]
+
+    @property
+    def effect(self) -> str:
+        """Sentence on the effect of masses; "" without masses."""
+        return "" if self.massless is None else masses_sentence(self.run, self.massless)
+
+    def warnings(self) -> Sequence[str]:
+        """Return a warning for a table that the motions leave."""
+        return self.beyond

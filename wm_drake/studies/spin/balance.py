@@ -12,7 +12,7 @@ from wm_drake.report.page import Picture, Section, picture
 from wm_drake.report.table import Column, Table, table_of
 from wm_drake.simulation.balance import Balance, balance_of
 from wm_drake.studies.spin.figures import speed_axis
-from wm_drake.studies.spin.study import CaseResult, SpinResult
+from wm_drake.studies.spin.study import CaseResult, SpinRuns
 
 WINDOW = 0.1
 """Time between rows of a table of angles, and between points of a figure. [s]"""
@@ -31,13 +31,13 @@ BALLS = (
 """Sentences of the section."""
 
 
-def balances(result: SpinResult) -> list[tuple[CaseResult, Balance]]:
+def balances(result: SpinRuns) -> list[tuple[CaseResult, Balance]]:
     """Return the cases of a machine with rings of balls that have samples, with their balance."""
     pairs = [(c, balance_of(c.case, result.parameters, c.record)) for c in result.results]
     return [(case, balance) for case, balance in pairs if balance is not None]
 
 
-def balance_section(result: SpinResult) -> Section:
+def balance_section(result: SpinRuns) -> Section:
     """Return the section; it is empty for a machine without rings."""
     shown = balances(result)
     if not shown:
@@ -47,7 +47,7 @@ def balance_section(result: SpinResult) -> Section:
     return Section("balance", "Balls and remaining unbalance", pictures, tables, BALLS)
 
 
-def balance_frame(result: SpinResult) -> pd.DataFrame:
+def balance_frame(result: SpinRuns) -> pd.DataFrame:
     """Return the unbalance in each plane: of the load, largest, and at the end of the run."""
     rows = [
         {
@@ -78,7 +78,7 @@ def _of_planes(balance: Balance) -> dict[str, dict[str, float]]:
     }
 
 
-def balance_table(result: SpinResult) -> Table:
+def balance_table(result: SpinRuns) -> Table:
     """Return `balance_frame` for reading."""
     caption = (
         "Unbalance in the plane of each ring: of the load alone, largest of load and balls with "
@@ -118,7 +118,7 @@ def balance_line(balance: Balance) -> str:
     return f"{text}; the balls make it larger"
 
 
-def ball_table(result: SpinResult) -> pd.DataFrame:
+def ball_table(result: SpinRuns) -> pd.DataFrame:
     """Return angles of the balls and unbalance in the planes over time, a row for each window."""
     parts = []
     for case, balance in balances(result):

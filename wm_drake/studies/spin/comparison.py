@@ -1,27 +1,28 @@
 """Comparison of spin results: machines or variants of one, with the differences of all measures."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 
 from wm_drake.errors import input_error
-from wm_drake.parameters import MachineParameters, SpinProfile, measured_amplitudes
+from wm_drake.parameters import (
+    MachineParameters,
+    SpinProfile,
+    measured_amplitudes,
+    measured_changes,
+)
 from wm_drake.parameters.measured import EXPERIMENT
 from wm_drake.parameters.units import Unit
-from wm_drake.report.formatting import plain
-from wm_drake.report.terminal import Printed
 from wm_drake.simulation.displacements import percent_difference, smooth_envelope
 from wm_drake.simulation.measures import MEASURES, Variable
 from wm_drake.simulation.measures.as_json import labelled_values
 from wm_drake.simulation.measures.registry import tabulated
 from wm_drake.simulation.records import Record
-from wm_drake.studies.spin.study import CaseResult, SpinResult
-from wm_drake.studies.study import PAGE, Facts, Result
+from wm_drake.studies.spin.study import CaseResult, SpinRuns
 
 MOST_VARIANTS = 6
 """Largest number of variants that a figure can tell apart."""
@@ -63,96 +64,12 @@ class Variant:
     """
 
     name: str
-    result: SpinResult
+    result: SpinRuns
 
     @property
     def page(self) -> str:
         """Name of the file with its own page."""
         return f"report_{self.result.files.part}.html"
-
-
-@dataclass(frozen=True)
-class ComparisonResult(Result):
-    """Results of several machines, or of runs with and without gasket.
-
-    Attributes:
-        variants: At least two; see `check_comparable`.
-        differences: Result of `difference_table`.
-        effect: Effect of the gasket on the amplitudes, result of `effects`; None if
-            the variants are not the same machines with and without gasket.
-    """
-
-    variants: tuple[Variant, ...]
-    differences: pd.DataFrame
-    effect: pd.DataFrame | None = None
-
-    float_formats: ClassVar[Mapping[str, str]] = {"amplitudes": "%.4f"}
-
-    def tables(self) -> dict[str, pd.DataFrame]:
-        """Return amplitudes, differences of all measures, and the effect of the gasket."""
-        amplitudes = [v.result.tables()["amplitudes"].assign(variant=v.name) for v in self.variants]
-        joined = pd.concat(amplitudes, ignore_index=True)
-        shown = {"amplitudes": joined[["variant", *joined.columns.drop("variant")]]}
-        effect = {} if self.effect is None else {"effect": self.effect}
-        return shown | {"differences": self.differences} | effect
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the measures of each variant, and their differences."""
-        first = self.variants[0].result
-        cases = [variant.result.as_json()["cases"] for variant in self.variants]
-        tree: dict[str, Any] = {
-            "engine": first.engine,
-            "variants": [
-                {"name": v.name, "machine": v.result.parameters.name, "cases": of_variant}
-                for v, of_variant in zip(self.variants, cases, strict=True)
-            ],
-            "differences": self.differences.to_dict("records"),
-        }
-        if self.effect is not None:
-            tree["effect"] = self.effect.to_dict("records")
-            tree["steady_window_s"] = steady_window(first.results[0].case.profile)
-        return dict(plain(tree))  # JSON has no NaN
-
-    def terminal(self) -> Printed:
-        """Return the amplitudes, the effect of the gasket, and the smallest gaps."""
-        from wm_drake.studies.spin.comparison_page import effect_summary, terminal_table
-        from wm_drake.studies.spin.tables import amplitude_lines, gap_text
-
-        amplitudes = self.tables()["amplitudes"]
-        gaps = [
-            f"{variant.name}, {case.case.name}: {text}"
-            for variant in self.variants
-            for case in variant.result.results
-            if (text := gap_text(case))
-        ]
-        shown: list[Any] = [amplitude_lines("Displacement amplitudes, in mm", amplitudes), *gaps]
-        if self.effect is None:
-            return shown
-        return [*shown, terminal_table(self.effect), effect_summary(self.effect)]
-
-    def page(self, facts: Facts) -> str:
-        """Return the page of the comparison."""
-        from wm_drake.studies.spin.comparison_page import comparison_page
-
-        return comparison_page(self, facts)
-
-    def pages(self, facts: Facts) -> dict[str, str]:
-        """Return the page of the comparison and that of each variant."""
-        return {PAGE: self.page(facts)} | {v.page: v.result.page(facts) for v in self.variants}
-
-    def write(self, folder: Path) -> None:
-        """Write the tables and the files of the cases."""
-        super().write(folder)
-        for variant in self.variants:
-            variant.result.write_cases(folder)
-
-    def warnings(self) -> list[str]:
-        """Return warnings of the variants."""
-        return [f"{v.name}: {text}" for v in self.variants for text in v.result.warnings()]
-
-    def failures(self) -> list[str]:
-        """Return a line for each case that diverged."""
-        return [f"{v.name}: {text}" for v in self.variants for text in v.result.failures()]
 
 
 def compared_variables() -> dict[str, Variable]:
@@ -301,16 +218,18 @@ def steady_amplitudes(record: Record, window: tuple[float, float]) -> xr.DataArr
     return smooth_envelope(record).sel(time=slice(*window)).mean("time")
 
 
-def effect_table(without: SpinResult, with_gasket: SpinResult) -> pd.DataFrame:
+def effect_table(without: SpinRuns, with_gasket: SpinRuns) -> pd.DataFrame:
     """Return the amplitudes of each load and sensor without and with gasket.
 
     Returns:
         Columns load, sensor, without_mm, with_mm, percent ([B] Eq. (1)); experiment_without_mm,
         experiment_with_mm, experiment_percent, which are NaN where nothing was measured or compared
-        ([B] Table 1); steady_without_mm, steady_with_mm, steady_percent, which are NaN if the
-        profile has no stretch of constant speed.
+        ([B] Table 1, percentages as printed); steady_without_mm, steady_with_mm, steady_percent,
+        which are NaN if the profile has no stretch of constant speed.
     """
     rows = []
+    changes = measured_changes(with_gasket.parameters)
+    changes = changes[changes["source"] == EXPERIMENT].set_index("load")
     for both in zip(without.results, with_gasket.results, strict=True):
         first = both[0]
         window = steady_window(first.case.profile)
@@ -322,12 +241,14 @@ def effect_table(without: SpinResult, with_gasket: SpinResult) -> pd.DataFrame:
             "steady_": [steady_amplitudes(c.record, window) if window else missing for c in both],
         }
         for sensor in map(str, first.record.sensor.values):
-            row: dict[str, object] = {"load": first.case.name, "sensor": sensor}
+            row: dict[str, Any] = {"load": first.case.name, "sensor": sensor}
             for prefix, values in columns.items():
                 one, other = (value.sel(sensor=sensor) for value in values)
                 row[f"{prefix}without_mm"] = MM.from_si(float(one))
                 row[f"{prefix}with_mm"] = MM.from_si(float(other))
                 row[f"{prefix}percent"] = float(percent_difference(other, one))
+            if np.isfinite(row["experiment_percent"]):
+                row["experiment_percent"] = changes.loc[first.case.name, sensor]
             rows.append(row)
     return pd.DataFrame(rows)
 
@@ -350,7 +271,7 @@ def effects(variants: Sequence[Variant]) -> pd.DataFrame:
     return pd.concat(tables, ignore_index=True)
 
 
-def _experiment(result: SpinResult, case: CaseResult) -> xr.DataArray:
+def _experiment(result: SpinRuns, case: CaseResult) -> xr.DataArray:
     """Return the measured amplitude of each sensor; NaN where nothing is compared. [m]"""
     sensors = [str(name) for name in case.record.sensor.values]
     values = np.full(len(sensors), np.nan)

@@ -1,31 +1,32 @@
 """Comparison of spin results: overlaid envelopes, tables of differences, and a page of both."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import pandas as pd
 
 from wm_drake.parameters import quantities
 from wm_drake.report.figure import MEASURED, OURS, QUIET, Axis, Figure, Line, Mark, Panel, Rule
-from wm_drake.report.formatting import MISSING, MM_PER_M, listed, number, percent
+from wm_drake.report.formatting import MISSING, MM_PER_M, listed, number, percent, plain
 from wm_drake.report.page import Picture, Section, SectionedPage, picture, versions_of
 from wm_drake.report.table import Column, Columns, Group, Row, Table, line, readable, table_of
+from wm_drake.report.terminal import Printed
 from wm_drake.simulation.displacements import envelopes, filtered_displacement
 from wm_drake.studies.spin import figures, tables
 from wm_drake.studies.spin.comparison import (
     LARGE_STEADY,
     SMALL_STEADY,
-    ComparisonResult,
     Variant,
     common_sensors,
     remarks,
     steady_window,
 )
-from wm_drake.studies.spin.page import warnings_of
+from wm_drake.studies.spin.page import cases_as_json, slack_springs_warning, spin_page, warnings_of
 from wm_drake.studies.spin.study import CaseResult, band_text
-from wm_drake.studies.study import Facts
+from wm_drake.studies.study import PAGE, Facts, Result
 
 if TYPE_CHECKING:
     from rich.table import Table as TerminalTable
@@ -38,6 +39,91 @@ MOST_MARKED = 3
 
 DECIMALS = {"mm": 1, "rpm": 0, "N": 1, "N*m": 2}
 """Decimals of a value in a table, by unit; others have two."""
+
+
+@dataclass(frozen=True)
+class SpinComparisonResult(Result):
+    """Results of several machines, or of runs with and without gasket.
+
+    Attributes:
+        variants: At least two; see `check_comparable`.
+        differences: Result of `difference_table`.
+        effect: Effect of the gasket on the amplitudes, result of `effects`; None if
+            the variants are not the same machines with and without gasket.
+    """
+
+    variants: tuple[Variant, ...]
+    differences: pd.DataFrame
+    effect: pd.DataFrame | None = None
+
+    float_formats: ClassVar[Mapping[str, str]] = {"amplitudes": "%.4f"}
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Return amplitudes, differences of all measures, and the effect of the gasket."""
+        amplitudes = [
+            tables.banded_amplitudes(v.result).assign(variant=v.name) for v in self.variants
+        ]
+        joined = pd.concat(amplitudes, ignore_index=True)
+        shown = {"amplitudes": joined[["variant", *joined.columns.drop("variant")]]}
+        effect = {} if self.effect is None else {"effect": self.effect}
+        return shown | {"differences": self.differences} | effect
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the measures of each variant, and their differences."""
+        first = self.variants[0].result
+        cases = [cases_as_json(variant.result) for variant in self.variants]
+        tree: dict[str, Any] = {
+            "engine": first.engine,
+            "variants": [
+                {"name": v.name, "machine": v.result.parameters.name, "cases": of_variant}
+                for v, of_variant in zip(self.variants, cases, strict=True)
+            ],
+            "differences": self.differences.to_dict("records"),
+        }
+        if self.effect is not None:
+            tree["effect"] = self.effect.to_dict("records")
+            tree["steady_window_s"] = steady_window(first.results[0].case.profile)
+        return dict(plain(tree))  # JSON has no NaN
+
+    def terminal(self) -> Printed:
+        """Return the amplitudes, the effect of the gasket, and the smallest gaps."""
+        amplitudes = self.tables()["amplitudes"]
+        gaps = [
+            f"{variant.name}, {case.case.name}: smallest gap {text}"
+            for variant in self.variants
+            for case in variant.result.results
+            if (text := case.gap_text)
+        ]
+        title = "Displacement amplitudes, in mm"
+        shown: list[Any] = [tables.amplitude_lines(title, amplitudes), *gaps]
+        if self.effect is None:
+            return shown
+        return [*shown, terminal_table(self.effect), effect_summary(self.effect)]
+
+    def page(self, facts: Facts) -> str:
+        """Return the page of the comparison."""
+        return comparison_page(self, facts)
+
+    def pages(self, facts: Facts) -> dict[str, str]:
+        """Return the page of the comparison and that of each variant."""
+        of_variants = {v.page: spin_page(v.result, facts) for v in self.variants}
+        return {PAGE: self.page(facts)} | of_variants
+
+    def write(self, folder: Path) -> None:
+        """Write the tables and the files of the cases."""
+        super().write(folder)
+        for variant in self.variants:
+            variant.result.write_cases(folder)
+
+    def warnings(self) -> list[str]:
+        """Return warnings of the variants."""
+        return [
+            f"{v.name}: {text}" for v in self.variants for text in slack_springs_warning(v.result)
+        ]
+
+    def failures(self) -> list[str]:
+        """Return a line for each case that diverged."""
+        return [f"{v.name}: {text}" for v in self.variants for text in v.result.failures()]
 
 
 def overlaid_envelopes_figure(
@@ -214,7 +300,7 @@ def _measured_mm(variants: Sequence[Variant], index: int) -> dict[str, dict[str,
     return different
 
 
-def comparison_page(comparison: ComparisonResult, facts: Facts | None = None) -> str:
+def comparison_page(comparison: SpinComparisonResult, facts: Facts | None = None) -> str:
     """Return the comparison as text of one self-contained HTML file."""
     variants, table, made = comparison.variants, comparison.differences, facts or Facts()
     machines = [variant.result.parameters for variant in variants]
@@ -250,7 +336,7 @@ def comparison_page(comparison: ComparisonResult, facts: Facts | None = None) ->
     ).html()
 
 
-def _pictures(comparison: ComparisonResult, index: int) -> Iterator[Picture | None]:
+def _pictures(comparison: SpinComparisonResult, index: int) -> Iterator[Picture | None]:
     """Yield overlaid envelopes of a case, and records with and without gasket of each machine."""
     variants, effect = comparison.variants, comparison.effect
     yield envelopes_picture(variants, index)
@@ -264,7 +350,7 @@ def _pictures(comparison: ComparisonResult, index: int) -> Iterator[Picture | No
         yield records_picture(rows, without, with_gasket)
 
 
-def _amplitude_sections(comparison: ComparisonResult) -> list[Section]:
+def _amplitude_sections(comparison: SpinComparisonResult) -> list[Section]:
     """Return the amplitudes of all variants, and the effect of the gasket if that is compared."""
     variants, effect = comparison.variants, comparison.effect
     shown = (amplitudes(variants, comparison.differences),)
@@ -293,7 +379,7 @@ def title(variants: Sequence[Variant]) -> str:
     return f"Comparison of machines {names}"
 
 
-def summary(comparison: ComparisonResult) -> str:
+def summary(comparison: SpinComparisonResult) -> str:
     """Return one paragraph: the largest amplitude and the smallest gap of each variant."""
     variants, table = comparison.variants, comparison.differences
     count = len(variants[0].result.results)
@@ -342,8 +428,8 @@ def facts_of_comparison(variants: Sequence[Variant], made: Facts) -> list[tuple[
     facts = []
     for variant in variants:
         machine = variant.result.parameters
-        step = f"step {1e3 * variant.result.step:g} ms"
-        facts.append((variant.name, f"{machine.about} {step.capitalize()}.".strip()))
+        how = variant.result.stepping_text
+        facts.append((variant.name, f"{machine.about} Integration: {how}.".strip()))
     versions = versions_of(first.results[0].record.attrs)
     made = replace(made, step=0.0)  # the lines of the variants have it
     return [*facts, ("Engine", first.engine), ("Versions", versions), *made.rows()]

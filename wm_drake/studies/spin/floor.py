@@ -15,7 +15,7 @@ from wm_drake.simulation.feet import MARGINS
 from wm_drake.simulation.measures.record import foot_loads_of
 from wm_drake.simulation.mounts import POINT
 from wm_drake.simulation.records import cabinet_in
-from wm_drake.studies.spin.study import CaseResult, SpinResult
+from wm_drake.studies.spin.study import CaseResult, SpinRuns
 
 WINDOW = 0.25
 """Time over which a figure shows the smallest value. [s]"""
@@ -32,7 +32,7 @@ HEADS = (
 """Heads of the columns of `MARGINS`."""
 
 
-def floor_section(result: SpinResult) -> Section:
+def floor_section(result: SpinRuns) -> Section:
     """Return the section; without cabinet in the machine file it has the resultant only."""
     standing = [case for case in result.results if case.measures.feet is not None]
     cabinet = result.parameters.cabinet
@@ -58,7 +58,7 @@ def floor_section(result: SpinResult) -> Section:
     return Section("cabinet", "Forces on the cabinet and the floor", pictures, tuple(shown), text)
 
 
-def floor_warnings(result: SpinResult) -> list[str]:
+def floor_warnings(result: SpinRuns) -> list[str]:
     """Return a warning for each case in which the cabinet would move, or walks."""
     warnings = []
     for case in result.results:
@@ -77,7 +77,7 @@ def floor_warnings(result: SpinResult) -> list[str]:
     return warnings
 
 
-def resultant_table(result: SpinResult) -> Table:
+def resultant_table(result: SpinRuns) -> Table:
     """Return force and moment of all mounts on the cabinet."""
     groups = []
     for case in result.results:

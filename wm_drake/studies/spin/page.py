@@ -1,7 +1,8 @@
 """Page of spin runs: the answer, pictures of each load, tables of all measures."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any, ClassVar
 
 import numpy as np
 import pandas as pd
@@ -10,6 +11,7 @@ from wm_drake.elements.motor import evaluate_motor, packed_limit
 from wm_drake.parameters.drive import motor_of
 from wm_drake.parameters.plausibility import unusual_numbers
 from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import Unit
 from wm_drake.report import figure as fig
 from wm_drake.report.formatting import (
     MISSING,
@@ -21,19 +23,29 @@ from wm_drake.report.formatting import (
 )
 from wm_drake.report.page import Picture, Section, SectionedPage, picture, versions_of
 from wm_drake.report.table import Group, Row, Table
+from wm_drake.report.terminal import Printed
+from wm_drake.simulation.balance import balance_of, rings_of
+from wm_drake.simulation.displacements import band_of
 from wm_drake.simulation.drive import CAPTURE_LAG, CAPTURE_TIME, over_revolutions
+from wm_drake.simulation.measures.as_json import as_json
 from wm_drake.simulation.measures.registry import tabulated
+from wm_drake.simulation.mounts import POINT
 from wm_drake.simulation.records import profile_of
 from wm_drake.simulation.spring_tension import slack_springs
 from wm_drake.studies.modes.page import natural_modes_table
 from wm_drake.studies.spin import figures, tables
-from wm_drake.studies.spin.balance import balance_section
+from wm_drake.studies.spin.balance import (
+    balance_as_json,
+    balance_frame,
+    balance_section,
+    ball_table,
+)
 from wm_drake.studies.spin.figures import revolution_starts
 from wm_drake.studies.spin.floor import floor_section, floor_warnings
-from wm_drake.studies.spin.study import CaseResult, Comparison, SpinResult, band_text
+from wm_drake.studies.spin.study import CaseResult, Comparison, SpinRuns, band_text
 from wm_drake.studies.spin.tables import amplitude_table
 from wm_drake.studies.spin.vibration import vibration_pictures
-from wm_drake.studies.study import Facts
+from wm_drake.studies.study import Facts, Result
 
 AXES = (
     "Axes: for a person who faces the door, x points to the right, y along the drum axis from "
@@ -59,7 +71,65 @@ VERDICT = (
 """How the verdict differs from this page."""
 
 
-def spin_page(result: SpinResult, facts: Facts | None = None) -> str:
+@dataclass(frozen=True)
+class SpinResult(Result):
+    """Spin runs of one machine, as they are shown."""
+
+    runs: SpinRuns
+    float_format: ClassVar[str | None] = "%.4f"
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Return the amplitudes, and of a machine with rings of balls what they do."""
+        runs, shown = self.runs, {"amplitudes": tables.banded_amplitudes(self.runs)}
+        if rings_of(runs.parameters) and any(c.record.sizes["time"] for c in runs.results):
+            shown |= {"balance": balance_frame(runs), "balls": ball_table(runs)}
+        return shown
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the measures of each case."""
+        runs = self.runs
+        return {
+            "machine": runs.parameters.name,
+            "engine": runs.engine,
+            "cases": cases_as_json(runs),
+        }
+
+    def terminal(self) -> Printed:
+        """Return the amplitudes, and lines with the other measures of each case."""
+        runs = self.runs
+        title = f"Displacement amplitudes of machine '{runs.parameters.name}', in mm"
+        lines = [line for case in runs.results for line in tables.case_lines(runs.parameters, case)]
+        amplitudes = tables.amplitude_lines(title, self.tables()["amplitudes"])
+        return [amplitudes, *runs.measured_notes(), *lines]
+
+    def page(self, facts: Facts) -> str:
+        """Return the page."""
+        return spin_page(self.runs, facts)
+
+    def write(self, folder: Path) -> None:
+        """Write the amplitudes and the files of the cases."""
+        super().write(folder)
+        self.runs.write_cases(folder)
+
+    def warnings(self) -> list[str]:
+        """Return a warning of springs that go slack, if any do."""
+        return slack_springs_warning(self.runs)
+
+    def failures(self) -> list[str]:
+        """Return a line for each case that diverged."""
+        return self.runs.failures()
+
+
+def cases_as_json(runs: SpinRuns) -> list[dict[str, Any]]:
+    """Return the measures of each case as objects for JSON."""
+    return [
+        case_as_json(case)
+        | {"balance": balance_as_json(balance_of(case.case, runs.parameters, case.record))}
+        for case in runs.results
+    ]
+
+
+def spin_page(result: SpinRuns, facts: Facts | None = None) -> str:
     """Return the page of spin runs as text of one self-contained HTML file."""
     table, made = amplitude_table(result), facts or Facts()
     gaps = _gaps_pictures(result)
@@ -108,7 +178,7 @@ def spin_page(result: SpinResult, facts: Facts | None = None) -> str:
     ).html()
 
 
-def _case_sections(result: SpinResult, table: pd.DataFrame) -> list[Section]:
+def _case_sections(result: SpinRuns, table: pd.DataFrame) -> list[Section]:
     """Return a section for each case; that with the largest amplitude has its vibration too."""
     main, sections = max(result.results, key=lambda case: _peak(case)[0]), []
     for index, case in enumerate(result.results, start=1):
@@ -125,12 +195,13 @@ def _case_sections(result: SpinResult, table: pd.DataFrame) -> list[Section]:
     return sections
 
 
-def summary(result: SpinResult, table: pd.DataFrame) -> str:
+def summary(result: SpinRuns, table: pd.DataFrame) -> str:
     """Return one paragraph about the cases that reached their end."""
     ended = [case for case in result.results if not case.record.attrs["diverged"]]
     count, diverged = len(result.results), len(result.results) - len(ended)
     cases = "1 case was" if count == 1 else f"{count} cases were"
-    speed = number(RPM_PER_RAD_S * max(max(case.case.profile.speed) for case in result.results), 0)
+    fastest = max(case.case.profile.highest_speed for case in result.results)
+    speed = number(RPM_PER_RAD_S * fastest, 0)
     opening = f"{cases} run with the {result.engine} engine, at drum speeds up to {speed} rpm."
     if not ended:
         return f"{opening} Every run diverged, so there is no result to summarize."
@@ -203,7 +274,7 @@ def _case_facts(case: CaseResult) -> str:
     return f"{facts} Smallest gap to the housing: {gap}." if gap else facts
 
 
-def _agreement_sentence(result: SpinResult, cases: list[CaseResult], table: pd.DataFrame) -> str:
+def _agreement_sentence(result: SpinRuns, cases: list[CaseResult], table: pd.DataFrame) -> str:
     changes = [
         change
         for case in cases
@@ -221,7 +292,7 @@ def _agreement_sentence(result: SpinResult, cases: list[CaseResult], table: pd.D
     )
 
 
-def _why_not_compared(result: SpinResult) -> str:
+def _why_not_compared(result: SpinRuns) -> str:
     if not result.parameters.measured:
         return "The machine file has no measured amplitudes."
     if result.comparison is Comparison.NONE:
@@ -237,7 +308,7 @@ def _why_not_compared(result: SpinResult) -> str:
     return "The machine file has no measured amplitudes for these cases."
 
 
-def warnings_of(result: SpinResult) -> list[str]:
+def warnings_of(result: SpinRuns) -> list[str]:
     """Return warnings about unusual numbers, divergence, overlaps, and springs that go slack."""
     warnings = [
         f"{problem.key}: {problem.message}." for problem in unusual_numbers(result.parameters)
@@ -260,21 +331,21 @@ def warnings_of(result: SpinResult) -> list[str]:
     )
 
 
-def slack_springs_warning(result: SpinResult) -> list[str]:
+def slack_springs_warning(result: SpinRuns) -> list[str]:
     """Return a warning of the springs that go slack, or none."""
     return slack_warning(
         {c.title: slack_springs(c.measures.smallest_tension) for c in result.results}, "load"
     )
 
 
-def facts_of_run(result: SpinResult, made: Facts) -> list[tuple[str, str]]:
+def facts_of_run(result: SpinRuns, made: Facts) -> list[tuple[str, str]]:
     """Return what was run and with which software, as pairs of heading and text."""
     attrs = result.results[0].record.attrs
     times = [f"{case.title} {number(case.wall_s)} s" for case in result.results]
     return [
         ("Machine", result.parameters.name),
         ("SDF model", Path(result.parameters.model).name),
-        ("Engine", f"{result.engine}, step {1e3 * result.step:g} ms"),
+        ("Engine", f"{result.engine}, {result.stepping_text}"),
         ("Versions", versions_of(attrs)),
         ("Computing time", "; ".join(times)),
         *replace(made, step=0.0).rows(),  # the line of the engine has the step
@@ -340,7 +411,7 @@ def _gasket_picture(case: CaseResult) -> Picture | None:
     return picture(figures.gasket_figure(case.record), alternative, caption)
 
 
-def _gaps_pictures(result: SpinResult) -> tuple[Picture, ...]:
+def _gaps_pictures(result: SpinRuns) -> tuple[Picture, ...]:
     cases = [case for case in result.results if case.measures.smallest_gap]
     if len(cases) < 2:
         return ()
@@ -352,7 +423,7 @@ def _gaps_pictures(result: SpinResult) -> tuple[Picture, ...]:
     return (picture(figures.gaps_figure(cases), words, caption),)
 
 
-def drive_section(result: SpinResult) -> Section:
+def drive_section(result: SpinRuns) -> Section:
     """Return the section: measures, and speed and torque over time of each load with a motor."""
     drive, pictures = motor_of(result.parameters.drive), tuple[Picture, ...]()
     text = (
@@ -372,14 +443,14 @@ def drive_section(result: SpinResult) -> Section:
     return Section("torques", "Drive", pictures, (drive_table(result),), text)
 
 
-def drive_in_short(result: SpinResult) -> str:
+def drive_in_short(result: SpinRuns) -> str:
     """Return one sentence about the drive."""
     if motor_of(result.parameters.drive) is None:
         return "The drum follows the spin profile exactly; the motor torque has no limit."
     return "A motor turns the drum; the spin profile is the speed that its controller wants."
 
 
-def capture_warnings(result: SpinResult) -> list[str]:
+def capture_warnings(result: SpinRuns) -> list[str]:
     """Return a warning for each case in which the drum is caught below the wanted speed."""
     return [
         f"Load {case.title}: caught at {number(RPM_PER_RAD_S * caught.speed, 0)} rpm "
@@ -391,7 +462,7 @@ def capture_warnings(result: SpinResult) -> list[str]:
     ]
 
 
-def drive_table(result: SpinResult) -> Table:
+def drive_table(result: SpinRuns) -> Table:
     """Return the measures of the drive for each load."""
     groups = []
     for case in result.results:
@@ -430,7 +501,7 @@ def drive_table(result: SpinResult) -> Table:
     return Table(caption, header, tuple(groups))
 
 
-def _picture(result: SpinResult, case: CaseResult) -> Picture:
+def _picture(result: SpinRuns, case: CaseResult) -> Picture:
     drive = case.measures.drive
     caption = (
         f"Load {case.title}. Upper panel: speed of the drum, and the wanted one (dashed). "
@@ -443,7 +514,7 @@ def _picture(result: SpinResult, case: CaseResult) -> Picture:
     return picture(drive_figure(result, case), alternative, caption)
 
 
-def drive_figure(result: SpinResult, case: CaseResult) -> fig.Figure:
+def drive_figure(result: SpinRuns, case: CaseResult) -> fig.Figure:
     """Return speed and torque of a drive with a motor over time."""
     record, time = case.record, case.record.time.values
     torque, speed = record.motor_torque.values, record.drum_speed.values
@@ -477,7 +548,7 @@ def drive_figure(result: SpinResult, case: CaseResult) -> fig.Figure:
     return fig.Figure(panels=fig.in_grid(panels, 1, share="x"), height=200.0)
 
 
-def _limit(result: SpinResult, speed: FloatArray) -> FloatArray:
+def _limit(result: SpinRuns, speed: FloatArray) -> FloatArray:
     """Return the torque limit at the drum at speeds of the drum (n,). [N m]"""
     drive = motor_of(result.parameters.drive)
     assert drive is not None
@@ -486,3 +557,26 @@ def _limit(result: SpinResult, speed: FloatArray) -> FloatArray:
         evaluate_motor(np.array([0.0, rate]), packed, of_motor)
         limit[index] = drive.belt_ratio * of_motor[1]
     return limit
+
+
+def case_as_json(case: CaseResult) -> dict[str, Any]:
+    """Return the measures of a case as an object for JSON."""
+    measures = case.measures
+    tree = as_json(measures.table)
+    tree["cabinet_wrench"]["about"] = POINT
+    if not measures.has_cabinet:
+        tree["feet"] = None
+    walk = measures.walk
+    return {
+        "load": case.case.name,
+        "gasket": case.has_gasket,
+        **tree,
+        "walk": walk
+        and {
+            "distance_mm": Unit("m", "mm").from_si(walk.distance),
+            "turn_deg": Unit("rad", "deg").from_si(walk.turn),
+        },
+        "displacement_band_hz": list(band_of(case.record)),
+        "diverged": case.record.attrs["diverged"] or None,
+        "wall_s": case.wall_s,
+    }

@@ -8,10 +8,9 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from wm_drake.batch.runs import Runner
 from wm_drake.batch.work_items import Preparation
@@ -22,20 +21,14 @@ from wm_drake.model.machine import Machine
 from wm_drake.model.scene import Scene
 from wm_drake.parameters import MachineParameters, Sensor
 from wm_drake.parameters.measured import measured_notes
-from wm_drake.parameters.units import Unit
-from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number
-from wm_drake.report.terminal import Printed
-from wm_drake.simulation.balance import balance_of, rings_of
+from wm_drake.report.formatting import MS_PER_S, RPM_PER_RAD_S, gap_size, number
 from wm_drake.simulation.cases import Case, is_as_measured, notice_jumping_friction
 from wm_drake.simulation.displacements import band_of, largest_motion
 from wm_drake.simulation.measures import Measures, measure
-from wm_drake.simulation.measures.as_json import as_json
-from wm_drake.simulation.mounts import POINT
-from wm_drake.simulation.records import Record, save_record
+from wm_drake.simulation.records import Record, sample_period, save_record
 from wm_drake.simulation.runs import DEFAULT_ENGINE, DivergenceWarning, simulate
 from wm_drake.simulation.steps import checked_integrator, checked_step
 from wm_drake.studies.spin.processes import can_start_processes, map_in_processes
-from wm_drake.studies.study import Facts, Result
 
 if TYPE_CHECKING:
     from wm_drake.studies.modes.study import NaturalModes
@@ -65,12 +58,22 @@ class CaseResult:
 
     @property
     def gap_text(self) -> str:
-        """Smallest gap, its parts and the drum speed there; "" without one."""
+        """Smallest gap, its parts, and drum speed and time there; "" without one."""
         gap = self.measures.smallest_gap
         if gap is None:
             return ""
-        size, speed = number(MM_PER_M * gap.distance), number(self.speed_rpm(gap.time), 0)
-        return f"{size} mm between {gap.parts}, at {speed} rpm"
+        at = f"{number(self.speed_rpm(gap.time), 0)} rpm ({number(gap.time, 2)} s)"
+        return f"{gap_size(gap.distance)} between {gap.parts}, at {at}"
+
+    @property
+    def stepping_text(self) -> str:
+        """Integrator and step that the run used, and the time between its samples."""
+        how = self.record.attrs
+        step = f"{how['step_s'] * MS_PER_S:g} ms"
+        words = f"steps of up to {step} with controlled error"
+        if "integrator" in how:
+            words = f"{how['integrator']}, steps of {step}"
+        return f"{words}, samples every {sample_period(self.record) * MS_PER_S:g} ms"
 
     def speed_rpm(self, time: float) -> float:
         """Return the drum speed at a time. [rpm]"""
@@ -118,7 +121,7 @@ class Files:
 
 
 @dataclass(frozen=True)
-class SpinResult(Result):
+class SpinRuns:
     """Results of all cases, in the order in which the cases were given.
 
     `modes` are the natural modes of the machine with the load of the first case; None if they were
@@ -127,19 +130,21 @@ class SpinResult(Result):
 
     parameters: MachineParameters
     engine: str
-    step: float
     results: tuple[CaseResult, ...]
     comparison: Comparison = Comparison.AS_MEASURED
     modes: "NaturalModes | None" = None
     files: Files = Files()
-
-    float_format: ClassVar[str | None] = "%.4f"
 
     def is_compared(self, result: CaseResult) -> bool:
         """Return whether a case is compared with the measured amplitudes of the machine."""
         if self.comparison is not Comparison.AS_MEASURED:
             return self.comparison is Comparison.ALL
         return is_as_measured(self.parameters, result.case)
+
+    @property
+    def stepping_text(self) -> str:
+        """How the cases were integrated and sampled, each way once."""
+        return "; ".join(dict.fromkeys(case.stepping_text for case in self.results))
 
     def sensors_of(self, case: CaseResult) -> dict[str, Sensor]:
         """Return the displacement sensors of the machine that a case was run with."""
@@ -152,50 +157,10 @@ class SpinResult(Result):
     def _name_of(self, case: CaseResult) -> str:
         return "_".join(filter(None, [self.files.part, case.case.name]))
 
-    def tables(self) -> dict[str, pd.DataFrame]:
-        """Return the amplitudes, and of a machine with rings of balls what they do."""
-        from wm_drake.studies.spin.balance import balance_frame, ball_table
-        from wm_drake.studies.spin.tables import banded_amplitudes
-
-        tables = {"amplitudes": banded_amplitudes(self)}
-        if rings_of(self.parameters) and any(c.record.sizes["time"] for c in self.results):
-            tables |= {"balance": balance_frame(self), "balls": ball_table(self)}
-        return tables
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the measures of each case."""
-        from wm_drake.studies.spin.balance import balance_as_json
-
-        cases = [
-            case_as_json(case)
-            | {"balance": balance_as_json(balance_of(case.case, self.parameters, case.record))}
-            for case in self.results
-        ]
-        return {"machine": self.parameters.name, "engine": self.engine, "cases": cases}
-
-    def terminal(self) -> Printed:
-        """Return the amplitudes, and lines with the other measures of each case."""
-        from wm_drake.studies.spin.tables import amplitude_lines, case_lines
-
-        title = f"Displacement amplitudes of machine '{self.parameters.name}', in mm"
-        lines = [line for case in self.results for line in case_lines(self.parameters, case)]
-        return [amplitude_lines(title, self.tables()["amplitudes"]), *self.measured_notes(), *lines]
-
     def measured_notes(self) -> list[str]:
         """Return what the measured amplitudes in the comparison are, by their files."""
         compared = any(map(self.is_compared, self.results))
         return measured_notes(self.parameters) if compared else []
-
-    def page(self, facts: Facts) -> str:
-        """Return the page."""
-        from wm_drake.studies.spin.page import spin_page
-
-        return spin_page(self, facts)
-
-    def write(self, folder: Path) -> None:
-        """Write the amplitudes and the files of the cases."""
-        super().write(folder)
-        self.write_cases(folder)
 
     def write_cases(self, folder: Path) -> None:
         """Write the record of each case and its 3D replay where wanted."""
@@ -205,12 +170,6 @@ class SpinResult(Result):
             if file := self.replay_of(case):
                 (folder / file).write_text(case_replay(self.parameters, case), encoding="utf-8")
 
-    def warnings(self) -> list[str]:
-        """Return a warning of springs that go slack, if any do."""
-        from wm_drake.studies.spin.page import slack_springs_warning
-
-        return slack_springs_warning(self)
-
     def failures(self) -> list[str]:
         """Return a line for each case that diverged."""
         return [
@@ -218,29 +177,6 @@ class SpinResult(Result):
             for case in self.results
             if case.record.attrs["diverged"]
         ]
-
-
-def case_as_json(case: CaseResult) -> dict[str, Any]:
-    """Return the measures of a case as an object for JSON."""
-    measures = case.measures
-    tree = as_json(measures.table)
-    tree["cabinet_wrench"]["about"] = POINT
-    if not measures.has_cabinet:
-        tree["feet"] = None
-    walk = measures.walk
-    return {
-        "load": case.case.name,
-        "gasket": case.has_gasket,
-        **tree,
-        "walk": walk
-        and {
-            "distance_mm": Unit("m", "mm").from_si(walk.distance),
-            "turn_deg": Unit("rad", "deg").from_si(walk.turn),
-        },
-        "displacement_band_hz": list(band_of(case.record)),
-        "diverged": case.record.attrs["diverged"] or None,
-        "wall_s": case.wall_s,
-    }
 
 
 @dataclass(frozen=True)
@@ -263,7 +199,7 @@ def run_spin(
     workers: int | None = None,
     comparison: Comparison = Comparison.AS_MEASURED,
     modes: bool = False,
-) -> SpinResult:
+) -> SpinRuns:
     """Run cases and return their records and measures.
 
     The results do not depend on the number of workers.
@@ -306,7 +242,7 @@ def run_spin(
             for index, item in enumerate(work_items)
         ]
     natural = _modes_of(built, cases[0]) if modes else None
-    return SpinResult(parameters, engine, step, tuple(results), comparison, natural)
+    return SpinRuns(parameters, engine, tuple(results), comparison, natural)
 
 
 def _modes_of(machine: Machine, case: Case) -> "NaturalModes | None":

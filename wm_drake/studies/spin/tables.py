@@ -11,7 +11,6 @@ import xarray as xr
 
 from wm_drake.parameters import MachineParameters, measured_amplitudes, quantities
 from wm_drake.parameters.measured import BAND, EXPERIMENT
-from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number, percent, shape_name
 from wm_drake.report.table import (
     MOST_SHOWN,
@@ -34,7 +33,7 @@ from wm_drake.simulation.mount_forces import mount_forces, rms_table, speed_rang
 from wm_drake.simulation.spring_tension import slack_springs
 from wm_drake.simulation.vibration import sensor_accelerations
 from wm_drake.studies.spin.balance import balance_line
-from wm_drake.studies.spin.study import CaseResult, SpinResult, band_text
+from wm_drake.studies.spin.study import CaseResult, SpinRuns, band_text
 
 if TYPE_CHECKING:
     from rich.table import Table as TerminalTable
@@ -52,7 +51,7 @@ class Difference:
     percent: float
 
 
-def amplitude_table(result: SpinResult) -> pd.DataFrame:
+def amplitude_table(result: SpinRuns) -> pd.DataFrame:
     """Return the amplitudes: load, gasket (yes, no), source, and one column per sensor. [mm]
 
     For each case, the table holds the measured rows with the same load and gasket, if the case is
@@ -77,7 +76,7 @@ def amplitude_table(result: SpinResult) -> pd.DataFrame:
     return pd.concat([part for part in parts if len(part)], ignore_index=True)
 
 
-def banded_amplitudes(result: SpinResult) -> pd.DataFrame:
+def banded_amplitudes(result: SpinRuns) -> pd.DataFrame:
     """Return the amplitudes, and in the column `band` the pass band of each computed row."""
     table = amplitude_table(result)
     table.loc[table["source"] == OURS, BAND] = [
@@ -135,7 +134,7 @@ def differences(table: pd.DataFrame, case: CaseResult, source: str = OURS) -> li
     return [Difference(case.title, name, float(change.sel(sensor=name))) for name in sensors]
 
 
-def comparison(result: SpinResult, table: pd.DataFrame) -> Table:
+def comparison(result: SpinRuns, table: pd.DataFrame) -> Table:
     """Return the amplitudes with their percent differences from the experiment."""
     sensors = list(result.parameters.sensors)
 
@@ -170,14 +169,14 @@ def _difference_rows(changes: list[Difference], source: str) -> list[Row]:
     return [Row(cells, "difference" if source == OURS else "difference other")]
 
 
-def critical_speeds(result: SpinResult) -> Table:
+def critical_speeds(result: SpinRuns) -> Table:
     """Return the drum speed at which the displacement of each sensor is largest."""
     (variable,) = (v for v in MEASURES["amplitudes"].variables if v.name == "critical_speed")
     caption = "Critical speeds: the drum speed at which the displacement of each sensor is largest."
     return replace(variable_table(result, variable, 0), caption=caption)
 
 
-def variable_table(result: SpinResult, variable: Variable, decimals: int | None = None) -> Table:
+def variable_table(result: SpinRuns, variable: Variable, decimals: int | None = None) -> Table:
     """Return one variable of a measure for each case.
 
     Args:
@@ -194,7 +193,7 @@ def variable_table(result: SpinResult, variable: Variable, decimals: int | None 
     return Table(caption, ("load", *columns), tuple(groups))
 
 
-def largest_values(result: SpinResult) -> Table:
+def largest_values(result: SpinRuns) -> Table:
     """Return D, F and M of [B] for each case."""
     parameters = result.parameters
     assumed = f" (assumption: frame {parameters.clearance_frame}, as the first sensor)"
@@ -219,7 +218,7 @@ def largest_values(result: SpinResult) -> Table:
     return by_case(result.results, caption, columns, rows)
 
 
-def accelerations(result: SpinResult) -> Table:
+def accelerations(result: SpinRuns) -> Table:
     """Return the largest acceleration at each sensor, and the RMS over the run."""
 
     def rows(case: CaseResult) -> list[Row]:
@@ -236,7 +235,7 @@ def accelerations(result: SpinResult) -> Table:
     return by_case(cases, caption, columns, rows, text_columns=2)
 
 
-def mount_force_tables(result: SpinResult) -> list[Table]:
+def mount_force_tables(result: SpinRuns) -> list[Table]:
     """Return the forces of the mounts on the cabinet, one table for each spin profile."""
     caption = (
         "Size of the force of each mount on the cabinet: at rest, largest with its drum speed, and "
@@ -270,7 +269,7 @@ def _mount_rows(case: CaseResult) -> Iterator[Row]:
             yield Row((name, force.at_rest, force.peak, speed, *map(float, rms)))
 
 
-def smallest_gaps(result: SpinResult) -> Table:
+def smallest_gaps(result: SpinRuns) -> Table:
     """Return the smallest gap of each case: its width, the two parts, the time and the place."""
     caption = (
         "Smallest gap between the housing and the parts that move with the tub, over all samples. "
@@ -299,7 +298,7 @@ def _gap_rows(case: CaseResult) -> list[Row]:
     return [Row(cells, "alarm" if gap.distance <= 0.0 else "")]
 
 
-def smallest_tensions(result: SpinResult) -> Table:
+def smallest_tensions(result: SpinRuns) -> Table:
     """Return the smallest tension of each spring for each case."""
     caption = (
         "Smallest tension of each spring over all samples, in N. A spring that only pulls goes "
@@ -315,7 +314,7 @@ def _tension_rows(case: CaseResult) -> list[Row]:
     return [Row(tuple(smallest.values), "alarm" if slack_springs(smallest) else "")]
 
 
-def loads(result: SpinResult) -> Table:
+def loads(result: SpinRuns) -> Table:
     """Return the point masses of each case."""
     caption = (
         "Loads: point masses in the drum. A mass with phase 0 is at the top when the drum angle is "
@@ -338,7 +337,7 @@ def _masses(case: CaseResult) -> list[Row]:
     return rows or [Row(("0 (empty drum)", None, None, None))]
 
 
-def profiles(result: SpinResult) -> Table:
+def profiles(result: SpinRuns) -> Table:
     """Return the corner points of the spin profile of each case."""
     cases: dict[tuple[tuple[float, ...], tuple[float, ...]], list[str]] = {}
     for case in result.results:
@@ -362,7 +361,7 @@ def _points(times: Sequence[float], speeds: Sequence[float]) -> tuple[Row, ...]:
     return tuple(rows)
 
 
-def changed_parameters(result: SpinResult, case: CaseResult) -> Table | None:
+def changed_parameters(result: SpinRuns, case: CaseResult) -> Table | None:
     """Return the parameters of a case that differ from the machine's; None if it has no own set."""
     if case.case.parameters is None:
         return None
@@ -390,7 +389,8 @@ def amplitude_lines(title: str, amplitudes: pd.DataFrame) -> "TerminalTable":
 
 def case_lines(parameters: MachineParameters, case: CaseResult) -> list[str]:
     """Return a line for each measure of a case beside its amplitudes."""
-    measures, lines = case.measures, [gap_text(case)]
+    measures, gap = case.measures, case.gap_text
+    lines = [f"smallest gap {gap}"] if gap else []
     tensions = measures.smallest_tension
     shown = zip(tensions.spring.values, tensions.values, strict=True)
     words = ", ".join(f"{name} {tension:.1f} N" for name, tension in shown)
@@ -408,17 +408,7 @@ def case_lines(parameters: MachineParameters, case: CaseResult) -> list[str]:
     if (walk := measures.walk) is not None:
         turn = math.degrees(walk.turn)
         lines.append(f"the cabinet walks {1e3 * walk.distance:.1f} mm and turns by {turn:.1f} deg")
-    return [f"{case.case.name}: {line}" for line in lines if line]
-
-
-def gap_text(case: CaseResult) -> str:
-    """Return the smallest gap of a case as text; "" if there is none."""
-    gap = case.measures.smallest_gap
-    if not gap:
-        return ""
-    distance = Unit("m", "mm").from_si(gap.distance)
-    parts = f"{gap.moving} and {gap.fixed}"
-    return f"smallest gap {distance:.1f} mm between {parts}, at {gap.time:.2f} s"
+    return [f"{case.case.name}: {line}" for line in lines]
 
 
 def _drive_text(measures: Measures) -> str:

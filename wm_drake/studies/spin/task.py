@@ -9,18 +9,19 @@ from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.runs import DEFAULT_ENGINE, ENGINES
+from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import selected_cases
-from wm_drake.studies.run import Executor
 from wm_drake.studies.spin.comparison import (
     MOST_VARIANTS,
-    ComparisonResult,
     Variant,
     check_comparable,
     difference_table,
     effects,
 )
+from wm_drake.studies.spin.comparison_page import SpinComparisonResult
 from wm_drake.studies.spin.options import SpinOptions
-from wm_drake.studies.spin.study import Comparison, Files, SpinResult, run_spin
+from wm_drake.studies.spin.page import SpinResult
+from wm_drake.studies.spin.study import Comparison, Files, run_spin
 from wm_drake.studies.study import Task
 
 LONGEST_FILE_PART = 60
@@ -88,7 +89,7 @@ class SpinTask(Task):
             return machine
         return words if len(self.options.machine) == 1 else f"{machine}, {words}"
 
-    def run(self, executor: Executor) -> SpinResult | ComparisonResult:
+    def run(self, executor: Executor) -> SpinResult | SpinComparisonResult:
         """Run all cases of all variants."""
         is_one, options = len(self.planned) == 1, self.options
         is_changed = options.sets or options.drive
@@ -121,9 +122,9 @@ class SpinTask(Task):
                 variants.append(Variant(planned.name, replace(result, files=files)))
                 finished += len(planned.cases)
         if is_one:
-            return variants[0].result
+            return SpinResult(variants[0].result)
         effect = effects(variants) if options.compare_gasket else None
-        return ComparisonResult(tuple(variants), difference_table(variants), effect)
+        return SpinComparisonResult(tuple(variants), difference_table(variants), effect)
 
 
 def file_parts(names: Sequence[str]) -> list[str]:

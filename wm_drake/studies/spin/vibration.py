@@ -15,7 +15,7 @@ from wm_drake.simulation.orders import PERIOD, REVOLUTIONS, WINDOW, frequency_ma
 from wm_drake.simulation.records import Record
 from wm_drake.simulation.vibration import sensor_accelerations
 from wm_drake.studies.spin import figures
-from wm_drake.studies.spin.study import CaseResult, SpinResult
+from wm_drake.studies.spin.study import CaseResult, SpinRuns
 
 DECADES = 3.0
 """Range of the amplitudes that a map shows, below the largest one, in powers of ten."""
@@ -31,7 +31,7 @@ ON_MAP = "#fefefe"
 """Colour of lines and texts on a map, in light and in dark."""
 
 
-def vibration_pictures(result: SpinResult, case: CaseResult) -> list[Picture | None]:
+def vibration_pictures(result: SpinRuns, case: CaseResult) -> list[Picture | None]:
     """Return mount forces, accelerations and spectra of a case; None where there is nothing."""
     accelerations = sensor_accelerations(case.record, result.sensors_of(case))
     return [

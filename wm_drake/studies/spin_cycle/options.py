@@ -59,6 +59,6 @@ SPIN_CYCLE = Study(
     "spin-cycle",
     "Run a spin cycle with many unbalances, and report RMS displacements per region and sensor.",
     SpinCycleOptions,
-    imported("wm_drake.studies.spin_cycle.study:SpinCycleTask"),
+    imported("wm_drake.studies.spin_cycle.task:SpinCycleTask"),
     quick={"case": ("2",)},
 )

@@ -4,13 +4,13 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 import xarray as xr
 
 from wm_drake.batch import simulate_many
-from wm_drake.batch.many import as_table
+from wm_drake.batch.run_table import RunTable
 from wm_drake.elements.bushing import AXES
 from wm_drake.errors import InputError, check_known, input_error
 from wm_drake.model.machine import Machine
@@ -23,12 +23,10 @@ from wm_drake.simulation.measures import MEASURES as KNOWN_MEASURES
 from wm_drake.simulation.measures import measure
 from wm_drake.simulation.mounts import mount_names
 from wm_drake.simulation.vibration import relative_error
-from wm_drake.studies.inputs import channel_names, existing_file, runnable_profile
-from wm_drake.studies.run import Executor
+from wm_drake.studies.inputs import channel_names, existing_file
 from wm_drake.studies.spin.study import run_spin
 from wm_drake.studies.spin_cycle.measured import DIMS, read_accelerations, read_rms
-from wm_drake.studies.spin_cycle.options import CycleOptions, SpinCycleOptions
-from wm_drake.studies.study import Result, Task
+from wm_drake.studies.spin_cycle.options import CycleOptions
 
 FORCES = ("mounts", "cabinet")
 """Measures of the forces on the cabinet."""
@@ -195,6 +193,23 @@ def average_errors(computed: xr.DataArray, measured: xr.DataArray) -> xr.DataArr
     return xr.DataArray(single, computed.coords, computed.dims).mean(DIMS[1:], skipna=True)
 
 
+def missing_regions(computed: xr.DataArray, measured: xr.DataArray) -> dict[str, list[str]]:
+    """Return the measured cases whose errors leave a region out, by the name of the region.
+
+    They have no value there that is both computed and measured.
+    """
+    is_measured = measured.notnull()
+    compared = (is_measured & computed.notnull()).any(DIMS[2:])
+    left_out = ~compared & is_measured.any(DIMS[1:])
+    cases = {
+        str(region): [str(case) for case in left_out.case.values[of_region]]
+        for region, of_region in zip(
+            left_out.region.values, left_out.transpose("region", "case").values, strict=True
+        )
+    }
+    return {region: of_region for region, of_region in cases.items() if of_region}
+
+
 def mean_and_deviation(errors: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
     """Return mean and standard deviation of errors over the cases.
 
@@ -231,44 +246,6 @@ def largest(displacement: xr.DataArray) -> Largest | None:
 
 def _flat(values: xr.DataArray) -> np.ndarray:
     return values.values.reshape(*values.shape[:2], -1)
-
-
-ENGINES = ("compiled", "drake")
-
-
-class SpinCycleTask(Task):
-    """The study with checked options."""
-
-    def __init__(self, options: SpinCycleOptions, machine: Machine) -> None:
-        """Read profile, cases and measurements."""
-        engine = options.engine
-        check_known(engine, ENGINES, f"unknown engine '{engine}'", where="--engine")
-        self.machine, self.engine = machine, engine
-        self.profile = runnable_profile(options.profile, machine.parameters)
-        self.cases = cases_of_table(options.cases, options.case)
-        self.measured = measured_displacements(
-            options, machine.parameters, self.cases, self.profile
-        )
-
-    @property
-    def identity(self) -> dict[str, Any]:
-        """Return what determines the runs."""
-        return {"profile": self.profile, "engine": self.engine}
-
-    def run(self, executor: Executor) -> Result:
-        """Run all cases."""
-        from wm_drake.studies.spin_cycle.page import SpinCycleReport
-
-        parameters = self.machine.parameters
-        if self.engine == "drake":
-            with executor.progress(len(self.cases), "cases") as progress:
-                evaluate = drake_runs(parameters, progress=progress)
-                result = run_spin_cycle(parameters, self.cases, self.profile, evaluate)
-        else:
-            measures = measures_of(parameters)
-            evaluate = partial(executor.simulate, self.machine, measures, what="cases")
-            result = run_spin_cycle(parameters, self.cases, self.profile, evaluate)
-        return SpinCycleReport(replace(result, measured=self.measured), self.engine)
 
 
 def cases_of_table(path: Path | None, names: Sequence[str] | None) -> list[UnbalanceCase]:
@@ -332,14 +309,14 @@ def drake_runs(
 
         results = run_spin(parameters, runs, "drake", progress=report).results
         measures, scene = measures_of(parameters), Scene(parameters)
-        rows = {
-            number: (
-                result.case.name,
-                str(result.record.attrs["diverged"]),
-                measure(result.record, scene, measures).values,
-            )
-            for number, result in enumerate(results)
-        }
-        return as_table(parameters, measures, rows)
+        table = RunTable(parameters, measures)
+        for number, result in enumerate(results):
+            of_run = measure(result.record, scene, measures)
+            values = {
+                variable.name: of_run.table[variable.name].values for variable in table.variables
+            }
+            diverged = str(result.record.attrs["diverged"])
+            table.put(number, result.case.name, values, diverged)
+        return table.dataset()
 
     return evaluate

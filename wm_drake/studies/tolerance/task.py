@@ -20,8 +20,9 @@ from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.measures.responses import Response, chosen_responses, has_gap, measures_of
 from wm_drake.simulation.steps import checked_step
+from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import existing_file, problems_of_file, profile_of
-from wm_drake.studies.run import Executor, machine_text
+from wm_drake.studies.run import machine_text
 from wm_drake.studies.study import Task
 from wm_drake.studies.tolerance.options import ToleranceOptions
 from wm_drake.studies.tolerance.page import ToleranceReport

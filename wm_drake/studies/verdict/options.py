@@ -32,7 +32,7 @@ VERDICT = Study(
     "verdict",
     "Say whether the tub touches the housing, how likely that is, and what to change.",
     VerdictOptions,
-    imported("wm_drake.studies.verdict.study:VerdictTask"),
+    imported("wm_drake.studies.verdict.task:VerdictTask"),
     quick={"samples": 16},
     group="",
 )

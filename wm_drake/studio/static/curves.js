@@ -38,6 +38,9 @@ const line = (xs, ys) => {
   return path;
 };
 
+/** Return the ends of some numbers in words. */
+const ends = (values) => `${digits(Math.min(...values), 3)} to ${digits(Math.max(...values), 3)}`;
+
 /** Return the value of a line through points (xs rising) at x. */
 function at(xs, ys, x) {
   if (!xs.length) return NaN;
@@ -80,16 +83,31 @@ export class BandPanel {
     this.unit = unit;
     this.time = time;
     this.data = null;
-    this.svg = draw('svg', {viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: 'img', 'aria-label': title});
+    this.svg = draw('svg', {viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: 'img', 'aria-label': `${title} in ${unit}`});
     parent.append(this.svg);
     time.panels.add(this);
     this.listen();
   }
 
-  /** Show {now, ghost, variants, measured, low, high, rpm}; only `now`, `low`, `high` are needed. */
+  /** Show {now, ghost, variants, measured, low, high, rpm}; ghost, variants, measured may be left out. */
   show(data) {
     this.data = data;
+    this.svg.setAttribute('aria-label', this.inWords());
     this.redraw();
+  }
+
+  /** Say what the panel shows: ends, the largest value with its time and speed, and the others. */
+  inWords() {
+    const {now, ghost, measured = [], rpm} = this.data;
+    const span = (band) => ends([...band.lower[1], ...band.upper[1]]);
+    const name = `${this.title} in ${this.unit} over time`;
+    if (!now.upper[1].length) return `${name}: no curve`;
+    const [size, time] = [now.lower, now.upper].flatMap(([times, values]) => values.map((value, place) => [Math.abs(value), times[place]]))
+      .reduce((best, one) => (one[0] > best[0] ? one : best));
+    const texts = [`${span(now)}, largest ${digits(size, 3)} at ${fixed(time, 1)} s and ${fixed(at(rpm[0], rpm[1], time), 0)} rpm`];
+    if (ghost?.upper[1].length) texts.push(`as it was ${span(ghost)}`);
+    if (measured.length) texts.push(`measured ${measured.map((value) => digits(value, 3)).join(' and ')}`);
+    return `${name}: ${texts.join('; ')}`;
   }
 
   x(time) {
@@ -173,8 +191,7 @@ export class BandPanel {
     const x = this.x(time);
     const upper = at(...now.upper, time);
     const lower = at(...now.lower, time);
-    const speed = rpm ? `, ${fixed(at(rpm[0], rpm[1], time), 0)} rpm` : '';
-    const text = `${fixed(time, 1)} s${speed}: ${digits(lower, 3)} to ${digits(upper, 3)}`;
+    const text = `${fixed(time, 1)} s, ${fixed(at(rpm[0], rpm[1], time), 0)} rpm: ${digits(lower, 3)} to ${digits(upper, 3)}`;
     const parts = [
       draw('path', {class: 'cursor', d: `M${x} ${TOP}V${HEIGHT - BOTTOM}`}),
       draw('text', {class: 'reading', x: String(WIDTH - RIGHT - 4), y: String(HEIGHT - BOTTOM - 6), 'text-anchor': 'end'}, text),
@@ -191,7 +208,7 @@ export class BandPanel {
 export class OrbitPanel {
   constructor(parent, title) {
     this.title = title;
-    this.svg = draw('svg', {viewBox: '0 0 300 300', role: 'img', 'aria-label': title});
+    this.svg = draw('svg', {viewBox: '0 0 300 300', role: 'img', 'aria-label': `orbit, ${title}`});
     parent.append(this.svg);
   }
 
@@ -199,6 +216,8 @@ export class OrbitPanel {
     const size = 300;
     const at = (value, sign) => 0.5 * size + (sign * value * (0.5 * size - 32)) / limit;
     const path = (orbit) => line(orbit.x.map((v) => at(v / 1000, 1)), orbit.z.map((v) => at(v / 1000, -1)));
+    const span = (orbit) => ['x', 'z'].map((axis) => `${axis} ${ends(orbit[axis].map((v) => v / 1000))}`).join(', ');
+    this.svg.setAttribute('aria-label', `orbit, ${this.title}, in mm: ${span(now)}${ghost ? `; as it was ${span(ghost)}` : ''}`);
     const parts = [];
     for (const value of ticks(-limit, limit, 4)) {
       const x = at(value, 1).toFixed(1);

@@ -27,6 +27,7 @@ export class History {
   constructor() {
     this.entries = [];
     this.place = -1;
+    this.control = null; // what was moved last by keys
     try {
       const kept = JSON.parse(sessionStorage.getItem(KEY));
       if (Array.isArray(kept?.entries) && kept.entries.length) Object.assign(this, kept);
@@ -35,14 +36,19 @@ export class History {
 
   get state() { return copyOf(this.entries[this.place].state); }
 
-  add(what, state) {
+  /** Add an entry; presses of a key that go on moving one `control` are one entry. */
+  add(what, state, control = null) {
+    const goesOn = control !== null && control === this.control;
+    this.control = control;
     if (this.place >= 0 && JSON.stringify(this.entries[this.place].state) === JSON.stringify(state)) return;
-    this.entries = [...this.entries.slice(0, this.place + 1), {what, state: copyOf(state)}].slice(-LONGEST);
+    const kept = this.entries.slice(0, this.place + (goesOn ? 0 : 1));
+    this.entries = [...kept, {what, state: copyOf(state)}].slice(-LONGEST);
     this.place = this.entries.length - 1;
     this.keep();
   }
 
   go(place) {
+    this.control = null;
     this.place = Math.min(this.entries.length - 1, Math.max(0, place));
     this.keep();
     return this.state;

@@ -8,6 +8,7 @@ import {NumberList} from './numbers.js';
 import {SceneView} from './scene.js';
 import {Problems, get, post} from './server.js';
 import {Studies} from './studies.js';
+import {showVerdict, smallestGap, worstFirst} from './verdict.js';
 
 const PAGE = crypto.randomUUID();
 const MASS = {mass: '0.5 kg', radius: '235 mm', y: '0 mm', phase: '0 deg'};
@@ -33,19 +34,22 @@ let settled = 0;       // number of the latest request that has a picture or a p
 let drawn = 0;         // number of the request whose picture is drawn
 let numbered = 0;      // number of the request whose numbers are shown
 let pending = 0;       // how many requests wait for an answer
+let refused = '';      // why the machine as it is now has not run, '' if it has
+let notice = '';       // what a link has that is not here
+let keyed = null;      // the slider or the choice that keys move, until something else is used
 
 /* ---- what is chosen ---- */
 
 function move(key, text, final) {
   if (text === null) delete state.values[key];
   else state.values[key] = text;
-  changed(final ? (text === null ? `${nameOf(key)} as it was` : `${nameOf(key)} ${text}`) : null);
+  changed(final ? (text === null ? `${list.nameOf(key)} as it was` : `${list.nameOf(key)} ${text}`) : null);
 }
 
 /** Run the new state; `what` names it in the history, null while a slider moves. */
 function changed(what) {
   if (what !== null) {
-    history_.add(what, state);
+    history_.add(what, state, keyed);
     intoLink(state, variants);
     showHistory();
   }
@@ -58,8 +62,9 @@ async function setState(wanted) {
   const other = !state || wanted.machine !== state.machine;
   const loads = JSON.stringify([wanted.load, wanted.masses, wanted.gasket]);
   const before = state && JSON.stringify([state.load, state.masses, state.gasket]);
-  state = copyOf(wanted);
-  if (other) await openMachine();
+  const next = copyOf(wanted);
+  if (other) await openMachine(next);
+  else state = next;
   intoLink(state, variants);
   showHistory();
   list.forget();
@@ -69,10 +74,16 @@ async function setState(wanted) {
   await run();
 }
 
-async function openMachine() {
+/** Open the machine of a state, which then is that of the page. */
+async function openMachine(next) {
   status('opening …');
-  machine = await get(`machine?id=${encodeURIComponent(state.machine)}`);
-  if (!state.masses.length && !machine.loads.includes(state.load)) [state.load] = machine.loads;
+  const opened = await get(`machine?id=${encodeURIComponent(next.machine)}`);
+  if (!next.masses.length && !opened.loads.includes(next.load)) {
+    if (next.load) notice = `the machine has no load '${next.load}'; the load with the smallest gap is opened`;
+    next.load = await loadThatDecides(opened.loads[0], next);
+  }
+  machine = opened;
+  state = next;
   list.fill(machine.numbers, machine.parts);
   scene.shapes(machine.shapes);
   turned = [];
@@ -85,7 +96,18 @@ async function openMachine() {
   search();
 }
 
+/** Return the load with the smallest gap; the first one if the machine does not run. */
+async function loadThatDecides(first, next) {
+  try {
+    return worstFirst(await post('run', {page: `${PAGE} loads`, state: {...next, load: first}}))[0].load;
+  } catch { return first; } // the run itself shows the problem
+}
+
+/** Say in words which load curves and tables have. */
+const loadWords = (of) => (of.masses.length ? 'the described load' : `load ${of.load}`);
+
 function showLoad() {
+  for (const place of document.querySelectorAll('.with-load')) place.textContent = ` with ${loadWords(state)}`;
   byId('load').value = state.masses.length ? DESCRIBED : state.load;
   byId('gasket').checked = state.gasket && machine.gasket;
   byId('described').hidden = !state.masses.length;
@@ -137,13 +159,12 @@ async function runPicture(number) {
     if (found.overtaken || number < drawn) return;
     drawn = number;
     answer = {...answer, ...found};
+    refused = '';
     showPicture();
     showProblems([], found.warnings);
     status(`${fixed(performance.now() - begin, 0)} ms · ${found.stepping.integrator}, ${digits(found.stepping.step_ms, 3)} ms steps`);
   } catch (error) {
-    if (number !== asked) return;
-    showProblems(error instanceof Problems ? error.problems : [{key: '', message: error.message}]);
-    status('not run');
+    if (number === asked) showRefusal(error);
   } finally {
     settled = Math.max(settled, number);
   }
@@ -245,6 +266,8 @@ function makePanels() {
   panels.orbits = ['front', 'rear'].map((name) => new OrbitPanel(byId('orbits'), name));
   answer = ghost = null;
   drawn = ++asked; // answers of the machine before are overtaken
+  refused = '';
+  verdict();
 }
 
 const envelopeBand = (sides) => ({
@@ -262,7 +285,7 @@ function showAnswer() {
 }
 
 function showPicture() {
-  showVerdict();
+  verdict();
   list.show(state.values, answer.values);
   showEnvelopes();
   showOrbits();
@@ -279,42 +302,13 @@ function showNumbers() {
   showWhetherOld();
 }
 
-/** Show table and forces paler until they are those of the picture. */
+/** Show what is not that of the machine as it is now paler: table and forces follow the picture. */
 function showWhetherOld() {
-  for (const id of ['measures', 'forces', 'variants']) byId(id).classList.toggle('old', numbered < drawn);
+  for (const id of ['measures', 'forces', 'variants']) byId(id).classList.toggle('old', Boolean(refused) || numbered < drawn);
+  for (const id of ['envelopes', 'orbits', 'scene']) byId(id).classList.toggle('old', Boolean(refused));
 }
 
-const touches = ({gap, diverged}) => Boolean(diverged || (gap && gap.distance <= 0));
-
-/** Say beside the sliders whether the tub touches the housing: the load that decides comes first. */
-function showVerdict() {
-  const [chosen] = answer.loads;
-  const size = (of) => (of.diverged ? -Infinity : of.gap?.distance ?? Infinity);
-  const all = [...answer.loads].sort((a, b) => size(a) - size(b));
-  const [first] = all;
-  byId('verdict').classList.toggle('alarm', touches(first));
-  if (first.diverged) byId('verdict').textContent = `The run with load ${first.load} diverged: no answer.`;
-  else if (!first.gap) byId('verdict').textContent = 'The machine has no shapes: no gap is known.';
-  else {
-    const distance = fixed(first.gap.distance);
-    const which = all.length > 1 ? ` with load ${first.load}` : '';
-    byId('verdict').replaceChildren(
-      make('strong', {}, touches(first) ? `The tub touches${which}: ${distance} mm` : `No contact: gap ${distance} mm${which}`),
-      `${first.gap.moving} to ${first.gap.fixed} at ${fixed(first.gap.rpm, 0)} rpm`,
-      make('span', {class: 'loads'}, ...(all.length > 1 ? all : []).map((of) => gapOfLoad(of, of === chosen))));
-  }
-}
-
-/** A button with the gap of a load, which shows that load. */
-function gapOfLoad(of, isChosen) {
-  const text = (one) => (one.diverged ? 'diverged' : fixed(one.gap.distance));
-  const before = ghost?.loads.find(({load}) => load === of.load);
-  const change = before && text(before) !== text(of) ? `, was ${text(before)}` : '';
-  return make('button', {
-    class: touches(of) ? 'alarm' : '', 'aria-pressed': String(isChosen),
-    title: `show load ${of.load}`, onclick: () => { if (!isChosen) showOtherLoad(of.load); },
-  }, `${of.load} ${text(of)}${change}`);
-}
+const verdict = () => showVerdict(byId('verdict'), answer, ghost, refused, showOtherLoad);
 
 function showOtherLoad(name) {
   byId('load').value = name;
@@ -391,14 +385,17 @@ function showMotion() {
   byId('at-gap').disabled = !answer.gap_points;
   const gap = answer.gap_points && {...answer.gap_points, distance: answer.gap.distance};
   if (frame < 0 && gap) {
-    scene.show(gap.pose, gap);
-    byId('frame-time').textContent = `${fixed(answer.gap.time, 2)} s, ${fixed(answer.gap.rpm, 0)} rpm: ${answer.gap.moving} to ${answer.gap.fixed}`;
+    showPose(gap.pose, gap, `${fixed(answer.gap.time, 2)} s, ${fixed(answer.gap.rpm, 0)} rpm: ${answer.gap.moving} to ${answer.gap.fixed}`);
     return;
   }
   const at = Math.min(Math.max(frame, 0), motion.time.length - 1);
   byId('frame').value = String(at);
-  scene.show(motion.poses[at], null);
-  byId('frame-time').textContent = `${fixed(motion.time[at], 2)} s`;
+  showPose(motion.poses[at], null, `${fixed(motion.time[at], 2)} s`);
+}
+
+function showPose(pose, gap, words) {
+  scene.show(pose, gap, words);
+  byId('frame-time').textContent = words;
 }
 
 function play() {
@@ -417,6 +414,18 @@ function play() {
 
 /* ---- problems, names ---- */
 
+/** Say why the machine as it is now has not run; what is drawn is that of the last one that ran. */
+function showRefusal(error) {
+  const problems = error instanceof Problems ? error.problems : [{key: '', message: error.message}];
+  const more = problems.length > 1 ? ` (and ${problems.length - 1} more)` : '';
+  const [{key, message}] = problems;
+  refused = `${key ? `${list.nameOf(key)}: ` : ''}${message}${more}`;
+  verdict();
+  showWhetherOld();
+  showProblems(problems);
+  status('not run');
+}
+
 function showProblems(problems, warnings = []) {
   for (const element of byId('masses').querySelectorAll('.problem')) element.textContent = '';
   const left = list.problems(problems, warnings).filter(({key, message}) => {
@@ -425,10 +434,13 @@ function showProblems(problems, warnings = []) {
     place.textContent = `${key.split('.').slice(2).join('.')}: ${message}`;
     return false;
   });
-  const texts = left.map(({key, message}) => (key ? `${key}: ${message}` : message));
+  const texts = left.map(({key, message}) => (key ? `${list.nameOf(key)}: ${message}` : message));
+  if (notice) texts.push(notice);
   if (answer?.diverged) texts.push(answer.diverged);
-  byId('problems').replaceChildren(...texts.map((text) => make('div', {}, text)));
   byId('problems').hidden = texts.length === 0;
+  if (byId('problems').dataset.shown === texts.join('\n')) return; // it is not read out once more
+  byId('problems').dataset.shown = texts.join('\n');
+  byId('problems').replaceChildren(...texts.map((text) => make('div', {}, text)));
 }
 
 function labelOf(key) {
@@ -436,7 +448,6 @@ function labelOf(key) {
   return number ? {name: number.short, unit: number.unit} : {name: key, unit: ''};
 }
 
-const nameOf = (key) => list.rows.get(key)?.number.label ?? key;
 const status = (text) => { byId('status').textContent = text; };
 const search = () => list.search(byId('search').value, byId('only-moved').checked);
 
@@ -448,25 +459,30 @@ function showHistory() {
       make('button', {onclick: () => setState(history_.go(index))}, what))));
 }
 
+/** Show the variants beside the machine as it is now; each column has a load of its own. */
 function showVariants() {
   const columns = [{name: 'now', state, answer}, ...variants];
   const largest = (of, group) => (of.answer ? Math.max(...of.answer.rows.filter((row) => row.group === group).map((row) => row.value ?? -Infinity)) : null);
-  const text = (value, decimals) => (Number.isFinite(value) ? fixed(value, decimals) : '–');
-  const groups = new Map();
+  const cell = (value, decimals) => ({text: Number.isFinite(value) ? fixed(value, decimals) : '–', alarm: false});
+  const rows = new Map([
+    ['smallest gap of all loads, mm', (of) => (of.answer ? smallestGap(of.answer) : cell(null))],
+    ['all below with the load', (of) => ({text: `${of.answer?.loads[0].load ?? '–'}${of.state.gasket ? '' : ', no gasket'}`})],
+  ]);
+  const found = (of, title) => of.answer?.rows.find((row) => row.title === title);
   answer.rows.forEach((row) => {
-    if (!row.group) groups.set(row.title, (of) => text(of.answer?.rows.find(({title}) => title === row.title)?.value, row.decimals));
-    else if (!groups.has(row.group)) groups.set(row.group, (of) => text(largest(of, row.group), row.decimals));
+    if (!row.group) rows.set(row.title, (of) => ({...cell(found(of, row.title)?.value, row.decimals), alarm: found(of, row.title)?.alarm}));
+    else if (!rows.has(row.group)) rows.set(row.group, (of) => cell(largest(of, row.group), row.decimals));
   });
-  const rows = [...groups];
-  const what = (of) => [of.state.machine, of.state.masses.length ? 'described load' : of.state.load, of.state.gasket ? '' : 'no gasket',
+  const what = (of) => [of.state.machine, loadWords(of.state), of.state.gasket ? '' : 'no gasket',
     ...Object.entries(of.state.values).map(([key, text]) => `${key} = ${text}`)].filter(Boolean).join('; ');
   const head = columns.map((of, index) => (index === 0 ? make('th', {}, 'now') : make('th', {title: what(of)},
     make('span', {class: `dot v${index - 1}`}), of.name,
     make('button', {title: 'go back to this variant', onclick: () => goTo(of)}, 'open'),
     make('button', {'aria-label': `remove ${of.name}`, onclick: () => removeVariant(of)}, '×'))));
+  const drawnCell = ({text, alarm}) => make('td', {class: alarm ? 'alarm' : ''}, text);
   byId('variants').replaceChildren(
     make('thead', {}, make('tr', {}, make('th', {}), ...head)),
-    make('tbody', {}, ...rows.map(([title, value]) => make('tr', {}, make('th', {}, title), ...columns.map((of) => make('td', {}, value(of)))))));
+    make('tbody', {}, ...[...rows].map(([title, value]) => make('tr', {}, make('th', {}, title), ...columns.map((of) => drawnCell(value(of)))))));
   byId('keep').disabled = variants.length >= MOST_VARIANTS || !answer;
 }
 
@@ -492,7 +508,8 @@ function removeVariant(variant) {
 async function runVariants() {
   for (const variant of variants.filter((of) => !of.answer)) {
     try {
-      variant.answer = await wholeAnswer(variant.name, variant.state);
+      const found = await wholeAnswer(variant.name, variant.state);
+      variant.answer = found.overtaken ? null : found;
     } catch { variant.answer = null; } // its machine is gone: the table shows dashes
   }
   showAnswer();
@@ -524,7 +541,8 @@ async function listMachines() {
 
 function listen() {
   byId('machine').addEventListener('change', (event) => {
-    const next = {machine: event.target.value, values: {}, load: state.load, masses: state.masses, gasket: true};
+    notice = '';
+    const next = {machine: event.target.value, values: {}, load: '', masses: state.masses, gasket: true};
     setState(next).then(() => { history_.add(`open ${state.machine}`, state); showHistory(); showLoad(); }, fail);
   });
   byId('load').addEventListener('change', (event) => {
@@ -551,6 +569,9 @@ function listen() {
       status('the link is copied');
     } catch { status('copy the address of this page: it is the link'); }
   });
+  // moves by keys are one entry of the history until something else is used
+  document.addEventListener('keydown', ({target}) => { keyed = target.matches('input[type=range], select') ? target : null; });
+  for (const kind of ['pointerdown', 'focusout']) document.addEventListener(kind, () => { keyed = null; });
   document.addEventListener('keydown', (event) => {
     if (!(event.ctrlKey || event.metaKey) || event.target.matches('input:not([type=range])')) return;
     if (event.key === 'z' && !event.shiftKey) { event.preventDefault(); byId('undo').click(); }
@@ -573,7 +594,7 @@ function listen() {
 }
 
 const fail = (error) => {
-  showProblems(error instanceof Problems ? error.problems : [{key: '', message: error.message}]);
+  showRefusal(error);
   status('not opened');
 };
 
@@ -585,7 +606,7 @@ async function begin() {
   variants = linked?.variants ?? [];
   const wanted = {...fresh, ...linked?.state};
   if (!found.machines.some(({id}) => id === wanted.machine)) {
-    fail(new Error(`the machine '${wanted.machine}' of the link is not here; '${found.first}' is opened`));
+    notice = `the machine '${wanted.machine}' of the link is not here; '${found.first}' is opened`;
     wanted.machine = found.first;
   }
   await setState(wanted);

@@ -35,7 +35,7 @@ export class NumberList {
     const slider = make('input', {type: 'range', min: '0', max: String(STEPS), 'aria-label': `slider of ${number.group} ${number.label}`});
     const back = make('button', {class: 'back', title: 'as it was', 'aria-label': `${number.label} as it was`}, '↺');
     const ranges = [
-      `slider ${digits(number.low, 3)} to ${digits(number.high, 3)}`,
+      number.needs ? `cannot be moved alone: ${number.needs}` : `slider ${digits(number.low, 3)} to ${digits(number.high, 3)}`,
       number.allowed && `allowed ${number.allowed}`,
       number.usual && `usual ${number.usual}`,
     ].filter(Boolean).join(' · ');
@@ -76,7 +76,7 @@ export class NumberList {
     for (const [key, row] of this.rows) {
       const isMoved = key in values;
       row.element.classList.toggle('moved', isMoved);
-      const value = key in shown ? shown[key] : row.number.value;
+      const value = isMoved && key in shown ? shown[key] : row.number.value;
       // an answer that comes while the user types leaves the text alone
       if (!row.isTyping && !row.isEmpty && (document.activeElement !== row.text || isMoved)) {
         row.text.value = isMoved ? values[key] : `${digits(row.number.value, 6).replace('−', '-')} ${row.number.unit}`.trim();
@@ -84,12 +84,13 @@ export class NumberList {
       if (document.activeElement !== row.slider && (key in shown || !isMoved)) {
         row.low = Math.min(row.number.low, value);
         row.high = Math.max(row.number.high, value);
-        row.slider.value = String((STEPS * (value - row.low)) / (row.high - row.low));
+        row.slider.hidden = row.high === row.low;
+        row.slider.value = String((STEPS * (value - row.low)) / (row.high - row.low || 1));
       }
     }
   }
 
-  /** Show problems and warnings at their values; return those that have no row. */
+  /** Show problems and warnings at their values; return those that stand at no moved number. */
   problems(problems, warnings = []) {
     for (const row of this.rows.values()) {
       row.warning.hidden = true;
@@ -104,13 +105,15 @@ export class NumberList {
       this.refuse(row, message);
       return false;
     });
-    for (const {key, message} of warnings) {
+    const others = warnings.filter(({key, message}) => {
       const row = this.nearest(key);
-      if (!row) continue;
+      if (!row?.element.classList.contains('moved')) return true;
       row.warning.textContent = message;
       row.warning.hidden = false;
-    }
-    return left;
+      this.reveal(row);
+      return false;
+    });
+    return [...left, ...others];
   }
 
   /** Forget which fields were left empty, because another state is shown. */
@@ -124,21 +127,26 @@ export class NumberList {
     row.problem.hidden = false;
     row.element.classList.add('wrong');
     row.text.setAttribute('aria-invalid', 'true');
-    this.open([row.number.key]);
+    this.reveal(row);
   }
+
+  /** Return the name of a number elsewhere on the page. */
+  nameOf(key) { return this.nearest(key)?.number.short ?? key; }
 
   nearest(key) {
     return this.rows.get(key) ?? this.rows.get(`${key}.0`);
   }
 
-  /** Show only numbers whose key path has all words, and only moved ones if wanted. */
+  /**
+   * Show only numbers whose key path has all words, and only moved ones if wanted. A number with a
+   * problem, or with a warning, is shown always.
+   */
   search(words, onlyMoved) {
     const wanted = words.toLowerCase().split(/\s+/).filter(Boolean);
-    for (const {number, element} of this.rows.values()) {
+    for (const {number, element, problem, warning} of this.rows.values()) {
       const name = `${number.key} ${number.part} ${number.group} ${number.label}`.toLowerCase();
       const fits = wanted.every((word) => name.includes(word)) && (!onlyMoved || element.classList.contains('moved'));
-      element.hidden = !fits;
-      element.style.display = fits ? '' : 'none';
+      element.hidden = !fits && problem.hidden && warning.hidden;
     }
     for (const fold of this.folds) {
       fold.hidden = !fold.querySelector('.number:not([hidden])');
@@ -146,10 +154,12 @@ export class NumberList {
     }
   }
 
-  /** Open the groups of some numbers. */
-  open(keys) {
-    for (const key of keys) {
-      for (let fold = this.rows.get(key)?.element.closest('details'); fold; fold = fold.parentElement.closest('details')) fold.open = true;
+  /** Show a row, whatever is searched for, and open its groups. */
+  reveal({element}) {
+    element.hidden = false;
+    for (let fold = element.closest('details'); fold; fold = fold.parentElement.closest('details')) {
+      fold.hidden = false;
+      fold.open = true;
     }
   }
 }

@@ -73,10 +73,15 @@ export class SceneView {
     this.reach = Math.max(0.1, ...points.map((p) => Math.hypot(...p)));
   }
 
-  /** Show a pose of the tub (roll, pitch, yaw, x, y, z), and the nearest points [m] if given. */
-  show(pose, gap) {
+  /**
+   * Show a pose of the tub (roll, pitch, yaw, x, y, z), and the nearest points [m] if given; `words`
+   * say when it is.
+   */
+  show(pose, gap, words) {
     this.pose = pose;
     this.gap = gap;
+    const which = gap ? `, smallest gap ${fixed(gap.distance)} mm` : '';
+    this.svg.setAttribute('aria-label', `tub in the housing${which}, at ${words}`);
     this.redraw();
   }
 

@@ -1,0 +1,296 @@
+"""Designs of a machine, with functions of known answer in place of the runs."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy import stats
+
+pytest.importorskip("pymoo")
+
+from pages import data_of, drawings
+
+from wm_drake.errors import InputError
+from wm_drake.parameters import load_machine
+from wm_drake.parameters.designs import DESIGNS, DesignTask, load_design
+from wm_drake.parameters.tolerances import Tolerances
+from wm_drake.simulation.cases import Case, case_of
+from wm_drake.studies.design.page import DesignResult, front_table, promises_table
+from wm_drake.studies.design.problem import machine_designs
+from wm_drake.studies.design.search import SearchSettings
+from wm_drake.studies.design.study import (
+    _is_kept,
+    front_envelopes,
+    promises,
+    run_designs,
+    summary_of,
+)
+from wm_drake.studies.study import Facts
+from wm_drake.studies.tolerance.distributions import base_samples
+from wm_drake.studies.tolerance.variables import uncertain_machine
+
+SPRING = "spring_types.suspension.stiffness"
+FRICTION = "damper_types.friction.friction_force"
+
+
+@pytest.fixture(scope="module")
+def machine():
+    return load_machine("reference")
+
+
+def task_of(**changes):
+    tree = {
+        "loads": ("middle", "counter"),
+        "variables": {"k": {"keys": (SPRING,), "low": "50 %", "high": "150 %"}},
+        "objectives": ({"quantity": "Dx"}, {"quantity": "Fx"}),
+    }
+    return DesignTask.model_validate(tree | changes)
+
+
+def designs_of(machine, task):
+    cases = [case_of(machine, load) for load in task.loads]
+    return machine_designs(machine, task, cases)
+
+
+def run_of(machine):
+    """Return a run whose displacement falls and whose force rises with the spring's stiffness.
+
+    The second load has twice the displacement and half the force of the first one.
+    """
+    nominal = machine.spring_types["suspension"].stiffness
+
+    def run(cases):
+        k = np.array([c.parameters.spring_types["suspension"].stiffness for c in cases]) / nominal
+        scale = np.array([2.0 if "counter" in c.name else 1.0 for c in cases])
+        d, f = 1e-3 * scale / k, 10.0 * k / scale
+        zeros = np.zeros((len(k), 3))
+        table = {
+            "detergent_displacement": (("run", "axis"), zeros + d[:, None]),
+            "gasket_force": (("run", "axis"), zeros + f[:, None]),
+            "gasket_moment": (("run", "axis"), zeros),
+            "diverged": ("run", np.full(len(k), "", dtype=object)),
+        }
+        return xr.Dataset(table)
+
+    return run
+
+
+def test_worst_mean_and_quantile_over_loads(machine):
+    goals = [{"quantity": "Dx", "over": over} for over in ("worst", "mean", "50 %")]
+    goals.append({"quantity": "Fx", "goal": "larger", "over": "worst"})
+    designs = designs_of(machine, task_of(objectives=tuple(goals)))
+    values, _ = designs.evaluate(np.array([[0.5], [1.0]]), run_of(machine))
+    assert values[0] == pytest.approx([2.0, 1.5, 1.5, 5.0])
+    assert values[1] == pytest.approx([2.0 / 1.5, 1.0, 1.0, 7.5])
+
+
+def test_bounds_in_percent_value_and_distance_give_the_same_machine(machine):
+    k = machine.spring_types["suspension"].stiffness
+    for low, high in (
+        ("90 %", "130 %"),
+        (f"{0.9 * k} N/m", f"{1.3 * k} N/m"),
+        (f"nominal - {0.1 * k} N/m", f"nominal + {0.3 * k} N/m"),
+    ):
+        variable = {"keys": (SPRING,), "low": low, "high": high}
+        designs = designs_of(machine, task_of(variables={"k": variable}))
+        assert designs.nominal() == pytest.approx([0.25])
+        found = designs.machine_at(np.array([0.5])).spring_types["suspension"].stiffness
+        assert found == pytest.approx(1.1 * k)
+
+
+def test_choice_sets_its_option(machine):
+    choices = {"damper": {"options": {"weak": {FRICTION: "20 N"}, "strong": {FRICTION: "60 N"}}}}
+    designs = designs_of(machine, task_of(choices=choices))
+    for place, force in ((0.0, 20.0), (0.49, 20.0), (0.51, 60.0), (1.0, 60.0)):
+        found = designs.machine_at(np.array([0.5, place]))
+        assert found.damper_types["friction"].friction_force == force
+
+
+def test_front_under_a_constraint_is_found(machine, tmp_path):
+    # Dx = 2 / k mm and Fx = 10 k N for k from 0.5 to 1.5; Dx at most 2.5 mm means k >= 0.8
+    task = task_of(constraints=({"quantity": "Dx", "at_most": "2.5 mm"},))
+    designs = designs_of(machine, task)
+    front = run_designs(designs, run_of(machine), SearchSettings(640, 32))
+    dx, fx = front.objectives.T
+    assert dx * fx == pytest.approx(20.0)  # 2/k mm times 10 k N
+    assert (dx.min(), dx.max()) == pytest.approx((2.0 / 1.5, 2.5), rel=0.01)
+    assert front.constraints[:, 0] == pytest.approx(dx)
+    assert front.nominal_objectives == pytest.approx([2.0, 10.0])
+    data = DesignResult(front, [], None, "").as_json()
+    assert data["evaluations"] == 640
+    assert set(data["front"][0]) == {"objectives", "constraints", "variables"}
+    assert len(front_table(front)) == len(data["front"])
+    DesignResult(front, [], None, "").write(tmp_path)
+    for name, number in front.chosen.items():
+        loaded = load_machine(tmp_path / f"machine_{name.replace(' ', '_')}.yaml")
+        assert loaded.name == f"reference, {name}"
+        wanted = front.machine(number).spring_types["suspension"].stiffness
+        assert loaded.spring_types["suspension"].stiffness == pytest.approx(wanted, rel=1e-12)
+    shown = front_envelopes(front, histories_of(machine))
+    page = DesignResult(front, [], shown, "about").page(Facts())
+    assert "compromise" in page
+    assert "loads middle, counter" in page
+    (shown,) = (one for one in data_of(page) if "envelopes" in one)
+    assert np.shape(shown["objectives"]) == np.shape(front.objectives)
+    assert len(drawings(page)) == 3  # front, envelopes, search
+
+
+def histories_of(machine):
+    """Return a function whose records oscillate at 2 Hz, with amplitudes that rise with 1 / k."""
+    nominal = machine.spring_types["suspension"].stiffness
+    time = np.arange(0.0, machine.profile.duration, 0.005)
+
+    def histories(cases, found):
+        for number, case in enumerate(cases):
+            k = case.parameters.spring_types["suspension"].stiffness / nominal
+            size = 1e-3 * (2.0 if "counter" in case.name else 1.0) / k
+            motion = size * np.sin(4.0 * np.pi * time)[:, None] * np.ones(len(machine.sensors))
+            sensors = list(machine.sensors)
+            found(
+                number,
+                xr.Dataset(
+                    {"displacement": (("time", "sensor"), motion)},
+                    {"time": time, "sensor": sensors},
+                ),
+            )
+
+    return histories
+
+
+def test_envelopes_are_the_largest_over_the_loads(machine):
+    front = run_designs(designs_of(machine, task_of()), run_of(machine), SearchSettings(32, 16))
+    shown = front_envelopes(front, histories_of(machine))
+    assert shown.sensors == tuple(machine.sensors)
+    # 2 mm / k of the counterweight's load; far from the ends, where the filter has settled
+    middle = slice(30, 90)
+    assert shown.nominal[:, middle] == pytest.approx(2e-3, rel=0.01)
+    assert shown.designs.shape == (len(front.objectives), len(machine.sensors), len(shown.time))
+    for (x,), lines in zip(front.search.designs, shown.designs, strict=True):
+        k = front.designs.dimensions[0].number(float(x))
+        assert lines[:, middle] == pytest.approx(2e-3 / k, rel=0.01)
+
+
+def test_number_of_the_machine_is_an_objective(machine):
+    designs = designs_of(machine, task_of(objectives=({"quantity": SPRING, "goal": "smaller"},)))
+    values, _ = designs.evaluate(np.array([[0.0]]), run_of(machine))
+    k = machine.spring_types["suspension"].stiffness
+    assert values[0, 0] == pytest.approx(0.5e-3 * k)  # in N/mm
+
+
+@pytest.mark.slow
+def test_robust_front_keeps_its_promise_on_fresh_samples(machine):
+    tolerances = Tolerances.model_validate(
+        {
+            "load": "middle",
+            "quantities": {
+                "k": {
+                    "keys": (SPRING,),
+                    "distribution": "normal",
+                    "mean": "100 %",
+                    "deviation": "5 %",
+                }
+            },
+        }
+    )
+    case = Case("middle", machine.loads["middle"], machine.profile)
+    task = task_of(
+        loads=(),
+        robust={"tolerances": "mine", "samples": 256},
+        objectives=({"quantity": "Fx", "over": "95 %"}, {"quantity": "Dx", "over": "95 %"}),
+    )
+
+    def designs(seed):
+        return machine_designs(
+            machine,
+            task,
+            [case],
+            lambda changed: uncertain_machine(changed, tolerances, case),
+            base_samples(1, 256, seed)[0],
+        )
+
+    front = run_designs(designs(0), run_of(machine), SearchSettings(96, 32))
+    fresh, _ = designs(7).evaluate(front.search.designs, run_of(machine))
+    # Fx = 10 k N with k within 5 %: its 95 % quantile is 1 + 1.645 * 0.05 times the nominal one
+    k = front.designs.dimensions[0]
+    nominal = np.array([10.0 * k.number(float(x)) for (x,) in front.search.designs])
+    assert front.objectives[:, 0] == pytest.approx((1.0 + 1.645 * 0.05) * nominal, rel=2e-3)
+    assert fresh == pytest.approx(front.objectives, rel=5e-3)
+    kept = promises(front, run_of(machine), 0)
+    assert {p.design for p in kept} == {"best Fx", "best Dx", "compromise"}
+    assert all(p.is_kept for p in kept)
+    number = front.chosen["best Fx"]
+    (best,) = (p for p in kept if (p.design, p.goal.given.quantity) == ("best Fx", "Fx"))
+    assert best.promised.value == pytest.approx(front.objectives[number, 0])
+    # the quantile of the normal distribution lies in both intervals
+    exact = (1.0 + stats.norm.ppf(0.95) * 0.05) * nominal[number]
+    for found in (best.promised, best.fresh):
+        assert found.lower < exact < found.upper
+    assert best.fresh.upper - best.fresh.lower < best.promised.upper - best.promised.lower
+    table = promises_table(kept)
+    assert list(table["kept"]) == [True] * 6
+    assert DesignResult(front, kept, None, "").as_json()["robust"][0]["fresh_value"] > 0.0
+    page = DesignResult(front, kept, None, "about").page(Facts())
+    assert "On fresh samples 6 of 6 values" in page
+
+
+def test_promise_of_too_few_samples_is_seen_to_break(machine):
+    designs = designs_of(machine, task_of(objectives=({"quantity": "Fx", "over": "mean"},)))
+    (goal,) = designs.objectives
+    lucky, fresh = np.linspace(9.0, 10.0, 16), np.linspace(9.0, 12.0, 64)
+    before, after = summary_of(goal, lucky), summary_of(goal, fresh)
+    # t quantile 2.131 of 15 degrees of freedom
+    assert before.upper - before.value == pytest.approx(2.1314 * np.std(lucky, ddof=1) / 4.0, 1e-4)
+    assert _is_kept(goal, before, after) is False
+    assert _is_kept(goal, before, before) is True
+
+
+def test_failed_runs_are_not_on_the_front(machine):
+    plain = run_of(machine)
+
+    def run(cases):
+        cases = list(cases)
+        table = plain(cases)
+        k = np.array([c.parameters.spring_types["suspension"].stiffness for c in cases])
+        stiff = k > machine.spring_types["suspension"].stiffness
+        return table.assign(diverged=("run", np.where(stiff, "at 3 s", "").astype(object)))
+
+    front = run_designs(designs_of(machine, task_of()), run, SearchSettings(96, 32))
+    assert len(front.objectives)
+    assert (front.objectives[:, 1] <= 10.0 + 1e-9).all()
+
+
+def test_shipped_files_fit_the_reference_machine(machine):
+    for name in DESIGNS.listed():
+        designs = designs_of(machine, load_design(name))
+        assert len(designs.dimensions) == 8
+        for corner in (0.0, 1.0):
+            designs.machine_at(np.full(8, corner))
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"variables": {"k": {"keys": ("spring_types.x",), "low": "1 m", "high": "2 m"}}}, "x"),
+        ({"variables": {"k": {"keys": (SPRING,), "low": "90 %", "high": "80 %"}}}, "below"),
+        ({"objectives": ({"quantity": "D"},)}, "several responses"),
+        ({"constraints": ({"quantity": "Dx", "at_most": "2 N"},)}, "N"),
+        ({"choices": {"c": {"options": {"a": {FRICTION: "1 m"}, "b": {}}}}}, "option a"),
+    ],
+)
+def test_wrong_files_are_refused(machine, changes, message):
+    with pytest.raises(InputError, match=message):
+        designs_of(machine, task_of(**changes))
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"variables": {}},
+        {"loads": ()},
+        {"objectives": ({"quantity": "Dx", "over": "often"},)},
+        {"constraints": ({"quantity": "Dx"},)},
+        {"loads": (), "robust": {"tolerances": "laundry", "samples": 100}},
+    ],
+)
+def test_incomplete_files_are_refused(changes):
+    with pytest.raises(ValueError, match=r"design|loads|over|at_least|power of two"):
+        task_of(**changes)

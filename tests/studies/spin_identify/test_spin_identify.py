@@ -1,0 +1,213 @@
+"""Identification from vibrations of the whole machine: known and undetermined numbers, command."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+
+from wm_drake.errors import InputError
+from wm_drake.parameters import SpinProfile, load_machine, with_value
+from wm_drake.parameters.spin import Region
+from wm_drake.parameters.unbalance_cases import load_unbalance_cases
+from wm_drake.studies.spin_cycle.study import labels_of
+from wm_drake.studies.spin_identify.page import warnings_of
+from wm_drake.studies.spin_identify.study import (
+    SpinModel,
+    at_point,
+    identified_machine,
+    identify_from_spin,
+    planted_values,
+    sought_of,
+    virtual_experiment,
+)
+
+PROFILE = SpinProfile(
+    time=(0.0, 5.0),
+    speed=(8.0, 30.0),
+    regions=tuple(Region(name=f"R{k + 1}", begin=1.0 * k, end=1.0 * k + 1.0) for k in range(5)),
+)
+CASES = tuple(load_unbalance_cases()[1:5:3])  # 400 g in front, at the rear
+KEYS = (
+    ("gasket.stiffness_x",),
+    ("gasket.stiffness_y", "gasket.stiffness_z"),
+    ("gasket.damping_x",),
+)
+
+
+LINEAR = (
+    "extends: reference\ngasket: {stiffness_x: 4 N/mm, stiffness_y: 4 N/mm, stiffness_z: 4 N/mm}\n"
+)
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory):
+    """Return the reference machine with numbers in place of tables."""
+    path = tmp_path_factory.mktemp("machine") / "linear.yaml"
+    path.write_text(LINEAR)
+    return load_machine(path)
+
+
+def made_up(reference, seen):
+    """Return a model with a known answer: the last number changes the displacements only if `seen`."""
+    sought = tuple(sought_of(reference, keys) for keys in KEYS)
+    labels = labels_of(reference, CASES, PROFILE)
+    waves = np.sin(np.arange(3 * 2 * 5 * 9).reshape(3, 2, 5, 3, 3) ** 1.3)
+
+    def regions(cases):
+        rows = []
+        for number, case in enumerate(cases):
+            gasket = case.parameters.gasket
+            assert gasket.stiffness_y == gasket.stiffness_z
+            numbers = (
+                gasket.stiffness_x / 4e3,
+                gasket.stiffness_y / 4e3,
+                (gasket.damping_x / 19.0 if seen else 1.0),
+            )
+            here = waves[:, number % len(CASES)]
+            rows.append(2.0 + sum(here[k] * value**0.5 for k, value in enumerate(numbers)))
+        return xr.Dataset(
+            {
+                "region_displacement": (
+                    ("run", "region", "accelerometer", "axis"),
+                    1e-3 * np.abs(rows),
+                )
+            }
+        )
+
+    assert list(labels) == ["case", "region", "accelerometer", "axis"]
+    return SpinModel(reference, PROFILE, CASES, sought, regions)
+
+
+def test_true_numbers_are_recovered_and_differ_from_the_machines(reference):
+    model = made_up(reference, seen=True)
+    planted = planted_values(model.sought, seed=3)
+    starts = np.array([sought.unknown.start for sought in model.sought])
+    assert np.abs(planted / starts - 1.0).min() > 0.03
+    measured = virtual_experiment(model, planted, noise=0.0, seed=3)
+    result = identify_from_spin(model, measured, planted=planted)
+    np.testing.assert_allclose(result.fit.values, planted, rtol=1e-4)
+    assert result.identifiable == (True, True, True)
+    assert (
+        float(abs(result.after / measured - 1.0).max())
+        < 1e-5
+        < float(abs(result.before / measured - 1.0).max())
+    )
+
+
+def test_numbers_that_the_data_do_not_determine_are_named(reference):
+    model = made_up(reference, seen=False)
+    planted = planted_values(model.sought, seed=4)
+    result = identify_from_spin(
+        model, virtual_experiment(model, planted, noise=1e-3, seed=4), planted=planted
+    )
+    assert result.identifiable == (True, True, False)
+    assert np.abs(result.recovered[:2]).max() < 0.02
+    assert result.uncertainty[2] == np.inf
+    assert any("gasket.damping_x" in direction.names for direction in result.fit.undetermined)
+    machine = identified_machine(result)
+    assert machine.name == "reference_identified"
+    assert machine.gasket.stiffness_x == result.fit["gasket.stiffness_x"].value
+    assert machine.gasket.damping_x == reference.gasket.damping_x
+    assert "virtual experiment: identified" in machine.sources["gasket.stiffness_z"]
+    assert machine.sources.get("gasket.damping_x") == reference.sources.get("gasket.damping_x")
+
+
+def test_verdict_is_that_of_the_displacements_not_of_the_intervals(reference):
+    """Fit a model that cannot reproduce the measurement: it still determines its numbers."""
+    model = made_up(reference, seen=True)
+    planted = planted_values(model.sought, seed=3)
+    measured = virtual_experiment(model, planted, noise=0.0, seed=3)
+    good = identify_from_spin(model, measured)
+    assert good.verdict == "good"
+    other = measured * (1.0 + 0.6 * np.sin(7.0 * np.arange(measured.size)).reshape(measured.shape))
+    poor = identify_from_spin(model, other)
+    assert poor.verdict == "poor"
+    assert poor.error_after > 0.15
+    assert not warnings_of(good)
+    assert any("Poor" in warning for warning in warnings_of(poor))
+
+
+def test_noise_widens_intervals_until_a_number_is_not_identified(reference):
+    model = made_up(reference, seen=True)
+    planted = planted_values(model.sought, seed=5)
+    halves = [
+        identify_from_spin(
+            model, virtual_experiment(model, planted, noise, 5), planted=planted
+        ).uncertainty
+        for noise in (1e-3, 1e-2)
+    ]
+    assert (halves[1] > 3.0 * halves[0]).all()
+
+
+def test_numbers_that_are_one_unknown_change_together(reference):
+    sought = (sought_of(reference, ("gasket.stiffness_x", "gasket.stiffness_z")),)
+    changed = at_point(reference, sought, np.array([5e3]))
+    assert (changed.gasket.stiffness_x, changed.gasket.stiffness_z) == (5e3, 5e3)
+    assert changed == with_value(
+        with_value(reference, "gasket.stiffness_x", 5e3), "gasket.stiffness_z", 5e3
+    )
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        (("gasket.stifness_x",), "unknown key 'stifness_x' .did you mean 'stiffness_x'"),
+        (("gasket.stiffness_x", "gasket.damping_x"), "have different units"),
+        (("gasket.friction_torque_x",), "is not positive, so its range must be given"),
+    ],
+)  # fmt: skip
+def test_bad_unknowns_are_refused(reference, keys, message):
+    with pytest.raises(InputError, match=message):
+        sought_of(reference, keys)
+
+
+@pytest.fixture
+def identify(wm_drake):
+    def run(*arguments):
+        text = "time: (0, 4) s\nspeed: (80, 300) rpm\nregions: [{name: A, begin: 0 s, end: 2 s}, {name: B, begin: 2 s, end: 4 s}]\n"
+        Path("p.yaml").write_text(text)
+        Path("linear.yaml").write_text(LINEAR)
+        common = "--machine linear.yaml --profile p.yaml --case 2 --case 5 --out out"
+        return wm_drake(f"study spin-identify {common}", *arguments)
+
+    return run
+
+
+def test_command_names_its_experiment_virtual_and_recovers_the_true_numbers(identify):
+    unknowns = (
+        "--unknown",
+        "gasket.stiffness_x+gasket.stiffness_z=(2, 8) N/mm",
+        "--unknown",
+        "gasket.stiffness_y",
+    )
+    ended = identify("--json", "--noise", "0", *unknowns)
+    assert (ended.code, len(ended.out.splitlines())) == (0, 1)
+    shown = json.loads(ended.out)
+    assert shown["virtual_experiment"] is True
+    assert all(
+        entry["identifiable"] and abs(entry["error"]) < 0.02 for entry in shown["unknowns"].values()
+    )
+    assert shown["average_error_after"] < 1e-3 < shown["average_error_before"]
+    page = Path("out/report.html").read_text(encoding="utf-8")
+    assert "This is a virtual experiment: nothing was measured." in page
+    written = load_machine("out/identified.yaml")
+    table = pd.read_csv("out/parameters.csv").set_index("unknown")
+    assert list(table.index) == ["gasket.stiffness_x", "gasket.stiffness_z", "gasket.stiffness_y"]
+    for key in table.index:
+        value = getattr(written.gasket, key.removeprefix("gasket."))
+        assert table.value[key] == pytest.approx(1e-3 * value, rel=1e-5)
+        assert table.lower_95[key] <= table.value[key] <= table.upper_95[key]
+        assert table.unit[key] == "N/mm"
+    assert written.name == "reference_identified"
+    real = identify("--json", "--measured", "out/measured.csv", "--overwrite", *unknowns)
+    told = json.loads(real.out)
+    assert told["virtual_experiment"] is False
+    for name, entry in told["unknowns"].items():
+        assert "planted" not in entry
+        assert entry["found"] == pytest.approx(shown["unknowns"][name]["found"], rel=1e-3)
+    assert (
+        "virtual" not in Path("out/report.html").read_text(encoding="utf-8").split("references")[0]
+    )

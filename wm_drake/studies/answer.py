@@ -1,0 +1,178 @@
+"""The result of a study: an answer in words, and parts of sentences, pictures and tables.
+
+Files, JSON, terminal, page and notebook follow from it. A study computes labelled datasets whose
+variables carry their quantities (`wm_drake.report.quantity`) and returns an `Answer` that shows
+them; it declares no class of its own.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+import xarray as xr
+
+from wm_drake.parameters import MachineParameters
+from wm_drake.report.figure import Figure
+from wm_drake.report.labelled import LabelledTable
+from wm_drake.studies.study import Facts, Result
+
+if TYPE_CHECKING:
+    from rich.table import Table as TerminalTable
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A figure of a page.
+
+    Attributes:
+        alternative: Text for readers who cannot see it.
+        caption: Text below it.
+    """
+
+    figure: Figure
+    alternative: str
+    caption: str
+
+
+@dataclass(frozen=True)
+class Part:
+    """A section of a page; one that shows nothing is left out.
+
+    Attributes:
+        heading: Heading. Before its first colon it is the name of the section in an address.
+        shown: Pictures and tables.
+        text: Sentences above them.
+        links: Names of files beside the page, and the words that link to them.
+        remarks: Sentences of a list.
+        facts: Pairs of word and text.
+        has_long_words: Whether the words of the tables are broken into lines.
+        is_folded: Whether a reader must open the section to see more than its heading.
+    """
+
+    heading: str
+    shown: Sequence[Plot | LabelledTable] = ()
+    text: str = ""
+    links: Sequence[tuple[str, str]] = ()
+    remarks: Sequence[str] = ()
+    facts: Sequence[tuple[str, str]] = ()
+    has_long_words: bool = False
+    is_folded: bool = False
+
+    @property
+    def tables(self) -> Iterator[LabelledTable]:
+        """The tables of the part, also those of files only."""
+        return (shown for shown in self.shown if isinstance(shown, LabelledTable))
+
+
+@dataclass(frozen=True)
+class Answer(Result):
+    """Result of a study.
+
+    Attributes:
+        title: Title of the page.
+        answer: Answer to the question of the study in a few sentences.
+        machine: Machine of the result; its numbers end the page. None for that of a component.
+        parts: Sections of the page, with all tables of the result.
+        details: How the result was computed, as pairs of word and text.
+        method: Sentences on the method, below the details.
+        files: Other files as text or bytes, by their names.
+        warned: Sentences on what a reader must know before the answer, in a box at the top and on
+            the terminal.
+        short: Part in a box between the answer and the contents. Its facts are also printed.
+        diverged: A line for each run that diverged.
+    """
+
+    title: str
+    answer: str
+    machine: MachineParameters | None
+    parts: tuple[Part, ...]
+    details: tuple[tuple[str, str], ...] = ()
+    method: str = ""
+    files: Mapping[str, str | bytes] = field(default_factory=dict)
+    warned: tuple[str, ...] = ()
+    short: Part | None = None
+    diverged: tuple[str, ...] = ()
+
+    def labelled(self) -> dict[str, LabelledTable]:
+        """Return the tables by name."""
+        parts = (*self.parts, self.short) if self.short else self.parts
+        return {table.name: table for part in parts for table in part.tables}
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Return the tables as frames, in units for reading, by name."""
+        return {name: table.frame() for name, table in self.labelled().items()}
+
+    def as_json(self) -> dict[str, Any]:
+        """Return machine, answer, and each table as a list of rows."""
+        about = {} if self.machine is None else {"machine": self.machine.name}
+        tables = {name: table.records() for name, table in self.labelled().items()}
+        return {**about, "answer": self.answer, **tables}
+
+    def terminal(self) -> "list[TerminalTable | str]":
+        """Return some tables, the answer, and the facts of the part in short."""
+        chosen = [table for table in self.labelled().values() if table.is_in_terminal]
+        facts = self.short.facts if self.short else ()
+        return [
+            *(table.table().terminal(table.heading) for table in chosen),
+            self.answer,
+            *(f"{word}: {text}" for word, text in facts),
+        ]
+
+    def page(self, facts: Facts) -> str:
+        """Return the page: answer, parts, how it was made, and the numbers of the machine."""
+        from wm_drake.report.page import SectionedPage
+
+        about = [] if self.machine is None else [("Machine", self.machine.name)]
+        seconds = f"{facts.wall_s:.0f} s"
+        time = ("Runs", f"{facts.runs} in {seconds}") if facts.runs else ("Time", seconds)
+        return SectionedPage(
+            self.title,
+            self.answer,
+            [_section(part) for part in self.parts],
+            [*about, time, *self.details, *facts.rows()],
+            self.machine,
+            [*facts.warnings, *self.warned],
+            method=self.method,
+            advice=_section(self.short) if self.short else None,
+        ).html()
+
+    def write(self, folder: Path) -> None:
+        """Write the tables as CSV, and the other files."""
+        super().write(folder)
+        for name, content in self.files.items():
+            data = content.encode("utf-8") if isinstance(content, str) else content
+            (folder / name).write_bytes(data)
+
+    def warnings(self) -> tuple[str, ...]:
+        """Return warnings of the result for the terminal."""
+        return self.warned
+
+    def failures(self) -> tuple[str, ...]:
+        """Return a line for each run that diverged."""
+        return self.diverged
+
+
+def diverged_runs(runs: xr.Dataset) -> tuple[str, ...]:
+    """Return a line for each run of a table of runs that diverged."""
+    texts = zip(runs.case.values, runs.diverged.values, strict=True)
+    return tuple(f"{case}: {text}" for case, text in texts if text)
+
+
+def _section(part: Part) -> Any:
+    """Return a part as section of a page."""
+    from wm_drake.report.page import Section, picture
+
+    return Section(
+        part.heading.partition(":")[0].lower().replace(" ", "-"),
+        part.heading,
+        [picture(p.figure, p.alternative, p.caption) for p in part.shown if isinstance(p, Plot)],
+        [table.table() for table in part.tables if table.heading],
+        part.text,
+        links=part.links,
+        remarks=part.remarks,
+        facts=part.facts,
+        has_long_words=part.has_long_words,
+        is_folded=part.is_folded,
+    )

@@ -1,0 +1,105 @@
+"""Check the options of the study of rings of balls, and run it."""
+
+from typing import Any
+
+from wm_drake.engines.compiled.step_check import check_step
+from wm_drake.errors import input_error
+from wm_drake.model.machine import Machine
+from wm_drake.parameters.units import Unit
+from wm_drake.report.quantity import SPEED
+from wm_drake.simulation.balance import rings_of
+from wm_drake.simulation.steps import checked_step
+from wm_drake.studies.answer import Answer
+from wm_drake.studies.balancer.options import BalancerOptions
+from wm_drake.studies.balancer.page import balancer_answer
+from wm_drake.studies.balancer.study import (
+    MASS,
+    PLACE,
+    RATE,
+    WINDOW,
+    Trials,
+    base_of,
+    numbers_of,
+    with_factors,
+)
+from wm_drake.studies.executor import Executor
+from wm_drake.studies.inputs import quantities_of
+from wm_drake.studies.study import Task
+
+PART = Unit("dimensionless", "percent")
+MOST_VALUES = 24
+"""Largest number of values of an option."""
+
+
+class BalancerTask(Task):
+    """The study with checked options."""
+
+    def __init__(self, options: BalancerOptions, machine: Machine) -> None:
+        """Check the rings, the values and the speeds."""
+        self.options, self.machine = options, machine
+        parameters = machine.parameters
+        self.rings = rings_of(parameters)
+        if not self.rings:
+            raise input_error(
+                f"machine '{parameters.name}' has no element of kind ball_ring; allowed is a "
+                "machine with rings of balls, such as the shipped machine 'ball_rings'",
+                key="elements",
+            )
+        radii = [u.radius for load in parameters.loads.values() for u in load.unbalances]
+        if not radii:
+            raise input_error("has no load with a point mass, whose radius is used", key="loads")
+        self.radius = radii[0]
+        self.masses = _values(options.mass, MASS.unit, "--mass")
+        self.places = _values(options.place, PLACE.unit, "--place", True)
+        self.ball_masses = _values(options.ball_mass, PART, "--ball-mass")
+        self.dampings = _values(options.damping, PART, "--damping")
+        self.rate = _values(options.rate, RATE.unit, "--rate")[0]
+        self.high = parameters.profile.highest_speed
+        if options.high is not None:
+            self.high = _values(options.high, SPEED.unit, "--to")[0]
+        if self.high < 4.0 * WINDOW * (1.0 - 1e-9):  # 100 rpm, in rad/s, is rounded
+            raise input_error(f"is below {SPEED.text(4.0 * WINDOW)}", where="--to")
+        self.release = _values(options.release, SPEED.unit, "--release")
+        if max(self.release) >= self.high:
+            raise input_error(
+                f"is not below the highest speed, {SPEED.unit.reading(self.high)}",
+                where="--release",
+            )
+        step = checked_step(parameters, None)
+        for ball_mass in self.ball_masses:
+            for damping in self.dampings:
+                changed = with_factors(parameters, ball_mass, damping)
+                check_step(machine.set_up(parameters=changed), step)
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """Return what determines the runs beside the machine."""
+        high, rate = SPEED.unit.reading(self.high), RATE.unit.reading(self.rate)
+        return {"run-up": f"to {high} at {rate}"}
+
+    def run(self, executor: Executor) -> Answer:
+        """Run loads, rings and releases."""
+        trials = Trials(self.machine, executor, self.high, self.rate, self.radius)
+        loads = trials.loads(self.masses, self.places)
+        base = base_of(loads)
+        rings = trials.rings(base, self.ball_masses, self.dampings)
+        releases = trials.releases(base, self.release)
+        plain = trials.plain(base)
+        numbers = numbers_of(trials, loads, plain)
+        loads = loads.assign(without_rings=plain.amplitude)
+        return balancer_answer(self.machine.parameters, numbers, loads, rings, releases)
+
+
+def _values(text: str, unit: Unit, option: str, is_place: bool = False) -> tuple[float, ...]:
+    """Return different values of an option, rising.
+
+    Args:
+        text, unit, option: As for `quantities_of`.
+        is_place: Whether the values may be 0 and below.
+    """
+    values = tuple(sorted(set(quantities_of(text, unit, option))))
+    if len(values) > MOST_VALUES:
+        raise input_error(f"has {len(values)} values; allowed are {MOST_VALUES}", where=option)
+    if not is_place and not values[0] > 0.0:
+        raise input_error(f"'{text}' is not above 0", where=option)
+    return values

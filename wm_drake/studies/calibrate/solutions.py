@@ -1,0 +1,201 @@
+"""Solutions of a calibration: errors, uncertainties, distinct solutions, and their machines."""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from wm_drake.parameters import MachineParameters
+from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import from_base, to_base
+from wm_drake.studies.calibrate.parameter_map import ParameterMap
+from wm_drake.studies.calibrate.targets import Targets
+from wm_drake.studies.fitting.posterior import AT_BOUND, DETERMINED, UNDETERMINED, Posterior
+
+GOOD = 1.25
+"""Largest ratio of the mean error of a good solution to that of the best solution."""
+
+DISTINCT = 0.5
+"""Least distance between distinct solutions: RMS over the quantities, in prior deviations."""
+
+
+class Percents(NamedTuple):
+    """Mean and largest absolute value of relative errors, in percent; NaN without errors."""
+
+    mean: float
+    largest: float
+
+    def named(self, prefix: str = "") -> dict[str, float]:
+        """Return both by name, such as `mean_percent`, for files."""
+        return {f"{prefix}{name}_percent": value for name, value in self._asdict().items()}
+
+    def __str__(self) -> str:
+        """Return both as words."""
+        return f"mean {self.mean:.1f} %, largest {self.largest:.1f} %"
+
+
+def percents_of(errors: FloatArray) -> Percents:
+    """Return mean and largest absolute value of relative errors; NaN values are ignored."""
+    if not errors.size:
+        return Percents(np.nan, np.nan)
+    sizes = np.abs(errors)
+    return Percents(100.0 * float(np.nanmean(sizes)), 100.0 * float(np.nanmax(sizes)))
+
+
+@dataclass(frozen=True)
+class Solution:
+    """The end point of a search.
+
+    Attributes:
+        parameter_map: Map from the free quantities to the machine.
+        targets: Targets of the search.
+        point: (n) values of the free quantities, in SI units.
+        amplitude: (case, sensor) computed amplitudes. [m]
+        responses: (response) other computed responses. [unit for reading]
+        data_cost, prior_cost: Half the sums of squares of data and prior.
+        posterior: Normal distribution around the point, in units of the prior.
+        evaluations: Number of points that the search evaluated.
+    """
+
+    parameter_map: ParameterMap
+    targets: Targets
+    start: int
+    point: FloatArray
+    amplitude: FloatArray
+    responses: FloatArray
+    data_cost: float
+    prior_cost: float
+    posterior: Posterior
+    evaluations: int
+
+    @property
+    def cost(self) -> float:
+        """Cost that the search minimizes: the sum of data cost and prior cost."""
+        return self.data_cost + self.prior_cost
+
+    @property
+    def coordinates(self) -> FloatArray:
+        """Point in units of the prior: (quantity - expected) / deviation. (n)"""
+        return self.posterior.coordinates
+
+    @property
+    def errors(self) -> FloatArray:
+        """(computed - measured) / measured (case, sensor); NaN where the weight is 0."""
+        return self.targets.errors(self.amplitude)
+
+    @property
+    def response_errors(self) -> FloatArray:
+        """(computed - target) / target (response); NaN where the weight is 0."""
+        return self.targets.response_errors(self.responses)
+
+    def verdicts(self) -> list[str]:
+        """Return what determines each quantity: "data", "prior", "data and prior" or "bound"."""
+        lower, upper = self.parameter_map.lower, self.parameter_map.upper
+        at_bound = np.minimum(self.point - lower, upper - self.point) < AT_BOUND * (upper - lower)
+        spread = self.posterior.spread()
+        cases = [at_bound, spread < DETERMINED, spread > UNDETERMINED]
+        return list(map(str, np.select(cases, ["bound", "data", "prior"], "data and prior")))
+
+    def values_beyond(self) -> list[str]:
+        """Return a text for each value beyond its limit, such as ``middle Xf +23 % (20 %)``."""
+        targets = self.targets
+        loads = [f"{name}{'' if gasket else ' without gasket'}" for name, gasket in targets.loads]
+        names = [f"{load} {sensor}" for load in loads for sensor in targets.sensors]
+        names += [
+            " ".join(filter(None, (target.load, target.response.name, target.factor and target.of)))
+            for target in targets.responses
+        ]
+        errors = np.concatenate([self.errors.ravel(), self.response_errors])
+        used = [(name, e) for name, e in zip(names, errors, strict=True) if e == e]
+        return [
+            f"{name} {100.0 * error:+.0f} % ({100.0 * limit:g} %)"
+            for (name, error), limit in zip(used, targets.limit_of_each(), strict=True)
+            if abs(error) > limit
+        ]
+
+
+def distinct(solutions: list[Solution]) -> list[Solution]:
+    """Return the good solutions, best first, without those that are close to a better one."""
+    ordered = sorted(solutions, key=lambda solution: solution.cost)
+    limit = GOOD * percents_of(ordered[0].errors).mean
+    kept: list[Solution] = []
+    for solution in ordered:
+        far = all(
+            np.sqrt(np.mean((solution.coordinates - other.coordinates) ** 2)) > DISTINCT
+            for other in kept
+        )
+        if far and percents_of(solution.errors).mean <= limit:
+            kept.append(solution)
+    return kept
+
+
+def solved_machine(solution: Solution, number: int = 0) -> MachineParameters:
+    """Return the machine of a solution.
+
+    The source of each fitted number is "fit: " followed by the text of `fit_texts`, and
+    "assumption: " followed by the known quantities that enter.
+
+    Args:
+        number: Number of the solution, for the name of the machine; 0 keeps the name.
+    """
+    parameter_map, all_texts = solution.parameter_map, fit_texts(solution)
+    fits: dict[str, list[str]] = {}
+    reasons: dict[str, list[str]] = {}
+    for value in parameter_map.values:
+        entering = np.flatnonzero(np.any(value.factors != 0.0, axis=1))
+        texts = [all_texts[index] for index in entering]
+        for listed, new in ((fits, texts), (reasons, value.reasons)):
+            kept = listed.setdefault(value.key, [])
+            kept.extend(text for text in new if text not in kept)
+    parameters = parameter_map.parameters_at(_rounded(solution))
+    fitted = {
+        key: "; ".join(
+            kind + "; ".join(listed[key])
+            for kind, listed in (("fit: ", fits), ("assumption: ", reasons))
+            if listed[key]
+        )
+        for key in fits
+    }
+    others = {
+        key: text
+        for key, text in parameters.sources.items()
+        if not any(key.startswith(f"{k}.") for k in fitted)
+    }
+    name = f"{parameters.name}_calibrated_{number}" if number else parameters.name
+    return parameters.model_copy(update={"name": name, "sources": {**others, **fitted}})
+
+
+def fit_texts(solution: Solution) -> list[str]:
+    """Return for each quantity ``damper_friction 27.5 ± 2.1 N (expected 35 ± 9 N)``."""
+    parameter_map, texts = solution.parameter_map, []
+    values = parameter_map.in_units(_rounded(solution))
+    expected, deviation = map(parameter_map.in_units, parameter_map.prior)
+    posterior = solution.posterior.spread() * deviation
+    for index, (name, unit) in enumerate(
+        zip(parameter_map.names, parameter_map.units, strict=True)
+    ):
+        after, before = (
+            f"{n[index]:.10g} ± {_short(s[index])} {unit}".rstrip()
+            for n, s in ((values, posterior), (expected, deviation))
+        )
+        texts.append(f"{name} {after} (expected {before})")
+    return texts
+
+
+def _rounded(solution: Solution) -> FloatArray:
+    """Return the point of a solution, rounded to about 0.1 % of the prior's standard deviation.
+
+    The rounding is decimal in the unit in which each quantity is written.
+    """
+    parameter_map, point = solution.parameter_map, []
+    for index, unit in enumerate(parameter_map.units):
+        value, deviation = (
+            from_base(float(a[index]), unit) for a in (solution.point, parameter_map.deviation)
+        )
+        point.append(to_base(round(value, 3 - math.floor(math.log10(deviation))), unit))
+    return np.clip(point, parameter_map.lower, parameter_map.upper)
+
+
+def _short(number: float) -> str:
+    return f"{number:.0f}" if abs(number) >= 100.0 else f"{number:.2g}"

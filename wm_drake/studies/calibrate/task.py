@@ -1,0 +1,154 @@
+"""Check the options of a calibration, and run it."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from wm_drake.errors import InputError, input_error, problems_at
+from wm_drake.model.build import build_machine
+from wm_drake.model.machine import Machine
+from wm_drake.parameters import MachineParameters, located
+from wm_drake.parameters.free import load_free
+from wm_drake.parameters.measured import measured_amplitudes, measured_responses
+from wm_drake.parameters.units import plain_number
+from wm_drake.studies.calibrate.computed import Runner
+from wm_drake.studies.calibrate.options import CalibrateOptions
+from wm_drake.studies.calibrate.page import CalibrateResult
+from wm_drake.studies.calibrate.parameter_map import parameter_map_of
+from wm_drake.studies.calibrate.prediction import check_held_out, predict
+from wm_drake.studies.calibrate.response_targets import with_deviations
+from wm_drake.studies.calibrate.study import (
+    RELATIVE_DEVIATION,
+    Plan,
+    calibrate,
+)
+from wm_drake.studies.calibrate.targets import AMPLITUDE, Targets, targets_of
+from wm_drake.studies.executor import Executor
+from wm_drake.studies.inputs import existing_file, pairs_of, with_measured
+from wm_drake.studies.study import Task
+
+
+class CalibrateTask(Task):
+    """A calibration with checked options."""
+
+    def __init__(self, options: CalibrateOptions, machine: Machine) -> None:
+        """Read targets and free file, and check the settings of the searches.
+
+        Raises:
+            InputError: an option or a file is wrong.
+        """
+        self.held_out = _groups(options.leave_out)
+        measured = with_measured(machine.parameters, options.targets, "--targets")
+        deviations = _fractions(options.deviation, "--deviation")
+        amplitude = deviations.pop(AMPLITUDE, RELATIVE_DEVIATION)
+        targets = _targets(measured, deviations).weighted(_numbers(options.weight, "--weight"))
+        with problems_at("--limit", ""):
+            self.targets = targets.limited(_fractions(options.limit, "--limit"))
+        # the calibrated machine names the targets as its measurements
+        self.machine = build_machine(measured) if options.targets else machine
+        resolution = 1e-3 * options.resolution
+        self.plan = Plan(options.starts, options.seed, options.iterations, amplitude, resolution)
+        self.free = load_free(existing_file(options.free, "--free"))
+        check_held_out(self.targets, self.held_out)
+        try:
+            parameter_map_of(self.machine, self.free)
+        except InputError as error:
+            raise located(error, options.free) from None
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """Return what determines the searches beside the machine."""
+        return {
+            "free": self.free,
+            "targets": self.targets,
+            "plan": self.plan,
+            "leave_out": "; ".join(map(",".join, self.held_out)),
+        }
+
+    def run(self, executor: Executor) -> CalibrateResult:
+        """Calibrate, and predict the held-out loads."""
+        assert executor.ledger is not None  # the study is declared with runs
+        runner = Runner(self.machine, executor.ledger, executor.workers)
+        with _searches(executor, runner, self.plan.starts) as shown:
+            calibration = calibrate(shown, self.free, self.targets, self.plan)
+        with _searches(executor, runner, len(self.held_out) * self.plan.starts) as shown:
+            predictions = predict(shown, self.free, calibration, self.held_out)
+        return CalibrateResult(calibration, predictions)
+
+
+@contextmanager
+def _searches(executor: Executor, runner: Runner, searches: int) -> Iterator[Runner]:
+    """Yield the runner with a progress bar of searches, machines and the least cost."""
+    with executor.progress(searches, "searches") as bar:
+        ended, last = 0, (0, 0)
+
+        def report(search: int, evaluations: int, best: float) -> None:
+            nonlocal ended, last
+            if last[1] > evaluations or last[0] != search:  # another search has begun
+                ended += 1
+            last = search, evaluations
+            bar(ended, f"{evaluations} machines, least cost {best:.1f}")
+
+        yield replace(runner, report=report)
+
+
+def _targets(parameters: MachineParameters, deviations: Mapping[str, float]) -> Targets:
+    if not parameters.measured:
+        raise input_error(
+            f"machine '{parameters.name}' names no measured amplitudes of its own; name a CSV file",
+            where="--targets",
+        )
+    targets = targets_of(
+        parameters,
+        measured_amplitudes(parameters),
+        ", ".join(Path(name).name for name in parameters.measured),
+        measured_responses(parameters),
+    )
+    with problems_at("--deviation", ""):
+        return replace(targets, responses=with_deviations(targets.responses, deviations))
+
+
+def _fractions(entries: Sequence[str], option: str) -> dict[str, float]:
+    """Return the numbers of NAME=PERCENT entries; one without a name is that of all amplitudes."""
+    plain = [entry for entry in entries if "=" not in entry]
+    if len(plain) > 1:
+        raise input_error(
+            f"{' and '.join(plain)} are given; one number without a name is allowed, that of the "
+            "amplitudes",
+            where=option,
+        )
+    named = [entry for entry in entries if "=" in entry]
+    named += [f"{AMPLITUDE}={entry}" for entry in plain]
+    return {name: number / 100.0 for name, number in _numbers(named, option, zero=False).items()}
+
+
+def _numbers(entries: Sequence[str], option: str, zero: bool = True) -> dict[str, float]:
+    """Return the numbers of NAME=NUMBER entries, each finite and above 0, or 0 where allowed."""
+    numbers: dict[str, float] = {}
+    for name, text in pairs_of(entries, option):
+        try:
+            number = plain_number(text)
+        except ValueError as error:
+            raise input_error(str(error), where=option, key=name) from None
+        if not 0.0 <= number < math.inf or (number == 0.0 and not zero):
+            allowed = ">= 0" if zero else "> 0"
+            raise input_error(
+                f"'{text}' is not allowed; must be {allowed} and finite", where=option, key=name
+            )
+        if name in numbers:
+            raise input_error("is given twice", where=option, key=name)
+        numbers[name] = number
+    return numbers
+
+
+def _groups(entries: Sequence[str]) -> list[list[str]]:
+    """Return the groups of loads that `--leave-out` names."""
+    groups = [[name.strip() for name in entry.split(",")] for entry in entries]
+    for names in groups:
+        for name in names:
+            if names.count(name) > 1:
+                raise input_error(f"'{name}' is given twice", where="--leave-out")
+    return groups

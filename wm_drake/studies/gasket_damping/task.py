@@ -1,0 +1,64 @@
+"""Check the options of the gasket-damping study, and run it."""
+
+from wm_drake.model.machine import Machine
+from wm_drake.report.terminal import say
+from wm_drake.simulation.runs import simulate
+from wm_drake.studies.answer import Answer
+from wm_drake.studies.executor import Executor
+from wm_drake.studies.fitting.methods import least_squares
+from wm_drake.studies.gasket_damping.options import GasketDampingOptions
+from wm_drake.studies.gasket_damping.page import gasket_damping_answer
+from wm_drake.studies.gasket_damping.study import (
+    SCREENED,
+    STARTS,
+    Comparison,
+    cases_at,
+    damping_problem,
+    grid_of_paper,
+    planted_damping,
+    read_records,
+    run_up_of,
+    virtual_experiment,
+)
+from wm_drake.studies.study import Task
+
+
+class GasketDampingTask(Task):
+    """The study with checked options."""
+
+    def __init__(self, options: GasketDampingOptions, machine: Machine) -> None:
+        """Check the machine, and read the records or the true values of the virtual experiment."""
+        self.options, self.machine = options, machine
+        run_up_of(machine.parameters)
+        self.records, self.truth = read_records(machine.parameters, options.record), None
+        if not options.record:
+            self.truth = planted_damping(
+                machine.parameters, options.planted_linear, options.planted_torsional
+            )
+
+    def run(self, executor: Executor) -> Answer:
+        """Identify the damping, from the records or from a virtual experiment."""
+        machine, records, mesh = self.machine, self.records, self.options.mesh
+        if self.truth is not None:
+            say(
+                "No measured records were given. The Drake engine runs a virtual experiment with "
+                "other damping values and noise.",
+                err=True,
+            )
+            records = virtual_experiment(machine.parameters, self.truth, self.options.seed)
+        problem = damping_problem(machine, records)
+        with executor.fraction("fit") as progress:
+            fit = least_squares(
+                problem,
+                seed=self.options.seed,
+                starts=STARTS,
+                screened=SCREENED,
+                progress=lambda fraction, _: progress(fraction),
+            )
+        grids = None if mesh is None else grid_of_paper(problem, mesh / 100.0)
+        computed = {
+            case.name: simulate(machine, case).displacement
+            for case in cases_at(machine.parameters, fit.values, tuple(records))
+        }
+        comparison = Comparison(records, computed, self.truth)
+        return gasket_damping_answer(machine.parameters, fit, comparison, grids)

@@ -1,0 +1,380 @@
+"""Identification of parameters from vibrations of the whole machine in a spin cycle.
+
+[A] section 4.2 identifies the parameters of its Table 8 in this way.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeAlias
+
+import numpy as np
+import xarray as xr
+
+from wm_drake.errors import input_error, problems_at
+from wm_drake.parameters import (
+    Change,
+    MachineParameters,
+    SpinProfile,
+    Variation,
+    apply,
+    with_values,
+)
+from wm_drake.parameters.keys import allowed_range
+from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.unbalance_cases import UnbalanceCase
+from wm_drake.parameters.variation import number_at, range_of
+from wm_drake.simulation.cases import Case
+from wm_drake.studies.fitting.fit import Fit, Verdict, verdict_of
+from wm_drake.studies.fitting.methods import least_squares
+from wm_drake.studies.fitting.problem import FitProblem, Measurement, Progress, Unknown
+from wm_drake.studies.spin_cycle.measured import DIMS
+from wm_drake.studies.spin_cycle.study import average_errors, labels_of, runs_of
+
+SPAN = 1.5
+"""Default bounds of an unknown: the number of the machine divided and multiplied by this."""
+
+PLANTED = (0.8, 1.25)
+"""Range of the ratio of true number to machine's number in a virtual experiment."""
+
+KNOWN = 0.02
+"""Largest relative half-width of the 95 % confidence interval of an identified unknown."""
+
+JOIN = "+"
+"""Separator between keys whose numbers are equal and form one unknown."""
+
+TABLE_8 = (
+    ("bushing_types.connecting.friction_torque_y",),
+    ("bushing_types.connecting.full_friction_rate_y",),
+    ("gasket.rotational_stiffness_x", "gasket.rotational_stiffness_z"),
+    ("gasket.rotational_stiffness_y",),
+    ("gasket.friction_torque_x", "gasket.friction_torque_y", "gasket.friction_torque_z"),
+    ("gasket.full_friction_rate_x", "gasket.full_friction_rate_y", "gasket.full_friction_rate_z"),
+)
+"""Keys of the numbers that [A] could identify from the whole machine only.
+
+They are the friction about the axis of its bushings and all rotational numbers of the gasket.
+"""
+
+Regions: TypeAlias = Callable[[Iterable[Case]], xr.Dataset]
+"""Function that runs cases and returns their table with "regions", as `simulate_many` does."""
+
+
+@dataclass(frozen=True)
+class Sought:
+    """An unknown: a variation with bounds.
+
+    Attributes:
+        variation: Numbers of the machine that are equal to the unknown.
+    """
+
+    variation: Variation
+    unknown: Unknown
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Key paths of the numbers."""
+        return self.variation.keys
+
+    @property
+    def guess(self) -> float:
+        """Start of the search; without one, the geometric mean of the bounds. [SI]"""
+        return float(self.unknown.start or np.sqrt(self.unknown.lower * self.unknown.upper))
+
+
+@dataclass(frozen=True)
+class SpinIdentification:
+    """Result of an identification.
+
+    Attributes:
+        parameters: The machine before the identification.
+        profile: Spin profile with regions.
+        measured: (case, region, accelerometer, axis) measured RMS displacements. [m]
+        before, after: RMS displacements of the machine before the identification and with the
+            identified numbers. [m]
+        planted: True numbers of a virtual experiment, in SI units; None for a real experiment.
+    """
+
+    parameters: MachineParameters
+    profile: SpinProfile
+    cases: tuple[UnbalanceCase, ...]
+    sought: tuple[Sought, ...]
+    fit: Fit
+    measured: xr.DataArray
+    before: xr.DataArray
+    after: xr.DataArray
+    planted: FloatArray | None = None
+
+    @property
+    def uncertainty(self) -> FloatArray:
+        """Relative half-width of the 95 % confidence interval of each unknown.
+
+        It is infinite if the data do not determine the unknown.
+        """
+        halves = [
+            0.5 * (e.upper - e.lower) / abs(e.value) if e.value else np.nan
+            for e in self.fit.estimates
+        ]
+        return np.where(np.isfinite(halves), halves, np.inf)
+
+    @property
+    def identifiable(self) -> tuple[bool, ...]:
+        """Whether the relative half-width of each unknown is at most `KNOWN`."""
+        return tuple(bool(half <= KNOWN) for half in self.uncertainty)
+
+    @property
+    def error_after(self) -> float:
+        """Average relative error of an RMS displacement with the identified numbers."""
+        return float(average_errors(self.after, self.measured).mean())
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether the machine with the identified numbers fits the measured displacements."""
+        return verdict_of(self.error_after)
+
+    @property
+    def recovered(self) -> FloatArray | None:
+        """Relative error of each unknown in a virtual experiment; None for a real experiment."""
+        return None if self.planted is None else self.fit.values / self.planted - 1.0
+
+
+def unknowns_of(parameters: MachineParameters, texts: Sequence[str]) -> tuple[Sought, ...]:
+    """Return the unknowns of KEYS[=RANGE] texts, or those of [A] Table 8 if there are none.
+
+    Raises:
+        InputError: a key or a range is wrong, or the machine does not have the numbers of Table 8.
+    """
+    if not texts:
+        if not parameters.bushing_types or parameters.gasket is None:
+            raise input_error(
+                f"machine '{parameters.name}' does not have the numbers of [A] Table 8; give keys "
+                "of this machine",
+                where="--unknown",
+            )
+        return tuple(sought_of(parameters, keys) for keys in TABLE_8)
+    unknowns = []
+    for text in texts:
+        names, _, bounds = (part.strip() for part in text.partition("="))
+        keys = [key.strip() for key in names.split(JOIN)]
+        with problems_at("--unknown"):
+            unknowns.append(sought_of(parameters, keys, bounds))
+    return tuple(unknowns)
+
+
+def sought_of(parameters: MachineParameters, keys: Sequence[str], bounds: str = "") -> Sought:
+    """Return an unknown of a machine; the search uses its logarithm if the bounds are positive.
+
+    Args:
+        parameters: The machine; its number is the start value.
+        keys: Key paths of numbers that are equal.
+        bounds: Bounds of the search, ``LOW..HIGH`` or ``(LOW, HIGH) UNIT``. If empty, they are the
+            machine's number divided and multiplied by `SPAN`.
+
+    Raises:
+        InputError: a key is unknown or not a number, the numbers have different units, or bounds
+            are wrong, or are needed because the number is not positive.
+    """
+    numbers = tuple(number_at(parameters, key) for key in keys)
+    for number in numbers:
+        if number.is_table:
+            raise input_error("is a table; an unknown is a number", key=number.key)
+    first = numbers[0]
+    if any(number.unit != first.unit for number in numbers):
+        raise input_error(
+            f"{', '.join(keys)} have different units; equal numbers need the same unit",
+            key=first.key,
+        )
+    value = first.nominal
+    if bounds:
+        ends = range_of(bounds)
+        if ends is None:
+            example = f"(1, 2) {first.unit.shown}"
+            message = f"'{bounds}' is not a range; write for example '{example}'"
+            raise input_error(message, key=first.key)
+        lower, upper = map(first.resolved, ends)
+    elif value is None or value <= 0.0:
+        message = "is not positive, so its range must be given; write KEY=LOW..HIGH"
+        raise input_error(message, key=first.key)
+    else:
+        lower, upper = value / SPAN, value * SPAN
+    for number in numbers:  # the search may go to either end
+        allowed = allowed_range(parameters, number.key)
+        if not (allowed.holds(lower) and allowed.holds(upper)):
+            limits = " and ".join(f"{sign} {end:g}" for sign, end in allowed.limits())
+            raise input_error(f"'{bounds}' is out of range; allowed is {limits}", key=number.key)
+    start = value if value is not None and lower <= value <= upper else None
+    name = JOIN.join(keys)
+    return Sought(
+        Variation(name, numbers, Change.VALUE, first.unit),
+        Unknown(name, lower, upper, first.unit, start, logarithmic=lower > 0.0),
+    )
+
+
+def at_point(
+    parameters: MachineParameters, sought: Sequence[Sought], values: FloatArray
+) -> MachineParameters:
+    """Return the machine with values of the unknowns, in SI units."""
+    return apply(parameters, [s.variation for s in sought], map(float, values))
+
+
+def planted_values(sought: Sequence[Sought], seed: int) -> FloatArray:
+    """Draw true numbers of a virtual experiment; all differ from the machine's. In SI units."""
+    low, high = np.log(PLANTED)
+    drawn = np.random.default_rng(seed).uniform(0.3, 1.0, len(sought)) * np.where(
+        np.arange(len(sought)) % 2, low, high
+    )
+    guesses = np.array([s.guess for s in sought])
+    lower, upper = np.array([(s.unknown.lower, s.unknown.upper) for s in sought]).T
+    return np.clip(guesses * np.exp(drawn), 1.02 * lower, 0.98 * upper)
+
+
+def identified_machine(result: SpinIdentification) -> MachineParameters:
+    """Return the machine with the identified numbers and the source of each.
+
+    A number that the data do not determine stays as it is. The machine has a name of its own.
+    """
+    virtual = "virtual experiment: " if result.planted is not None else ""
+    cases = ", ".join(case.name for case in result.cases)
+    values: dict[str, float] = {}
+    sources: dict[str, str] = {}
+    for sought, estimate in zip(result.sought, result.fit.estimates, strict=True):
+        if not estimate.determined:
+            continue
+        text = f"{virtual}identified from spin cycle, cases {cases}"
+        if estimate.at_bound:
+            text += f"; at the {estimate.at_bound} bound of the search"
+        elif np.isfinite(estimate.lower):
+            unit = sought.unknown.unit
+            lower, upper = (unit.from_si(value) for value in (estimate.lower, estimate.upper))
+            text += f"; 95 % interval {lower:.4g} to {upper:.4g} {unit.shown}"
+        values |= dict.fromkeys(sought.keys, estimate.value)
+        sources |= dict.fromkeys(sought.keys, text)
+    changed = with_values(result.parameters, values)
+    return changed.model_copy(
+        update={
+            "name": f"{result.parameters.name}_identified",
+            "sources": {**changed.sources, **sources},
+        }
+    )
+
+
+@dataclass(frozen=True)
+class SpinModel:
+    """RMS displacements of unbalance cases as a function of the unknowns."""
+
+    parameters: MachineParameters
+    profile: SpinProfile
+    cases: tuple[UnbalanceCase, ...]
+    sought: tuple[Sought, ...]
+    regions: Regions
+
+    def displacements(self, points: FloatArray) -> FloatArray:
+        """Compute the RMS displacements at points.
+
+        Args:
+            points: (k, unknowns) in SI units.
+
+        Returns:
+            (k, case, region, accelerometer, axis); NaN where a run diverged. [m]
+        """
+        labels = labels_of(self.parameters, self.cases, self.profile)
+        table = self.regions(self._runs(points))
+        return table.region_displacement.values.reshape(
+            len(points), *(len(labels[dim]) for dim in DIMS)
+        )
+
+    def _runs(self, points: FloatArray) -> Iterator[Case]:
+        for point in points:
+            parameters = at_point(self.parameters, self.sought, point)
+            for run in runs_of(parameters, self.cases, self.profile):
+                yield replace(run, parameters=parameters)
+
+
+def virtual_experiment(
+    model: SpinModel, planted: FloatArray, noise: float, seed: int
+) -> xr.DataArray:
+    """Simulate an experiment: RMS displacements with the true numbers and random errors.
+
+    Args:
+        planted: True numbers of the unknowns, in SI units.
+        noise: Relative standard deviation of the error of each value.
+
+    Returns:
+        (case, region, accelerometer, axis). [m]
+    """
+    exact = model.displacements(planted[None])[0]
+    errors = np.random.default_rng(seed).standard_normal(exact.shape)
+    return xr.DataArray(
+        exact * (1.0 + noise * errors),
+        labels_of(model.parameters, model.cases, model.profile),
+        DIMS,
+    )
+
+
+def identify_from_spin(
+    model: SpinModel,
+    measured: xr.DataArray,
+    *,
+    planted: FloatArray | None = None,
+    seed: int = 0,
+    progress: Progress = lambda fraction, least: None,
+) -> SpinIdentification:
+    """Identify the unknowns from measured RMS displacements.
+
+    The fit minimizes the root mean square of the relative errors [A] Eq. (9) of all regions and
+    cases.
+
+    Args:
+        measured: (case, region, accelerometer, axis) RMS displacements; NaN where nothing was
+            measured. [m]
+        planted: True numbers of a virtual experiment, in SI units.
+        progress: Called with the fraction done and the lowest error so far.
+
+    Raises:
+        InputError: nothing was measured in the cases of the study.
+    """
+    problem = _problem(model, measured)
+    fit = least_squares(problem, seed=seed, starts=1, screened=8, progress=progress)
+    start = np.array([s.guess for s in model.sought])
+    before, after = (
+        measured.copy(data=values) for values in model.displacements(np.stack([start, fit.values]))
+    )
+    return SpinIdentification(
+        model.parameters,
+        model.profile,
+        model.cases,
+        model.sought,
+        fit,
+        measured,
+        before,
+        after,
+        planted,
+    )
+
+
+def _problem(model: SpinModel, measured: xr.DataArray) -> FitProblem:
+    """Return the fit problem, whose residuals are those of [A] Eq. (9).
+
+    Each value is divided by the norm of the measured values in its case and region.
+    """
+    is_measured = np.isfinite(measured.values)
+    data = np.where(is_measured, measured.values, 0.0)
+    norms = np.sqrt(np.sum(data**2, axis=(2, 3), keepdims=True))
+    is_measured &= norms > 0.0
+    weights = is_measured / np.where(norms > 0.0, norms, 1.0)
+    with_data = [k for k in range(len(model.cases)) if is_measured[k].any()]
+    if not with_data:
+        raise input_error(
+            "nothing was measured in the cases of this study; at least one needs values above 0"
+        )
+
+    def scaled(values: FloatArray) -> list[FloatArray]:
+        return [(values[..., k, :, :, :] * weights[k])[..., is_measured[k]] for k in with_data]
+
+    tests = tuple(
+        Measurement(f"case {model.cases[k].name}", numbers)
+        for k, numbers in zip(with_data, scaled(data), strict=True)
+    )
+    unknowns = tuple(s.unknown for s in model.sought)
+    return FitProblem(
+        unknowns, tests, lambda points: np.concatenate(scaled(model.displacements(points)), axis=1)
+    )

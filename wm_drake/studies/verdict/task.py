@@ -1,0 +1,117 @@
+"""Check the options of the verdict, and run it."""
+
+from typing import Any
+
+import numpy as np
+
+from wm_drake.errors import input_error, problems_at
+from wm_drake.model.bodies import with_sdf_values
+from wm_drake.model.build import build_machine
+from wm_drake.model.machine import Machine
+from wm_drake.model.sdf_names import sdf_names
+from wm_drake.parameters import with_values
+from wm_drake.simulation.measures import MEASURES
+from wm_drake.simulation.measures.responses import GAP, has_gap, known_responses, measures_of
+from wm_drake.studies.executor import Executor
+from wm_drake.studies.inputs import profile_of, selected_cases
+from wm_drake.studies.study import Result, Task
+from wm_drake.studies.tolerance.options import ToleranceOptions
+from wm_drake.studies.tolerance.study import CONTACTS
+from wm_drake.studies.tolerance.task import ToleranceTask
+from wm_drake.studies.verdict.options import VerdictOptions
+from wm_drake.studies.verdict.page import VerdictResult
+from wm_drake.studies.verdict.study import COUNTERWEIGHT, MM, Laundry, Trials, changeable
+
+NO_SHAPES = "the SDF has no shapes on both tub and housing, so no verdict can be given"
+
+SHOWN_GROUPS = ("amplitude", "F", "mount_force_peak")
+"""Responses that tell what a change costs: displacement, force of the gasket, forces of mounts."""
+
+
+class VerdictTask(Task):
+    """The verdict with checked options."""
+
+    def __init__(self, options: VerdictOptions, machine: Machine) -> None:
+        """Check the options and the laundry."""
+        if not has_gap(machine.parameters):
+            raise input_error(NO_SHAPES)
+        self.options, self.clearance = options, _length(options.clearance)
+        weights = [name for name in sdf_names(machine.plant).links if COUNTERWEIGHT in name]
+        keys = [f"bodies.{name}.mass" for name in weights]
+        full = with_sdf_values(machine.plant, machine.parameters, keys)
+        self.machine = build_machine(full)
+        self.laundry = self._laundry(self.machine)
+        self.cases = selected_cases(full, None, True, options.profile)
+        known = known_responses(full, profile_of(full, options.profile))
+        self.responses = tuple(r for r in known if r.group in SHOWN_GROUPS or r.name == GAP)
+        measures = {*measures_of(full, self.responses), CONTACTS}
+        self.measures = tuple(name for name in MEASURES if name in measures)
+
+    @property
+    def _command(self) -> str:
+        """Return the command of this verdict, without sizes."""
+        options = self.options
+        words = ["wm-drake verdict", options.machine, *(f'--set "{text}"' for text in options.sets)]
+        words += [f"--clearance '{options.clearance}'"] if self.clearance else []
+        words += [f"--profile {options.profile}"] if options.profile else []
+        return " ".join(words)
+
+    def _laundry(self, machine: Machine) -> ToleranceTask:
+        """Return the tolerance study of a machine, without what a verdict does not show."""
+        o = self.options
+        with_gap = ToleranceOptions(
+            file=o.laundry, samples=o.samples, sensitivity=0, subset=0, response=(GAP,),
+            profile=o.profile, seed=o.seed,
+        )  # fmt: skip
+        return ToleranceTask(with_gap, machine)
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """Return what determines the runs."""
+        return {**self.laundry.identity, "change": f"{self.options.change:g} %"}
+
+    def run(self, executor: Executor) -> Result:
+        """Run the loads, the changes, and the laundry before and after the best change."""
+        parameters = self.machine.parameters
+        trials = Trials(self.machine, self.cases, self.measures, executor)
+        (base,) = trials.outcomes([{}], "loads")
+        laundry = self._samples(self.laundry, executor)
+        influences = trials.influences(changeable(parameters), self.options.change)
+        steps = trials.combined(base, influences)
+        changed = None
+        if steps:
+            better = build_machine(with_values(parameters, steps[-1].changes))
+            changed = self._samples(self._laundry(better), executor)
+        return VerdictResult(
+            parameters,
+            tuple(case.name for case in self.cases),
+            self.clearance,
+            self.options.change,
+            base,
+            tuple(influences),
+            steps[0] if steps else None,
+            steps[-1] if len(steps) > 1 else None,
+            laundry,
+            changed,
+            self.laundry.tolerances.about,
+            self.responses,
+            self._command,
+            executor.runs,
+        )
+
+    def _samples(self, task: ToleranceTask, executor: Executor) -> Laundry:
+        """Return the gaps of the samples of a tolerance study."""
+        (gaps,) = (column for _, column in task.sampled(executor).values.items())
+        return Laundry(np.nan_to_num(1e-3 * gaps.to_numpy(), nan=-np.inf), self.clearance)
+
+
+def _length(text: str) -> float:
+    """Return a clearance. [m]"""
+    with problems_at("--clearance", ""):
+        try:
+            clearance = MM.number(text)
+        except ValueError as error:
+            raise input_error(str(error)) from None
+        if not 0.0 <= clearance < 1.0:
+            raise input_error(f"'{text}' is not allowed; allowed are 0 mm to below 1 m")
+    return clearance
