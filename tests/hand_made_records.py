@@ -115,4 +115,4 @@ def case_result(
 
 
 def spin_result(parameters: MachineParameters, results: Sequence[CaseResult]) -> SpinRuns:
-    return SpinRuns(parameters, "drake", 2.5e-3, tuple(results))
+    return SpinRuns(parameters, "drake", tuple(results))

@@ -1,11 +1,17 @@
-"""What section 4 of [B] says of its gasket study in words, checked on a screening."""
+"""What [B] says in words of amplitudes and of its gasket study, checked on ours."""
 
 from collections.abc import Callable, Mapping
+from typing import TypeAlias
+
+import numpy as np
 
 from wm_drake.studies.doe.anova import Term
-from wm_drake.studies.gasket.screening import LEADING_MAIN_PERCENT, Label, Screening
+from wm_drake.studies.gasket.screening import LEADING_MAIN_PERCENT, Label, Published, Screening
 
 HOLDS, FAILS = "holds", "**does not hold**"
+
+Amplitudes: TypeAlias = Mapping[tuple[str, bool], Mapping[str, float]]
+"""Amplitude of each sensor, by load and whether the gasket is in. [mm]"""
 
 
 def _mains(screening: Screening, label: Label) -> dict[str, Term]:
@@ -99,4 +105,136 @@ def claims(screenings: Mapping[str, Screening]) -> list[tuple[str, list[str]]]:
     return [
         (words, [HOLDS if holds(screening) else FAILS for screening in screenings.values()])
         for words, holds in CLAIMS.items()
+    ]
+
+
+def change(amplitudes: Amplitudes, load: str, sensor: str) -> float:
+    """Return the change of an amplitude by the gasket, [B] Eq. (1). [%]"""
+    without, with_gasket = (amplitudes[load, gasket][sensor] for gasket in (False, True))
+    return 100.0 * (with_gasket / without - 1.0)
+
+
+def _verdict(is_so: bool, text: str) -> str:
+    return f"{HOLDS if is_so else FAILS}: {text}"
+
+
+def _signs(changes: Mapping[str, float], expected: int) -> str:
+    """Return whether all changes have a sign, and those of the other one, or all."""
+    wrong = {name: value for name, value in changes.items() if value * expected <= 0.0}
+    shown = wrong or changes
+    return _verdict(not wrong, ", ".join(f"{name} {value:+.0f} %" for name, value in shown.items()))
+
+
+def _increases(amplitudes: Amplitudes) -> str:
+    """Return the largest increase by the gasket along each axis, over both loads and ends."""
+    largest = (
+        max(change(amplitudes, load, f"{axis}{end}") for load in LOADS for end in "rf")
+        for axis in "XYZ"
+    )
+    return ", ".join(f"{axis} {value:+.0f} %" for axis, value in zip("xyz", largest, strict=True))
+
+
+def _plane(amplitudes: Amplitudes, load: str, end: str) -> str:
+    """Return the plane of the two largest amplitudes at the rear or at the front of the tub."""
+    smallest = min("XYZ", key=lambda axis: amplitudes[load, True][f"{axis}{end}"])
+    return "XYZ".replace(smallest, "").lower()
+
+
+def _planes(amplitudes: Amplitudes) -> str:
+    found = [_plane(amplitudes, load, end) for load in ("back", "front") for end in "rf"]
+    return _verdict(found == ["xz", "xz", "xy", "xz"], ", ".join(found))
+
+
+def _changes_have_sign(load: str, sensors: str, expected: int) -> Callable[[Amplitudes], str]:
+    return lambda of: _signs({name: change(of, load, name) for name in sensors.split()}, expected)
+
+
+MEASURED_CLAIMS: dict[str, tuple[str, Callable[[Amplitudes], str]]] = {
+    "2.2: middle load: the gasket increases all amplitudes but X_f": (
+        "increase",
+        _changes_have_sign("middle", "Xr Yr Zr Yf Zf", 1),
+    ),
+    "2.2: middle load: it reduces X_f": ("-1.0 %", _changes_have_sign("middle", "Xf", -1)),
+    "2.2: counter load: it reduces X_r and Y_f": (
+        "Xr -23.7 %, Yf -16.3 %",
+        _changes_have_sign("counter", "Xr Yf", -1),
+    ),
+    "2.2: largest increases along x, y and z": ("80, 605, 25 %", _increases),
+    "3.2: plane of the largest amplitudes: back load rear, front; front load rear, front": (
+        "xz, xz, xy, xz",
+        _planes,
+    ),
+}
+"""Statements of sections 2.2 and 3.2: what is printed, and what amplitudes give."""
+
+
+def measured_claims(computed: Mapping[str, Amplitudes]) -> list[list[str]]:
+    """Return each statement on amplitudes, what is printed, and what each machine gives."""
+    return [
+        [words, printed, *(found(amplitudes) for amplitudes in computed.values())]
+        for words, (printed, found) in MEASURED_CLAIMS.items()
+    ]
+
+
+def _least_main(screening: Screening) -> str:
+    """Return the smallest share of the main effects, Dx of the middle load apart."""
+    shares = {
+        label: table.main_percent
+        for label, table in screening.tables.items()
+        if label != ("middle", "Dx")
+    }
+    least = min(shares, key=lambda label: shares[label])
+    good = sum(share >= 92.5 for share in shares.values())
+    return f"{shares[least]:.1f} % ({', '.join(least)}); {good} of {len(shares)} reach 92.5 %"
+
+
+def _elsewhere(screening: Screening, names: str, own: str = "") -> str:
+    """Return the largest contribution of factors to responses other than one."""
+    percents = {
+        (*label, name): _mains(screening, label)[name].percent
+        for label in screening.tables
+        for name in names.split()
+        if label[1] != own
+    }
+    worst = max(percents, key=lambda key: percents[key])
+    return f"{percents[worst]:.0f} % ({', '.join(worst)})"
+
+
+def _damping_ratios(screening: Screening, published: Published) -> str:
+    """Return smallest and largest ratio of effects of damping on displacements to printed ones."""
+    ratios = [
+        term.effects[(-1,)] / published.effects(label, term)[(-1,)]
+        for label, term in published.compared_terms(screening)
+        if label[1].startswith("D") and term.name in ("C_L", "C_T")
+    ]
+    return f"{np.min(ratios):.1f} to {np.max(ratios):.1f} times"
+
+
+def numbers(screenings: Mapping[str, Screening], published: Published) -> list[list[str]]:
+    """Return the numbers behind statements of section 4: printed, and of each machine."""
+    rows: dict[str, tuple[str, Callable[[Screening], str]]] = {
+        "smallest share of the main effects, D_x of the middle load apart": (
+            "92.50 % (middle, Dz); 17 of 17 reach 92.5 %",
+            _least_main,
+        ),
+        "largest contribution of K_Ty to another response than M_y": (
+            "below 10 %",
+            lambda s: _elsewhere(s, "K_Ty", "My"),
+        ),
+        "contribution of K_Ty to D_z, middle load": (
+            "below 10 %",
+            lambda s: f"{_mains(s, ('middle', 'Dz'))['K_Ty'].percent:.0f} %",
+        ),
+        "largest contribution of K_Tx or K_Tz": (
+            "below 10 %",
+            lambda s: _elsewhere(s, "K_Tx K_Tz"),
+        ),
+        "effects of C_L and C_T on displacements at level -1, by the printed ones": (
+            "1",
+            lambda s: _damping_ratios(s, published),
+        ),
+    }
+    return [
+        [words, printed, *(found(screening) for screening in screenings.values())]
+        for words, (printed, found) in rows.items()
     ]

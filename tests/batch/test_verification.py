@@ -1,5 +1,7 @@
 """A sample of runs is run again with half the step: what is not converged is said."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -27,9 +29,10 @@ def test_springs_that_no_step_at_rest_reveals_are_found(earlier):
 def test_error_has_the_size_of_the_difference(machine):
     # second route: two plain runs of one integrator
     case = wm.case_of(machine.parameters, "middle")
+    sampled = wm.with_value(machine.parameters, "output_period", 2.5e-3)
     given, half = (
-        wm.measure(wm.simulate(machine, case, step=step)).amplitude.values
-        for step in (2.5e-3, 1.25e-3)
+        wm.measure(wm.simulate(machine, finer, step=step)).amplitude.values
+        for finer, step in ((case, 2.5e-3), (replace(case, parameters=sampled), 1.25e-3))
     )
     expected = np.max(np.abs(given - half)) / np.max(given)
     assert wm.step_error(machine, [case]).difference == pytest.approx(expected, rel=1e-6)
@@ -47,6 +50,6 @@ def test_sample_is_spread_over_all_runs(machine):
 
 
 def test_run_that_diverges_with_one_step_only_is_large():
-    error = StepError(float("inf"), "middle", 1e-3, 1)
+    error = StepError(float("inf"), "middle", 1e-3, 5e-3, 1)
     assert error.is_large
     assert "one of the two runs of 'middle' diverges" in error.text

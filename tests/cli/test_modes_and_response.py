@@ -17,6 +17,9 @@ def test_study_modes_prints_the_documented_json(wm_drake, tmp_path):
         assert len({mode["name"] for mode in modes}) == 6
     campbell = found["campbell"]
     assert np.shape(campbell["frequency_Hz"]) == (6, len(campbell["rpm"]))
+    assert np.shape(campbell["name"]) == np.shape(campbell["frequency_Hz"])
+    at_rest = [mode["name"] for mode in found["modes"]["sliding"]]
+    assert [names[0] for names in campbell["name"]] == at_rest
     # at a critical speed, order 1 is the frequency of a mode
     for rpm in found["critical_rpm"]:
         columns = np.array(campbell["frequency_Hz"])

@@ -331,7 +331,7 @@ class LaneRun(Run):
         """Hold a work item, its schedule, the function that returns the shapes, lane and path."""
         self.item, self.schedule, self._find_scene, self.lane = item, schedule, scene, lane
         self.path = path
-        self.profile, self.period = item.case.profile, item.numbers.setup.parameters.output_period
+        self.profile, self.period = item.case.profile, item.numbers.period
         self.good = int(lane.extremes[-1])
         self._sensors = lane.moved.shape[1] - 3  # the last three points are the detergent point's
 

@@ -1,13 +1,14 @@
-"""Verify the step of runs: a sample of them is run again with half the step.
+"""Verify the step of runs: a sample of them is run again with half the step and twice the samples.
 
 The eigenvalues of a machine tell whether a step is stable, not whether it is accurate: a foot that
 strikes the floor, a spring that goes slack or a motion that is chaotic shows in no linear machine.
-A run that is converged changes little with half the step.
+Nor do they tell how far the peaks lie beside the samples that the measures are computed from. A run
+that is converged changes little with half the step and half the time between samples.
 """
 
 import hashlib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -31,18 +32,19 @@ MOST_RUNS = WIDTH
 
 @dataclass(frozen=True)
 class StepError:
-    """Largest difference of amplitudes between runs and the same runs with half the step.
+    """Largest difference of amplitudes between runs and the same runs, twice as fine.
 
     Attributes:
         difference: By the largest amplitude of the run; infinite if one of the two diverged.
         case: Name of the case of this difference.
-        step: Its step size, before it was halved. [s]
+        step, period: Its step size and its time between samples, before they were halved. [s]
         runs: Number of runs that were run again.
     """
 
     difference: float
     case: str
     step: float
+    period: float
     runs: int
 
     @property
@@ -57,14 +59,18 @@ class StepError:
             differ = f"one of the two runs of '{self.case}' diverges"
         else:
             differ = f"amplitudes of '{self.case}' differ by {100.0 * self.difference:.2g} %"
-        return f"with half the step of {1e3 * self.step:g} ms, {differ}"
+        return (
+            f"with half the step of {1e3 * self.step:g} ms and half the {1e3 * self.period:g} ms "
+            f"between samples, {differ}"
+        )
 
     @property
     def warning(self) -> str:
         """Return the warning of results that are not converged."""
         return (
-            f"{self.text}: the results are not converged. Use a shorter step (--set step=...); if "
-            "the difference stays, the motion is chaotic and its amplitudes have no one value"
+            f"{self.text}: the results are not converged. Use a shorter step (--set step=...) or "
+            "more samples (--set output_period=...); if the difference stays, the motion is "
+            "chaotic and its amplitudes have no one value"
         )
 
 
@@ -96,7 +102,7 @@ class Sample:
             for machine, case in self.cases
             for key in run_keys(machine.parameters, [case], measures=("amplitudes",))
         )
-        return hashlib.sha256(f"half step {' '.join(keys)}".encode()).hexdigest()
+        return hashlib.sha256(f"half step and period {' '.join(keys)}".encode()).hexdigest()
 
     def step_error(self, step: float | None = None) -> StepError | None:
         """Return the error of the steps of the sample; None without runs.
@@ -112,7 +118,7 @@ class Sample:
         if not errors:
             return None
         worst = max(errors, key=lambda error: error.difference)
-        return StepError(worst.difference, worst.case, worst.step, len(self.cases))
+        return replace(worst, runs=len(self.cases))
 
 
 def remembered_step_error(sample: Sample, ledger: Ledger) -> StepError | None:
@@ -120,17 +126,19 @@ def remembered_step_error(sample: Sample, ledger: Ledger) -> StepError | None:
     key = sample.key()
     if key in ledger:
         known = ledger.get(key)
-        difference, step, runs = known.values["step_error"].tolist()
-        return StepError(difference, known.note, step, int(runs))
+        difference, step, period, runs = known.values["step_error"].tolist()
+        return StepError(difference, known.note, step, period, int(runs))
     error = sample.step_error()
     if error is not None:
-        numbers = np.array([error.difference, error.step, error.runs])
+        numbers = np.array([error.difference, error.step, error.period, error.runs])
         ledger.put_all({key: Result({"step_error": numbers}, error.case)})
     return error
 
 
 def step_error(machine: Machine, cases: Sequence[Case], step: float | None = None) -> StepError:
-    """Run cases twice, with a step and with half of it, and compare their amplitudes.
+    """Run cases twice, the second time twice as fine, and compare their amplitudes.
+
+    The second runs have half the step and half the time between samples.
 
     Args:
         machine: A built machine.
@@ -153,26 +161,38 @@ def step_error(machine: Machine, cases: Sequence[Case], step: float | None = Non
     errors = list[StepError]()
     for key, items in Preparation(machine, step, integrator).batches(cases):
         given = runner.run(key, items)
-        halved = dict(_with_half_step(machine, runner, key, items))
+        halved = dict(_twice_as_fine(machine, runner, key, items))
         for index, run in enumerate(given):
             before, after = run.values["amplitude"], halved[index]
             difference = _difference(before, after)
-            errors.append(StepError(difference, run.case.name, key.stepping.step, len(cases)))
+            sizes = key.stepping.step, key.period
+            errors.append(StepError(difference, run.case.name, *sizes, len(cases)))
     return max(errors, key=lambda error: error.difference)
 
 
-def _with_half_step(
+def _twice_as_fine(
     machine: Machine, runner: Runner, key: BatchKey, items: Sequence[WorkItem]
 ) -> Iterator[tuple[int, FloatArray]]:
-    """Yield number and amplitudes of each work item, run with half the step of its batch."""
-    half, cases = 0.5 * key.stepping.step, [item.case for item in items]
+    """Yield number and amplitudes of each work item, run with half the step and half the period."""
+    step, cases = 0.5 * key.stepping.step, _with_period(machine, 0.5 * key.period, items)
     try:
-        batches = list(Preparation(machine, half, key.stepping.integrator).batches(cases))
+        batches = list(Preparation(machine, step, key.stepping.integrator).batches(cases))
     except InputError:  # this integrator does not suit so short a step
-        batches = list(Preparation(machine, half, "runge_kutta").batches(cases))
+        batches = list(Preparation(machine, step, "runge_kutta").batches(cases))
     for halved, work_items in batches:
         for run in runner.run(halved, work_items):
             yield run.number, run.values["amplitude"]
+
+
+def _with_period(machine: Machine, period: float, items: Sequence[WorkItem]) -> list[Case]:
+    """Return the cases of work items with another time between samples."""
+    given = [item.case.parameters or machine.parameters for item in items]
+    # cases with the same parameters share what is packed of them
+    finer = {id(one): one.model_copy(update={"output_period": period}) for one in given}
+    return [
+        replace(item.case, parameters=finer[id(one)])
+        for item, one in zip(items, given, strict=True)
+    ]
 
 
 def _difference(before: FloatArray, after: FloatArray) -> float:

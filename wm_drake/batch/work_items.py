@@ -32,6 +32,7 @@ class PackedParameters:
         points: Measured points, from `outputs.measured_points`, one after the other.
         rest: State of rest.
         stepping: How to integrate runs with these numbers.
+        period: Time between samples. [s]
     """
 
     setup: Setup
@@ -40,6 +41,7 @@ class PackedParameters:
     points: FloatArray
     rest: FloatArray
     stepping: Stepping
+    period: float
 
 
 @dataclass(frozen=True)
@@ -126,8 +128,8 @@ class Preparation:
         waiting: dict[BatchKey, list[WorkItem]] = {}
         for number, case in enumerate(cases):
             item = self._work_item(number, case)
-            period = item.numbers.setup.parameters.output_period
-            key = BatchKey(case.profile, item.numbers.layout, item.numbers.stepping, period)
+            numbers = item.numbers
+            key = BatchKey(case.profile, numbers.layout, numbers.stepping, numbers.period)
             work_items = waiting.setdefault(key, [])
             work_items.append(item)
             if len(work_items) == WIDTH:
@@ -169,7 +171,8 @@ class Preparation:
         if key not in self._known_numbers:
             if len(self._known_numbers) >= KEPT_NUMBERS:
                 del self._known_numbers[next(iter(self._known_numbers))]
-            period = (case.parameters or self.machine.parameters).output_period
+            longest = (case.parameters or self.machine.parameters).output_period
+            period = case.profile.sample_period(longest)
             if (case.profile, period) not in self._have_place:  # reads files of the system
                 check_size(case.profile, self.step, period, self.at_once)
                 self._have_place.add((case.profile, period))
@@ -186,7 +189,7 @@ class Preparation:
             )
             points, rest = setup.measured_points.ravel(), initial_state(setup, case.profile)
             self._known_numbers[key] = PackedParameters(
-                setup, elements, layout, points, rest, stepping
+                setup, elements, layout, points, rest, stepping, period
             )
         return self._known_numbers[key]
 

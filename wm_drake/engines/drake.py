@@ -86,7 +86,7 @@ def run_drake(
     """
     setup.machine.set_profile(setup.context, profile, setup.elements)
     simulator = _simulator(setup, step, scheme, accuracy)
-    period = setup.parameters.output_period
+    period = profile.sample_period(setup.parameters.output_period)
     check_size(profile, step, period)
     samples = _Samples(setup, output_times(profile, period))
     failure = ""

@@ -211,8 +211,9 @@ class MachineParameters(Frozen):
             folder of the machine file.
         gravity: Acceleration of free fall.
         step: Largest step of the integrator.
-        output_period: Time between samples of a record, an integer multiple of the step. Measures
-            of runs are computed from the samples.
+        output_period: Longest time between samples of a record, an integer multiple of the step.
+            Measures of runs are computed from the samples. A fast profile halves it until a turn
+            of the drum has 30 samples.
         integrator: `multistep` and `midpoint` (telescopic dampers) take one derivative a step,
             `runge_kutta` four; `auto` takes one of the first two where it suits the machine.
         drive: Prescribed speed of the drum, or a motor.
@@ -355,7 +356,7 @@ class MachineParameters(Frozen):
         counts = {kind.replace("_", " "): len(getattr(self, kind)) for kind in kinds}
         parts = [f"{count} {kind}" for kind, count in counts.items() if count]
         parts += [f"{'a' if self.gasket else 'no'} gasket", f"loads {', '.join(self.loads)}"]
-        rpm = max(map(abs, self.profile.speed)) * 30.0 / math.pi
+        rpm = self.profile.highest_speed * 30.0 / math.pi
         speed = f"up to {rpm:.4g} rpm in {self.profile.duration:.4g} s"
         return f"<{type(self).__name__} '{self.name}': {', '.join(parts)}; {speed}>"
 

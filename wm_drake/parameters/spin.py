@@ -180,6 +180,12 @@ class Region(Frozen):
     end: u.Duration
 
 
+SAMPLES_OF_TURN = 30
+"""Smallest number of samples of a run in a turn of the drum at its highest speed.
+
+A peak of order one then exceeds the nearest sample by up to 1 - cos(pi / 30) = 0.55 % of it."""
+
+
 class SpinProfile(Frozen):
     """Drum speed over time, linear between the points.
 
@@ -296,6 +302,25 @@ class SpinProfile(Frozen):
     def duration(self) -> float:
         """End time of the profile. [s]"""
         return self.time[-1]
+
+    @property
+    def highest_speed(self) -> float:
+        """Largest speed of the drum, in either direction. [rad/s]"""
+        return max(map(abs, self.speed))
+
+    def sample_period(self, longest: float) -> float:
+        """Return the time between samples of a run. [s]
+
+        A drum that turns once in a few samples is met at the same few angles in every turn, and its
+        peaks lie between them. So the longest time is halved until a turn at the highest speed has
+        `SAMPLES_OF_TURN` samples. Halves keep the step, which divides the longest time.
+
+        Args:
+            longest: Longest time between samples, `output_period` of a machine. [s]
+        """
+        in_turn = SAMPLES_OF_TURN * self.highest_speed * longest / (2.0 * np.pi)
+        halvings = np.ceil(np.log2(max(1.0, in_turn)) - 1e-9)
+        return float(longest / 2.0**halvings)
 
     def acceleration(self) -> list[float]:
         """Return the angular acceleration between each two points. [rad/s^2]"""

@@ -11,6 +11,7 @@ from wm_drake.parameters.units import Unit
 MM_PER_M = Unit("m", "mm").from_si(1.0)
 GM_PER_KGM = Unit("kg*m", "g*m").from_si(1.0)
 MPA_PER_PA = Unit("Pa", "MPa").from_si(1.0)
+MS_PER_S = Unit("s", "ms").from_si(1.0)
 RPM_PER_RAD_S = Unit("rad/s", "rpm").from_si(1.0)
 
 MISSING = "–"
@@ -45,6 +46,11 @@ def percent(value: float) -> str:
         return MISSING
     text = number(value, 0)
     return f"+{text} %" if round(value) > 0 else f"{text} %"
+
+
+def gap_size(distance: float) -> str:
+    """Return a gap with its unit, and that the parts touch where it is not positive. [m]"""
+    return f"{number(MM_PER_M * distance)} mm{' (they touch)' if distance <= 0.0 else ''}"
 
 
 def listed(words: Sequence[str]) -> str:

@@ -62,28 +62,22 @@ def pass_band(profile: SpinProfile, period: float) -> tuple[float, float]:
     """
     low, high = profile.band or (
         LOWER_EDGE,
-        max(LEAST_UPPER_EDGE, ORDERS_PASSED * _highest_frequency(profile)),
+        max(LEAST_UPPER_EDGE, ORDERS_PASSED * profile.highest_speed / (2.0 * np.pi)),
     )
     return low, max(min(high, HIGHEST_PART / period), 1.001 * low)
 
 
-def _highest_frequency(profile: SpinProfile) -> float:
-    """Return the highest frequency of drum revolutions. [Hz]"""
-    return max(map(abs, profile.speed)) / (2.0 * np.pi)
+def band_warnings(profile: SpinProfile) -> list[str]:
+    """Return a warning if the pass band of a profile cuts its highest speed.
 
-
-def band_warnings(profile: SpinProfile, period: float) -> list[str]:
-    """Return a warning if the pass band of displacements cuts the highest speed of a profile."""
-    low, high = pass_band(profile, period)
-    highest = _highest_frequency(profile)
-    if low <= highest <= high or highest == 0.0:
+    A band that `pass_band` chooses reaches beyond it, and so do the samples.
+    """
+    highest = profile.highest_speed / (2.0 * np.pi)
+    if profile.band is None or highest == 0.0 or profile.band[0] <= highest <= profile.band[1]:
         return []
-    remedy = (
-        "remove profile.band or widen it"
-        if profile.band and not low <= highest <= profile.band[1]
-        else "choose a shorter output_period"
-    )
+    low, high = profile.band
     return [
         f"the pass band of displacements, {low:g} to {high:.3g} Hz, cuts the highest drum speed, "
-        f"{60.0 * highest:.4g} rpm or {highest:.3g} Hz, so amplitudes are too small; {remedy}"
+        f"{60.0 * highest:.4g} rpm or {highest:.3g} Hz, so amplitudes are too small; remove "
+        "profile.band or widen it"
     ]

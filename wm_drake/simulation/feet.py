@@ -21,7 +21,7 @@ from wm_drake.simulation.foot_histories import (
     foot_history,
     moving_feet_history,
 )
-from wm_drake.simulation.vibration import region_limits
+from wm_drake.simulation.vibration import region_samples
 
 MARGINS = ("smallest_foot_load", "slide_margin", "turn_margin", "tilt_margin")
 """Names of the smallest values, in the order of the columns of `foot_histories`."""
@@ -121,18 +121,15 @@ def foot_measures(
         By the names of `BY_FOOT`, `MARGINS` and `REGION_VARIABLES`: smallest and largest normal
         load and largest tangential load (4,) of the feet [N]; smallest load of any foot [N] and
         smallest margins of sliding [N], turning [N m] and tilting [N m] over the run; the same in
-        each region (regions,). NaN without samples, and where the run ended before the region did.
+        each region (regions,). NaN without samples, and for regions without `region_samples`.
     """
-    p, regions = packed_feet(cabinet, gravity), region_limits(profile, period)
-    parts: list[Any] = [slice(*limits) for limits in regions] or [*ranges]
+    p = packed_feet(cabinet, gravity)
+    parts: list[Any] = [*region_samples(profile, period, len(wrenches))] or [*ranges]
     extremes, smallest = np.empty((3, FEET_COUNT)), np.empty((1 + len(parts), len(MARGINS)))
     region_of = np.full(len(wrenches), -1, dtype=np.int64)
     for number, part in enumerate(parts):
         region_of[part] = number
     foot_extremes(*_loads(p, wrenches, floor_forces), p, region_of, extremes, smallest)
-    for number, (first, last) in enumerate(regions, start=1):
-        if not first < last <= len(wrenches):
-            smallest[number] = np.nan
     smallest[~np.isfinite(smallest)] = np.nan
     rows = (NORMAL_SMALLEST, NORMAL_LARGEST, TANGENTIAL_LARGEST)
     of_feet = dict(zip(BY_FOOT, (extremes[row] for row in rows), strict=True))

@@ -10,7 +10,8 @@ from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.simulation.mounts import force_measures
-from wm_drake.simulation.records import Record
+from wm_drake.simulation.records import Record, sample_period
+from wm_drake.simulation.vibration import region_samples
 
 BoolArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
@@ -84,15 +85,16 @@ def speed_ranges(record: Record, profile: SpinProfile) -> list[SpeedRange]:
     These are the regions of the profile if it has any, else ranges of drum speed of equal width.
     Samples of a standing drum belong to the first range.
     """
-    time = record.time.values
     if profile.regions:
+        numbers = np.arange(record.sizes["time"])
+        parts = region_samples(profile, sample_period(record), len(numbers))
         return [
-            SpeedRange(region.name, (time >= region.begin) & (time < region.end))
-            for region in profile.regions
+            SpeedRange(region.name, (numbers >= part.start) & (numbers < part.stop))
+            for region, part in zip(profile.regions, parts, strict=True)
         ]
     in_rpm = Unit("rad/s", "rpm").from_si(1.0)
     speed = in_rpm * np.abs(record.drum_speed.values)
-    highest = in_rpm * float(np.max(np.abs(profile.speed)))
+    highest = in_rpm * profile.highest_speed
     width = SPEED_STEP_RPM * max(1.0, np.ceil(highest / SPEED_STEP_RPM / MOST_RANGES))
     count = max(1, int(np.ceil(highest / width * (1.0 - 1e-9))))
     place = np.minimum((speed / width * (1.0 + 1e-9)).astype(int), count - 1)

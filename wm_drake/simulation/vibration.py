@@ -26,6 +26,9 @@ DRIFT_HZ = 0.1
 It is a fifth of `HIGH_PASS_HZ`, so that it does not change the motion above that frequency.
 """
 
+MOST_MISSING = 0.01
+"""Largest part of a region that a record may lack at its end."""
+
 FEWEST = 16
 """Smallest number of samples that is filtered; results for fewer samples are NaN."""
 
@@ -51,7 +54,7 @@ def region_displacements(
 
     Returns:
         Two arrays (regions, k, 3) in W: from the displacement itself, and from the acceleration
-        integrated twice. NaN where the run ended before the region did. [m]
+        integrated twice. NaN for regions without `region_samples`. [m]
     """
 
     def rms(signal: FloatArray) -> FloatArray:
@@ -192,30 +195,33 @@ def region_rms(signal: FloatArray, period: float, profile: SpinProfile) -> Float
         period: Time between samples. [s]
 
     Returns:
-        (regions, k) in the unit of the signals. NaN where the signals end before the region does.
+        (regions, k) in the unit of the signals. NaN for regions without `region_samples`.
     """
-    rows = []
-    for first, last in region_limits(profile, period):
-        is_complete = last <= len(signal) and last > first
-        rows.append(
-            np.sqrt(np.mean(signal[first:last] ** 2, axis=0))
-            if is_complete
-            else np.full(signal.shape[1], np.nan)
-        )
+    parts = [signal[part] for part in region_samples(profile, period, len(signal))]
+    missing = np.full(signal.shape[1], np.nan)
+    rows = [np.sqrt(np.mean(part**2, axis=0)) if len(part) else missing for part in parts]
     return np.array(rows).reshape(len(profile.regions), signal.shape[1])
 
 
-def region_limits(profile: SpinProfile, period: float) -> list[tuple[int, int]]:
-    """Return the first sample of each region of a profile, and the one after its last.
+def region_samples(profile: SpinProfile, period: float, count: int) -> list[slice]:
+    """Return the samples of each region of a profile; none of a region that the samples lack.
+
+    A record may end a sample or `MOST_MISSING` before a region does.
 
     Args:
         period: Time between samples; the first is at time 0. [s]
+        count: Number of samples.
     """
 
     def first_at(time: float) -> int:
         return int(np.ceil(time / period * (1.0 - 1e-12)))
 
-    return [(first_at(region.begin), first_at(region.end)) for region in profile.regions]
+    parts = []
+    for region in profile.regions:
+        first, last = first_at(region.begin), first_at(region.end)
+        is_there = last - count <= max(1.0, MOST_MISSING * (last - first))
+        parts.append(slice(first, min(last, count) if is_there else first))
+    return parts
 
 
 def relative_error(computed: FloatArray, measured: FloatArray) -> FloatArray:

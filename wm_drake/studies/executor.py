@@ -176,7 +176,7 @@ class Executor:
             yield case
 
     def verify(self, machine: "Machine", cases: "Iterable[Case]") -> None:
-        """Add cases to those of which a sample is run with half the step, after the study."""
+        """Add cases to those of which a sample is run twice as fine, after the study."""
         from wm_drake.batch.verification import Sample
 
         if self._sample is None:

@@ -63,7 +63,7 @@ def runnable_profile(name_or_path: str | Path, parameters: "MachineParameters") 
 
     profile = load_profile(name_or_path)
     with problems_of_file(Path(name_or_path)):
-        check_size(profile, parameters.step, parameters.output_period)
+        check_size(profile, parameters.step, profile.sample_period(parameters.output_period))
     return profile
 
 
@@ -153,7 +153,7 @@ def machine_warnings(parameters: "MachineParameters", profile: Path | None = Non
 
     unused = [UNUSED_PHASE_ERROR] if parameters.imperfections.phase_error else []
     chosen = profile_of(parameters, profile)
-    return [*unused, *band_warnings(chosen, parameters.output_period)]
+    return [*unused, *band_warnings(chosen)]
 
 
 def friction_warnings(parameters: "MachineParameters") -> list[str]:
@@ -240,7 +240,8 @@ def built_with_problems(
         measured_amplitudes(parameters)
         published_results(parameters.published)
         step = checked_step(parameters, None)
-        check_size(parameters.profile, step, parameters.output_period)
+        period = parameters.profile.sample_period(parameters.output_period)
+        check_size(parameters.profile, step, period)
         machine = build_machine(parameters)
         setup = machine.set_up()
         choose_stepping(setup, *pack(setup), parameters.profile, step, parameters.integrator)

@@ -113,9 +113,10 @@ class Facts:
         command: Command line or Python call.
         wall_s: Duration. [s]
         warnings: Warnings of the machine, without those of the result.
-        step: Step size of the compiled engine; 0 without a machine, or with several. [s]
-        integrator: Integrator of the compiled engine.
-        verified: What a sample of the runs gave with half the step; "" without runs.
+        step: Largest step of the compiled engine, as the machine has it; runs may take shorter
+            ones. 0 without a machine, or with several. [s]
+        integrator: Integrator of the compiled engine, as the machine has it.
+        verified: What a sample of the runs gave twice as fine; "" without runs.
         runs: Number of runs.
     """
 
@@ -134,7 +135,7 @@ class Facts:
 
         step = f"{1e3 * self.step:g} ms, integrator {self.integrator}"
         return [
-            *([("Step", step)] if self.step else []),
+            *([("Largest step", step)] if self.step else []),
             *([("Check of the step", self.verified)] if self.verified else []),
             ("Versions", ", ".join(f"{name} {text}" for name, text in versions().items())),
             ("Sources", sources_version()),

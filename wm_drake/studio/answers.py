@@ -26,8 +26,7 @@ from wm_drake.model.scene import Gap
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.plausibility import unusual_numbers
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Unit
-from wm_drake.report.formatting import plain, shape_name
+from wm_drake.report.formatting import MM_PER_M, MS_PER_S, RPM_PER_RAD_S, plain, shape_name
 from wm_drake.simulation.band import band_warnings, pass_band
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.displacements import local_maxima, replay_samples
@@ -53,12 +52,8 @@ LANES = WIDTH - 1
 BINS = 350
 """Number of time bins of a force; each is drawn from its smallest to its largest value."""
 
-_MM, _RPM = Unit("m", "mm"), Unit("rad/s", "rpm")
-MM_PER_M, RPM_PER_RAD_S = _MM.from_si(1.0), _RPM.from_si(1.0)
-MS_PER_S = 1e3
-"""Times are sent in whole milliseconds, displacements in whole micrometres."""
-
 MICRO = 1e6
+"""Displacements are sent in whole micrometres, times in whole milliseconds."""
 
 
 def shown_measures() -> tuple[str, ...]:
@@ -94,7 +89,7 @@ def picture(machine: OpenMachine, runner: Runner, state: State) -> dict[str, Any
         setup = items[0].numbers.setup
         profile, period = batch_key.profile, batch_key.period
         warnings = [
-            *(Problem("", "profile.band", text) for text in band_warnings(profile, period)),
+            *(Problem("", "profile.band", text) for text in band_warnings(profile)),
             *unusual_numbers(setup.parameters, state.values),
             *unusual_springs(setup),
             *(Problem("", "damper_types", text) for text in friction_warnings(setup.parameters)),

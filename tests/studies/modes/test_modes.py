@@ -13,7 +13,7 @@ from wm_drake.studies.modes.amplitude import amplitude_modes
 from wm_drake.studies.modes.campbell import campbell, critical_speeds, mac
 from wm_drake.studies.modes.linearisation import Linearisation, Spectrum, spectrum_of
 from wm_drake.studies.modes.sensitivity import sensitivities
-from wm_drake.studies.modes.shapes import ANGLE_ARM, modes_of
+from wm_drake.studies.modes.shapes import ANGLE_ARM, modes_of, names_at_speed
 from wm_drake.studies.modes.study import SLIDING, STUCK, three_linearisations
 
 BALL_INERTIA, BALLS = 0.3, 6
@@ -171,6 +171,48 @@ def test_energy_is_shared_as_the_stiffness_is(isotropic):
     both = np.concatenate([slopes, 3.0 * slopes[-1:]])  # a second gasket, three times as stiff
     for mode in modes_of(linear.spectrum().first(6), both):
         assert mode.strain_energy[-1] == pytest.approx(0.75, abs=1e-6)
+
+
+def test_turning_modes_are_named_by_their_shape_where_curves_cross():
+    """Let forward whirl rise from below the translations to above them: w = sqrt(k/I + g^2) + g."""
+    stiffness, inertia = 250.0, BALLS * BALL_INERTIA
+    linear = linearised(build_machine(isotropic_machine(rotational_stiffness=stiffness)))
+    whirl, translation = np.sqrt(stiffness / inertia), np.sqrt(STIFFNESS / MASS)
+    assert whirl < translation
+    for speed in (30.0, 100.0, 180.0):
+        spectrum = linear.spectrum(speed).first(6)
+        found = dict(zip(names_at_speed(spectrum), np.abs(spectrum.values), strict=True))
+        g = 0.5 * BALL_INERTIA * speed / inertia
+        ends = np.sqrt(whirl**2 + g * g) + np.array([g, -g])
+        wanted = {"forward whirl": ends[0], "backward whirl": ends[1]}
+        wanted |= dict.fromkeys(("sway", "fore-aft", "bounce"), translation)
+        assert {name: found[name] for name in wanted} == pytest.approx(wanted, rel=1e-6)
+
+
+@pytest.mark.parametrize("friction", [True, False])
+def test_names_at_speed_are_those_of_the_kinetic_energy(machine, friction):
+    """Compare with the kinetic energy in each coordinate, by the mass matrix of the diagram."""
+    setup = machine.set_up(friction=friction)
+    tub = machine.state_layout.tub
+    masses = machine.plant.CalcMassMatrix(setup.plant_context)[np.ix_(tub, tub)]
+    linear = Linearisation(setup)
+    parts = {
+        "bounce": [5],
+        "pitch": [1],
+        "sway": [3, 4],  # they share these two motions
+        "fore-aft": [3, 4],
+        "forward whirl": [0, 2],
+        "backward whirl": [0, 2],
+    }
+    spectrum = linear.spectrum(1800.0 * np.pi / 30.0).first(6)
+    names = names_at_speed(spectrum)
+    assert sorted(names) == sorted(parts)
+    for name, vector in zip(names, spectrum.right.T, strict=True):
+        rates = vector[6:12]
+        energy = np.real(np.conj(rates) * (masses @ rates))
+        assert energy[parts[name]].sum() > 0.55 * energy.sum()
+    hertz = dict(zip(names, spectrum.frequency_hz, strict=True))
+    assert hertz["forward whirl"] > 1.3 * hertz["bounce"] > 1.3 * hertz["backward whirl"]
 
 
 def test_sensitivities_of_one_mass_are_those_of_the_closed_form(isotropic):

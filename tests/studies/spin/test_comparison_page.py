@@ -66,6 +66,12 @@ def page(variants):
     return page_of([first, variants[1]], "wm-drake spin --compare-gasket")
 
 
+def test_terminal_has_the_gap_of_each_case(variants, table):
+    shown = SpinComparisonResult(tuple(variants), table, None).terminal()
+    gap = "smallest gap 18.0 mm between tub shell and wall right, at 240 rpm (0.50 s)"
+    assert f"without gasket, back: {gap}" in shown
+
+
 def test_differences_of_planted_values(table, variants):
     of_middle = table[table["load"] == "middle"].set_index(["measure", "name"])
     gap = of_middle.loc[("smallest gap", "")]

@@ -23,9 +23,7 @@ def spin_result(machine, parameters):
     """Return the result of a short run of the load `counter`."""
     case = Case("counter", parameters.loads["counter"], PROFILE, parameters=parameters)
     record = simulate(machine, case)
-    return SpinRuns(
-        parameters, "compiled", 2.5e-3, (CaseResult(case, record, measure(record), 1.0),)
-    )
+    return SpinRuns(parameters, "compiled", (CaseResult(case, record, measure(record), 1.0),))
 
 
 @pytest.fixture(scope="module")

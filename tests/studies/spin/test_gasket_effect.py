@@ -60,7 +60,7 @@ def result(parameters, gasket, transient, steady, comparison):
     table = xr.Dataset({"amplitude": sizes, "critical_speed": sizes})
     measures = Measures(table, None, None, None, has_cabinet=False)
     results = (CaseResult(case, record, measures, 0.0),)
-    return SpinRuns(parameters, "compiled", 0.0025, results, comparison)
+    return SpinRuns(parameters, "compiled", results, comparison)
 
 
 @pytest.mark.parametrize("comparison", [Comparison.AS_MEASURED, Comparison.NONE])

@@ -215,6 +215,32 @@ def test_overlap_is_warned_of(machine: MachineParameters) -> None:
     assert page.index(answer) < page.index("1 case was run")  # the answer comes first
 
 
+@pytest.mark.parametrize(
+    ("gap", "size"), [(0.0187, "18.7 mm between"), (-0.0169, "−16.9 mm (they touch) between")]
+)
+@pytest.mark.usefixtures("without_drawing")
+def test_terminal_and_page_say_the_same_gap(
+    machine: MachineParameters, gap: float, size: str
+) -> None:
+    case = case_result(machine, gap=gap)
+    text = f"smallest gap {size} tub shell and wall right, at 240 rpm (0.50 s)"
+    result = spin_result(machine, [case])
+    assert f"{case.case.name}: {text}" in result.terminal()
+    assert text.removeprefix("smallest gap ") in spin_page(result)
+
+
+@pytest.mark.usefixtures("without_drawing")
+def test_page_says_the_steps_that_the_runs_took(machine: MachineParameters) -> None:
+    cases = [case_result(machine), case_result(machine), case_result(machine)]
+    shorter = {"integrator": "multistep", "step_s": 1.25e-3}
+    cases[1] = replace(cases[1], record=cases[1].record.assign_attrs(shorter))
+    words = (
+        "steps of up to 2.5 ms with controlled error, samples every 5 ms; "
+        "multistep, steps of 1.25 ms, samples every 5 ms"
+    )
+    assert words in spin_page(spin_result(machine, cases))
+
+
 def test_names_cannot_inject_markup(machine: MachineParameters) -> None:
     evil = "<script>alert('$x$')</script>"
     parameters = machine.model_copy(

@@ -60,7 +60,7 @@ def run_compiled(
         profile: Drum speed over time; followed exactly.
         step: Step size. [s]
         progress: Called with the fraction done.
-        period: Time between two samples; None for the output period of the machine. [s]
+        period: Time between two samples; None for that of the machine and the profile. [s]
         integrator: "multistep", "midpoint" or "runge_kutta".
         relaxation: As in the `Stepping`, for "midpoint".
 
@@ -70,7 +70,7 @@ def run_compiled(
     Raises:
         InputError: the machine has something that the compiled engine does not represent.
     """
-    period = period or setup.parameters.output_period
+    period = period or profile.sample_period(setup.parameters.output_period)
     check_size(profile, step, period)
     p, layout = pack(setup)
     begin = initial_state(setup, profile)

@@ -97,6 +97,8 @@ def choose_stepping(
         InputError: the step is too long for the integrator, or the sample time of a controller for
             the drum.
     """
+    period = profile.sample_period(setup.parameters.output_period)
+    step = min(step, period / np.ceil(period / step * (1.0 - 1e-9)))  # steps end at samples
     moving = setup.cabinet or setup.motor or layout.rubber
     only_tubes = bool(setup.telescopes) and not moving
     if integrator == "midpoint" and not only_tubes:
@@ -107,7 +109,7 @@ def choose_stepping(
         )
     if integrator != "runge_kutta" and not layout.control_period:
         linear = linearised(setup, packed, layout, ACROSS_JUMPS)
-        fastest = max(abs(speed) for speed in profile.speed)
+        fastest = profile.highest_speed
         if only_tubes and integrator != "multistep":
             midpoint = _midpoint(setup, layout, linear.jacobians, fastest, step, integrator)
             if midpoint:

@@ -9,6 +9,7 @@ from wm_drake.parameters.units import Unit
 from wm_drake.simulation.displacements import amplitudes, power_means
 from wm_drake.simulation.measures.kind import Measure, Variable, detail, each_run
 from wm_drake.simulation.measures.run import Run
+from wm_drake.simulation.vibration import region_samples
 
 MM, RPM = Unit("m", "mm"), Unit("rad/s", "rpm")
 
@@ -22,12 +23,11 @@ def _amplitudes(run: Run) -> Sequence[FloatArray]:
 def _in_regions(run: Run) -> Sequence[FloatArray]:
     shape = len(run.profile.regions), run.displacement.shape[1]
     sizes, speeds = np.full(shape, np.nan), np.full(shape, np.nan)
-    for row, region in enumerate(run.profile.regions):
-        inside = np.flatnonzero((run.time >= region.begin) & (run.time < region.end))
-        size, at = amplitudes(run.filtered[inside])
+    for row, part in enumerate(region_samples(run.profile, run.period, len(run.time))):
+        size, at = amplitudes(run.filtered[part])
         known = ~np.isnan(size)
         sizes[row, known] = size[known]
-        speeds[row, known] = run.drum_speed[inside[at[known]]]
+        speeds[row, known] = run.drum_speed[part][at[known]]
     return sizes, speeds
 
 

@@ -10,6 +10,7 @@ from wm_drake.simulation.measures.kind import Measure, detail, each_run
 from wm_drake.simulation.measures.regions import DIMS
 from wm_drake.simulation.measures.run import Run
 from wm_drake.simulation.outputs import point_displacements
+from wm_drake.simulation.vibration import region_samples
 
 
 def _radial(run: Run) -> Sequence[FloatArray]:
@@ -17,10 +18,9 @@ def _radial(run: Run) -> Sequence[FloatArray]:
     moved = point_displacements(np.ascontiguousarray(run.tub_motion), points, run.rest_pose)
     radius = np.hypot(moved[..., 0], moved[..., 2])
     radii = np.full((len(run.profile.regions), len(points)), np.nan)
-    for row, region in enumerate(run.profile.regions):
-        begin, end = np.searchsorted(run.time, (region.begin, region.end))
-        if end > begin and run.time[-1] >= region.end - run.period:
-            radii[row] = radius[begin:end].max(axis=0)
+    for row, part in enumerate(region_samples(run.profile, run.period, len(run.time))):
+        if part.start < part.stop:
+            radii[row] = radius[part].max(axis=0)
     return [radii]
 
 

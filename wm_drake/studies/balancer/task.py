@@ -54,7 +54,7 @@ class BalancerTask(Task):
         self.ball_masses = _values(options.ball_mass, PART, "--ball-mass")
         self.dampings = _values(options.damping, PART, "--damping")
         self.rate = _values(options.rate, RATE.unit, "--rate")[0]
-        self.high = max(parameters.profile.speed)
+        self.high = parameters.profile.highest_speed
         if options.high is not None:
             self.high = _values(options.high, SPEED.unit, "--to")[0]
         if self.high < 4.0 * WINDOW * (1.0 - 1e-9):  # 100 rpm, in rad/s, is rounded

@@ -161,8 +161,8 @@ def _flat_sides(
     for k in range(len(point)):
         others = np.delete(above - below, k, axis=0)
         steps = np.stack([above[k], below[k]]) - residuals
-        remainder = steps - steps @ np.linalg.pinv(others, rcond=SAME) @ others
-        upwards, downwards = np.linalg.norm(remainder, axis=1)
+        remaining = steps - steps @ np.linalg.pinv(others, rcond=SAME) @ others
+        upwards, downwards = np.linalg.norm(remaining, axis=1)
         side[k] = float(upwards < FLAT_SIDE * downwards) - float(downwards < FLAT_SIDE * upwards)
     at_bound = (point < DIFFERENCE) | (point > 1.0 - DIFFERENCE)
     return np.where(at_bound, 0.0, side)

@@ -264,7 +264,9 @@ def envelopes_of(displacement: xr.DataArray) -> xr.DataArray:
     a small peak appears.
     """
     whole = smooth_envelope(xr.Dataset({"displacement": displacement}))
-    return whole.sel(time=slice(WINDOW[0] - 1e-9, WINDOW[1] + 1e-9))
+    first, last = np.rint(np.array(WINDOW) / OUTPUT_PERIOD)
+    compared = OUTPUT_PERIOD * np.arange(first, last + 1)  # runs may have closer samples
+    return whole.sel(time=compared, method="nearest")
 
 
 def run_up_of(parameters: MachineParameters) -> SpinProfile:

@@ -188,12 +188,13 @@ INTEGRATORS = {
 
 
 def _numerics(parameters: MachineParameters) -> dict[str, Any]:
-    band = pass_band(parameters.profile, parameters.output_period)
+    period = parameters.profile.sample_period(parameters.output_period)
+    band = pass_band(parameters.profile, period)
     both_ways = "forwards and backwards, so that no phase is shifted"
     return {
         "integrator": INTEGRATORS[parameters.integrator],
         "step_s": parameters.step,
-        "output_period_s": parameters.output_period,
+        "output_period_s": period,
         "displacement_filter": f"Butterworth band-pass of order {FILTER_ORDER}, {both_ways}; ends "
         f"mirrored over {PADDING_PERIODS / band[0]:g} s",
         "displacement_band_hz": list(band),

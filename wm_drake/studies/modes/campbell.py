@@ -28,18 +28,26 @@ MOST_HALVINGS = 8
 
 @dataclass(frozen=True)
 class Campbell:
-    """Modes over the speed of the drum.
+    """Modes over the speed of the drum, each a curve without jumps.
+
+    Where two curves come near each other and part again, the shapes change over from one to the
+    other: the shape of a curve at one speed says nothing about another speed.
 
     Attributes:
         speed: (s,) rising. [rad/s]
-        value: Eigenvalue of each mode; column k is the same mode at all speeds. (s, m) complex
-            [1/s]
-        mac: MAC of each mode with the same one at the speed before; 1 at the first. (s, m)
+        spectra: Modes at each speed; number k is on the same curve at all speeds. NaN behind the
+            end of a curve.
+        mac: MAC of each mode with the one of its curve at the speed before; 1 at the first. (s, m)
     """
 
     speed: FloatArray
-    value: ComplexArray
+    spectra: tuple[Spectrum, ...]
     mac: FloatArray
+
+    @property
+    def value(self) -> ComplexArray:
+        """Return the eigenvalues. (s, m) complex [1/s]"""
+        return np.array([spectrum.values for spectrum in self.spectra])
 
     @property
     def frequency_hz(self) -> FloatArray:
@@ -58,7 +66,7 @@ class CriticalSpeed:
 
     Attributes:
         order: Multiple of the drum's speed.
-        mode: Number of the mode.
+        mode: Number of the curve.
         speed: [rad/s]
         damping_ratio: Of the mode there.
     """
@@ -85,13 +93,13 @@ def campbell(spectrum_at: Callable[[float], Spectrum], speeds: FloatArray, count
         count: Number of modes to follow, the slowest at the first speed.
     """
     here = spectrum_at(float(speeds[0])).first(count)
-    values: list[ComplexArray] = [here.values]
+    spectra = [here]
     macs: list[FloatArray] = [np.ones(len(here.values))]
     for before, after in itertools.pairwise(speeds):
         here, least = _joined(spectrum_at, float(before), float(after), here, MOST_HALVINGS)
-        values.append(here.values)
+        spectra.append(here)
         macs.append(least)
-    return Campbell(np.asarray(speeds), np.array(values), np.array(macs))
+    return Campbell(np.asarray(speeds), tuple(spectra), np.array(macs))
 
 
 def _joined(

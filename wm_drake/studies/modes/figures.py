@@ -1,7 +1,9 @@
 """Figures of the modes of a machine."""
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 
@@ -71,9 +73,10 @@ def _campbell(result: MachineModes, name: str, scale: fig.Scale, top: float) -> 
     marks: list[fig.Mark] = []
     for mode, column in enumerate(diagram.frequency_hz.T):
         marks.append(fig.Line(rpm, column, color=fig.QUIET, width=1.1))
-        mode_name = result.modes[name][mode].name
-        points = fig.Points(rpm, column, values=diagram.damping_ratio[:, mode], name=mode_name)
-        marks.append(replace(points, scale=scale, size=5.0))
+        for words, part in stretches([of_speed[mode] for of_speed in result.names[name]]):
+            ratios = diagram.damping_ratio[part, mode]
+            points = fig.Points(rpm[part], column[part], values=ratios, name=words)
+            marks.append(replace(points, scale=scale, size=5.0))
     for order in ORDERS:
         key = "order of the drum speed"
         marks.append(fig.Line(rpm, order * rpm / 60.0, color=fig.MARK, dash="dashed", key=key))
@@ -89,10 +92,15 @@ def _campbell(result: MachineModes, name: str, scale: fig.Scale, top: float) -> 
             fig.Points(speeds, speeds / 60.0, symbol="triangle-down", opacity=0.75, key=key)
         )
     marks += _mode_names(result, name, last, top)
-    x = fig.Axis(label="drum speed, rpm", range=(0.0, 1.16 * last))
+    speeds = fig.round_numbers(0.0, last, 6)
+    ticks = fig.named((f"{speed:g}" for speed in speeds), speeds)
+    x = fig.Axis(label="drum speed, rpm", range=(-LEFT * last, (1.0 + RIGHT) * last), ticks=ticks)
     y = fig.Axis(label="natural frequency, Hz", range=(0.0, top))
     return fig.Panel(title=TITLES[name], marks=tuple(marks), x=x, y=y)
 
+
+LEFT, RIGHT = 0.2, 0.36
+"""Room for the names of modes at both ends of a diagram, as parts of its largest speed."""
 
 NEAR_LABELS = 0.035
 """Distance of two critical speeds, as a part of the axis of frequencies, below which they share a
@@ -123,17 +131,32 @@ def _critical_marks(result: MachineModes, name: str, top: float) -> list[fig.Mar
     return marks
 
 
+def stretches(names: Sequence[str]) -> list[tuple[str, slice]]:
+    """Return each name of a sequence with the places next to each other that have it."""
+    changes = [at for at in range(1, len(names)) if names[at] != names[at - 1]]
+    bounds = itertools.pairwise([0, *changes, len(names)])
+    return [(names[begin], slice(begin, end)) for begin, end in bounds]
+
+
 def _mode_names(result: MachineModes, name: str, last_rpm: float, top: float) -> list[fig.Mark]:
-    """Return the names of the modes at the right end, apart from each other."""
-    ends = result.diagrams[name].frequency_hz[-1]
-    order = np.argsort(ends)
-    places = ends[order].copy()
-    for index in range(1, len(places)):
-        places[index] = max(places[index], places[index - 1] + 0.042 * top)
-    return [
-        fig.Text(1.015 * last_rpm, place, result.modes[name][mode].name, size=12.0, across="left")
-        for place, mode in zip(places, order, strict=True)
-    ]
+    """Return the names of the modes at standstill and at the right end, apart from each other."""
+    hertz, names = result.diagrams[name].frequency_hz, result.names[name]
+    marks: list[fig.Mark] = []
+    ends: tuple[tuple[int, float, Literal["left", "right"]], ...] = (
+        (0, -0.015, "right"),
+        (-1, 1.015, "left"),
+    )
+    for end, x, side in ends:
+        known = np.flatnonzero(np.isfinite(hertz[end]))
+        order = known[np.argsort(hertz[end][known])]
+        places = hertz[end][order]
+        for index in range(1, len(places)):
+            places[index] = max(places[index], places[index - 1] + 0.042 * top)
+        marks += [
+            fig.Text(x * last_rpm, float(place), names[end][mode], size=12.0, across=side)
+            for place, mode in zip(places, order, strict=True)
+        ]
+    return marks
 
 
 def amplitude_figure(result: MachineModes) -> fig.Figure:

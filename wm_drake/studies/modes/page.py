@@ -260,7 +260,7 @@ def critical_rows(result: MachineModes, name: str) -> list[dict[str, Any]]:
     return [
         {
             "order": critical.order,
-            "name": result.modes[name][critical.mode].name,
+            "name": result.name_at(name, critical.mode, critical.speed),
             "rpm": RPM_PER_RAD_S * critical.speed,
             "damping_ratio": critical.damping_ratio,
         }
@@ -274,7 +274,7 @@ def _campbell_as_json(result: MachineModes, name: str) -> dict[str, Any]:
         "rpm": RPM_PER_RAD_S * computed.speed,
         "frequency_Hz": computed.frequency_hz.T,
         "damping_ratio": computed.damping_ratio.T,
-        "name": [mode.name for mode in result.modes[name]],
+        "name": [list(of_curve) for of_curve in zip(*result.names[name], strict=True)],
     }
 
 
@@ -349,8 +349,8 @@ def _critical_table(result: MachineModes) -> Table:
         if rows:
             groups.append(Group(TITLES[name], tuple(rows)))
     caption = (
-        "Critical speeds: an order of the drum speed equals a natural frequency. The names are "
-        "those of a drum that stands still."
+        "Critical speeds: an order of the drum speed equals a natural frequency. A mode has the "
+        "name of its shape at this speed."
     )
     columns = tuple(MODE[key] for key in ("mode", "order", "rpm", "damping_ratio"))
     return Table(caption, ("linearisation", *columns), tuple(groups), text_columns=3)
@@ -358,8 +358,11 @@ def _critical_table(result: MachineModes) -> Table:
 
 def _campbell_picture(result: MachineModes) -> Picture:
     caption = (
-        "Campbell diagram. The gyroscopic effect of the drum bends the curves. Circles: critical "
-        "speeds of the orders 1 and 2, with the speed in rpm for order 1."
+        "Campbell diagram. The gyroscopic effect of the drum bends the curves. Names at the left: "
+        "shapes of a drum that stands still; at the right: shapes at the highest speed. Where two "
+        "curves come near each other, they exchange their shapes. Whirl: roll and yaw together, "
+        "the axis of the drum goes round with the drum (forward) or against it (backward). "
+        "Circles: critical speeds of the orders 1 and 2, with the speed in rpm for order 1."
     )
     if result.run_up is not None:
         caption += (
@@ -427,14 +430,15 @@ def campbell_frame(result: MachineModes) -> pd.DataFrame:
         {
             "linearisation": name,
             "rpm": RPM_PER_RAD_S * speed,
-            "mode": mode.name,
+            "curve": column + 1,
+            "mode": result.names[name][index][column],
             "frequency_Hz": diagram.frequency_hz[index, column],
             "damping_ratio": diagram.damping_ratio[index, column],
             "mac": diagram.mac[index, column],
         }
         for name, diagram in result.diagrams.items()
         for index, speed in enumerate(diagram.speed)
-        for column, mode in enumerate(result.modes[name])
+        for column in range(diagram.value.shape[1])
     )
 
 

@@ -25,6 +25,15 @@ NAMES = {
 Angles about x, y, z as in records; sway to the sides, fore-aft along the drum axis, bounce up and
 down."""
 
+FORWARD, BACKWARD = "forward whirl", "backward whirl"
+"""Names of roll and yaw together as the drum turns: its axis goes round with the drum or against
+it. A fast drum has no other: forward whirl rises with the speed (nutation), backward whirl falls
+(precession)."""
+
+WHIRL = 0.5
+"""Least part of roll and yaw together in a whirl, of the smaller one in the larger, and of the area
+of their ellipse in that of a circle."""
+
 ANGLE_ARM = 0.25
 """Length that converts angles to displacements in a mode shape: about the radius of the tub. [m]"""
 
@@ -122,6 +131,31 @@ def names_of(shares: FloatArray) -> list[str]:
     choices = np.array(list(permutations(range(len(COORDINATES)), count)), dtype=int)
     best = np.argmax(shares[np.arange(count), choices].sum(axis=1))
     return [NAMES[COORDINATES[coordinate]] for coordinate in choices[best]]
+
+
+def names_at_speed(spectrum: Spectrum) -> list[str]:
+    """Return a name for each mode of a turning drum, from its shape at this speed.
+
+    A mode has the name of a coordinate, as at standstill, or is a whirl of roll and yaw.
+    """
+    shares = participation(spectrum)
+    names = names_of(shares)
+    for index, (roll, _, yaw, *_) in enumerate(shares):
+        circular = _circularity(spectrum.right[0, index], spectrum.right[2, index])
+        is_whirl = roll + yaw > WHIRL and min(roll, yaw) > WHIRL * max(roll, yaw)
+        if is_whirl and abs(circular) > WHIRL:
+            names[index] = FORWARD if circular > 0.0 else BACKWARD
+    return names
+
+
+def _circularity(roll: complex, yaw: complex) -> float:
+    """Return the area of the ellipse of roll and yaw over time, 1 for a circle with the drum.
+
+    The drum turns from z to x, so that on a forward circle the roll follows the yaw by a quarter of
+    a turn.
+    """
+    size = abs(roll) ** 2 + abs(yaw) ** 2
+    return float(2.0 * np.imag(roll.conjugate() * yaw) / size) if size else 0.0
 
 
 def energies(

@@ -20,7 +20,7 @@ from wm_drake.studies.modes.amplitude import AmplitudeMode, amplitude_modes
 from wm_drake.studies.modes.campbell import Campbell, CriticalSpeed, campbell, critical_speeds
 from wm_drake.studies.modes.linearisation import MODES, Linearisation, Spectrum, check_fixed_cabinet
 from wm_drake.studies.modes.sensitivity import Sensitivity, numbers_of, sensitivities
-from wm_drake.studies.modes.shapes import Mode, modes_of
+from wm_drake.studies.modes.shapes import Mode, modes_of, names_at_speed
 from wm_drake.studies.threads import on_one_thread
 
 STUCK, SLIDING, AMPLITUDE = "stuck", "sliding", "amplitude"
@@ -81,6 +81,7 @@ class MachineModes(NaturalModes):
         elements: Names of the elements on the tub, in the order of the shares of a mode.
         over_amplitude: Each mode over its amplitude.
         diagrams: Campbell diagram of `STUCK` and `SLIDING`.
+        names: Name of each mode of these at each speed, from its shape there.
         critical: Critical speeds of each.
         sensitivities: Of each, for a drum that stands still.
         run_up: Peaks of the machine's own run-up, one run a load: `critical_speed` and `amplitude`
@@ -92,9 +93,15 @@ class MachineModes(NaturalModes):
     elements: list[str]
     over_amplitude: list[AmplitudeMode]
     diagrams: dict[str, Campbell]
+    names: dict[str, list[list[str]]]
     critical: dict[str, list[CriticalSpeed]]
     sensitivities: dict[str, list[Sensitivity]]
     run_up: xr.Dataset | None
+
+    def name_at(self, linearisation: str, mode: int, speed: float) -> str:
+        """Return the name of a mode at the nearest speed of its diagram. [rad/s]"""
+        nearest = int(np.argmin(np.abs(self.diagrams[linearisation].speed - speed)))
+        return self.names[linearisation][nearest][mode]
 
     @property
     def critical_speeds(self) -> FloatArray:
@@ -164,7 +171,7 @@ def modes(
     amplitudes = np.union1d(AMPLITUDES, amplitude)
     over = amplitude_modes(setup, spectra[STUCK], natural[STUCK], amplitudes)
     progress(0.3)
-    diagrams = _diagrams(linear, spectra, max(parameters.profile.speed))
+    diagrams = _diagrams(linear, spectra, parameters.profile.highest_speed)
     progress(0.4)
     bars = _sensitivities(machine, load, gasket, spectra, lambda part: progress(0.4 + 0.5 * part))
     peaks = None
@@ -183,6 +190,10 @@ def modes(
         linear[STUCK].names,
         over,
         diagrams,
+        {
+            name: [[mode.name for mode in natural[name]], *map(names_at_speed, diagram.spectra[1:])]
+            for name, diagram in diagrams.items()
+        },
         {name: critical_speeds(diagram, ORDERS) for name, diagram in diagrams.items()},
         bars,
         peaks,

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+import xarray as xr
 
 from wm_drake.model.scene import Outline
 from wm_drake.parameters.types import FloatArray
@@ -26,7 +27,8 @@ def response_figure(cases: list[SteadyCase]) -> fig.Figure:
     Args:
         cases: The same load with and without gasket, or one of them.
     """
-    x, y = fig.Axis(label="drum speed, rpm"), fig.Axis(label="amplitude, mm", range=(0.0, None))
+    x = fig.Axis(label="drum speed, rpm")
+    y = fig.Axis(label="amplitude, mm", range=(0.0, _shown_amplitude(cases)))
     panels = []
     for sensor in map(str, cases[0].response.sensor.values):
         marks: list[fig.Mark] = []
@@ -39,22 +41,38 @@ def response_figure(cases: list[SteadyCase]) -> fig.Figure:
     return fig.Figure(panels=fig.in_grid(panels, COLUMNS, share="both"), height=160.0)
 
 
+def _shown_amplitude(cases: list[SteadyCase]) -> float | None:
+    """Return the upper end of the amplitudes: above what is reached, steady or in the run. [mm]
+
+    Unstable motions may be much larger.
+    """
+    sizes = [case.largest()[0] for case in cases]
+    sizes += [_run_up_size(case.run_up) for case in cases if case.run_up is not None]
+    largest = max(float(np.nanmax(size, initial=0.0)) for size in sizes)
+    return 1.25 * MM_PER_M * largest or None
+
+
 def _branch(case: SteadyCase, values: FloatArray, color: str) -> list[fig.Mark]:
-    """Return a quantity along the branch: a line where it is stable, dots where it is not."""
+    """Return a quantity along the branch: lines where it is stable, dots where it is not.
+
+    The line is pale where the tub touches the housing.
+    """
     rpm = RPM_PER_RAD_S * case.response.speed.values
-    stable = case.response.stable.values.astype(bool)
     key = f"steady, {'with' if case.gasket else 'without'} gasket"
-    marks: list[fig.Mark] = [
-        fig.Line(rpm, np.where(stable, values, np.nan), color=color, width=2.4, key=key)
-    ]
-    if not stable.all():
-        shown = ~stable
-        shown[:-1] |= ~stable[1:]
-        shown[1:] |= ~stable[:-1]
-        line = fig.Line(
-            rpm, np.where(shown, values, np.nan), color=color, width=2.0, key="unstable"
-        )
-        marks.append(replace(line, dash="dotted"))
+    line = fig.Line(rpm, values, color=color)
+    kinds = (
+        (case.reachable, replace(line, width=2.4, key=key)),
+        (case.stable & case.touches, replace(line, width=2.4, opacity=0.35, key="in contact")),
+        (~case.stable, replace(line, width=2.0, dash="dotted", key="unstable")),
+    )
+    marks: list[fig.Mark] = []
+    for index, (of_kind, style) in enumerate(kinds):
+        shown = of_kind.copy()
+        if index:  # reach to the points beside it, which are of another kind
+            shown[:-1] |= of_kind[1:]
+            shown[1:] |= of_kind[:-1]
+        if of_kind.any():
+            marks.append(replace(style, y=np.where(shown, values, np.nan)))
     return marks
 
 
@@ -62,11 +80,16 @@ def _run_up(case: SteadyCase, sensor: str, color: str) -> list[fig.Mark]:
     if case.run_up is None:
         return []
     run = case.run_up.sel(sensor=sensor)
-    size = np.maximum(np.abs(run.upper.values), np.abs(run.lower.values))
+    size = _run_up_size(run)
     rising = np.append(np.diff(run.speed.values) > 0.0, False)
     rpm = RPM_PER_RAD_S * run.speed.values[rising][::5]
     line = fig.Line(rpm, MM_PER_M * size[rising][::5], color=color, opacity=0.45, dash="long")
     return [replace(line, key="spin profile of the machine")]
+
+
+def _run_up_size(run_up: xr.Dataset) -> FloatArray:
+    """Return the larger one of both envelopes. [m]"""
+    return np.maximum(np.abs(run_up.upper.values), np.abs(run_up.lower.values))
 
 
 def forces_figure(cases: list[SteadyCase]) -> fig.Figure:
@@ -105,7 +128,10 @@ def _force_panel(
     peaks: list[tuple[SteadyCase, FloatArray]],
     dynamic: list[tuple[SteadyCase, FloatArray]],
 ) -> fig.Panel:
-    """Return values over the speed of cases, one colour a load; those of `dynamic` are dashed."""
+    """Return values over the speed of cases, one colour a load; those of `dynamic` are dashed.
+
+    A line has gaps where no steady motion is reachable.
+    """
     colors = colors_of_loads([case.load for case, _ in peaks])
     marks = []
     kinds: tuple[tuple[fig.Dash, list[tuple[SteadyCase, FloatArray]]], ...] = (
@@ -115,7 +141,8 @@ def _force_panel(
     for dash, lines in kinds:
         for case, values in lines:
             rpm = RPM_PER_RAD_S * case.response.speed.values
-            line = fig.Line(rpm, values, color=colors[case.load], width=2.0, key=case.load)
+            shown = np.where(case.reachable, values, np.nan)
+            line = fig.Line(rpm, shown, color=colors[case.load], width=2.0, key=case.load)
             marks.append(replace(line, dash=dash))
     y = fig.Axis(range=(0.0, None))
     return fig.Panel(title=title, marks=tuple(marks), x=fig.Axis(label="drum speed, rpm"), y=y)
@@ -128,9 +155,10 @@ def colors_of_loads(loads: list[str]) -> dict[str, str]:
 
 
 def peaks_of(case: SteadyCase, most: int = 3) -> list[int]:
-    """Return the points of the largest peaks of the largest amplitude, in order of speed."""
+    """Return the points of the largest reachable peaks, in order of speed."""
     size = case.response.amplitude.values.max(axis=1)
     inner = np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] >= size[2:])) + 1
+    inner = inner[case.reachable[inner]]
     largest = inner[np.argsort(-size[inner])][:most]
     return sorted(int(index) for index in largest)
 
@@ -192,15 +220,16 @@ def sweep_figure(study: SteadyStudy) -> fig.Figure:
     )
     for load, color in colors.items():
         case = next(case for case in study.cases if case.load == load)
-        peak = case.response.amplitude.max("point")
-        sensor = str(peak.sensor.values[int(np.argmax(peak.values))])
-        values = case.response.amplitude.sel(sensor=sensor).values
-        speed = RPM_PER_RAD_S * float(case.response.speed.values[int(np.argmax(values))])
+        sizes, speeds = case.largest()
+        if np.isnan(sizes).all():
+            continue
+        at = int(np.argmax(sizes))
+        sensor, speed = str(case.response.sensor.values[at]), RPM_PER_RAD_S * float(speeds[at])
         chosen = study.sweeps.sel(load=load, gasket=case.gasket, sensor=sensor)
         for direction, dash, symbol in directions:
             one = chosen.sel(direction=direction)
             shift = RPM_PER_RAD_S * one.speed.values - speed
-            height = 100.0 * one.amplitude.values / values.max()
+            height = 100.0 * one.amplitude.values / sizes[at]
             for marks, y in ((shifts, shift), (heights, height)):
                 line = fig.Line(rate, y, color=color, dash=dash, symbol=symbol)
                 marks.append(replace(line, key=f"{load}, {sensor}, {direction}"))

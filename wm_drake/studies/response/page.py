@@ -1,17 +1,16 @@
 """What the study of the steady response shows: files, JSON, terminal and page."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-import xarray as xr
 
 from wm_drake.model.scene import Scene
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
-from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number, percent, plain
+from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, listed, number, percent, plain
 from wm_drake.report.page import Picture, Section, SectionedPage, picture
 from wm_drake.report.table import Column, Group, Row, Table, table_of
 from wm_drake.report.terminal import Printed
@@ -23,7 +22,7 @@ from wm_drake.studies.response.figures import (
     response_figure,
     sweep_figure,
 )
-from wm_drake.studies.response.study import SteadyCase, SteadyStudy
+from wm_drake.studies.response.study import BoolArray, SteadyCase, SteadyStudy
 from wm_drake.studies.study import Facts, Result
 
 DEG_PER_RAD = Unit("rad/s", "deg/s").from_si(1.0)
@@ -33,7 +32,9 @@ LEAST_SPIN = 0.05
 
 METHOD = (
     "The steady motion has the period of a drum revolution. Its stability follows from its Floquet "
-    "multipliers; where it is unstable, the machine moves otherwise than drawn. Telescopic dampers "
+    "multipliers. A machine moves in a motion that is stable and in which the tub does not touch "
+    "the housing. It leaves an unstable motion for another one, and the model has no forces of "
+    "contact. Telescopic dampers "
     "that spin about their axes make the motion vary slowly; then the values hold for dampers near "
     "the angle at which they are built."
 )
@@ -44,7 +45,7 @@ class Quantity(NamedTuple):
 
     Attributes:
         name: Name of the variable, and of its columns in a CSV file.
-        dim: Its dimension beside the points of the branch.
+        dim: Its dimension beside the points of the branch; "" for none.
         in_json: Name in JSON, with the unit.
         unit: Unit in names of columns.
         factor: Its factor from SI units.
@@ -64,6 +65,7 @@ QUANTITIES = (
     Quantity("gasket_moment", "axis", "gasket_moment_Nm", "Nm"),
     Quantity("spring_tension", "spring", "spring_tension_N"),
     Quantity("damper_tension", "damper", "damper_tension_N"),
+    Quantity("smallest_gap", "", "smallest_gap_mm", "mm", MM_PER_M),
     Quantity("damper_spin", "spinning", "damper_spin_deg_s", "deg_s", DEG_PER_RAD),
 )
 MOUNT_FORCES = tuple(Quantity(f"mount_force_{kind}", "mount", kind) for kind in KINDS)
@@ -94,7 +96,10 @@ class ResponseResult(Result):
 
     def terminal(self) -> Printed:
         """Return the largest amplitude of each sensor, and a summary."""
-        title = f"Largest steady amplitudes of machine '{self.study.parameters.name}', in mm"
+        title = (
+            f"Largest steady amplitudes of machine '{self.study.parameters.name}', in mm, stable "
+            "and without contact"
+        )
         return [largest_table(self.study).terminal(title), summary(self.study)]
 
     def page(self, facts: Facts) -> str:
@@ -104,7 +109,8 @@ class ResponseResult(Result):
         forces = picture(
             forces_figure(first),
             "Displacement of the box and gasket forces over the drum speed.",
-            f"Largest value of the axes, {_gasket(first[0])}.",
+            f"Largest value of the axes, {_gasket(first[0])}. A line has gaps where no steady "
+            "motion is stable and without contact.",
         )
         mounts = picture(
             mounts_figure(first),
@@ -150,14 +156,21 @@ def _case_as_json(case: SteadyCase) -> dict[str, Any]:
     }
 
 
-def _by_label(case: SteadyCase, quantities: Sequence[Quantity]) -> dict[str, dict[str, FloatArray]]:
+def _along_branch(case: SteadyCase, quantity: Quantity) -> dict[str, FloatArray]:
+    """Return a quantity along the branch by label; that of a quantity without any is ""."""
+    values = quantity.factor * case.response[quantity.name]
+    if not quantity.dim:
+        return {"": values.values}
+    labels = case.response[quantity.dim].values
+    return {str(label): values.sel({quantity.dim: label}).values for label in labels}
+
+
+def _by_label(case: SteadyCase, quantities: Sequence[Quantity]) -> dict[str, Any]:
     """Return quantities along the branch, by name in JSON and label."""
     return {
-        q.in_json: {
-            str(label): q.factor * case.response[q.name].sel({q.dim: label}).values
-            for label in case.response[q.dim].values
-        }
+        q.in_json: of_label if q.dim else of_label[""]
         for q in quantities
+        for of_label in [_along_branch(case, q)]
     }
 
 
@@ -185,39 +198,85 @@ def _gasket(case: SteadyCase) -> str:
 
 
 def summary(study: SteadyStudy) -> str:
-    """Return one paragraph about the largest amplitude and about stability."""
-    case = max(study.cases, key=lambda case: float(case.response.amplitude.max()))
-    values = case.response.amplitude.values
-    point, sensor = np.unravel_index(int(np.argmax(values)), values.shape)
-    rpm = RPM_PER_RAD_S * float(case.response.speed.values[point])
-    speeds = RPM_PER_RAD_S * case.response.speed.values
-    unstable = [c for c in study.cases if not c.response.stable.values.all()]
+    """Return one paragraph: what can be reached, where the tub touches, what is unstable."""
+    speeds = RPM_PER_RAD_S * np.concatenate([case.response.speed.values for case in study.cases])
     folded = [c for c in study.cases if np.any(np.diff(c.response.speed.values) < 0.0)]
     count = len(study.cases)
-    return " ".join(
-        [
-            f"{count} steady response{'s' if count > 1 else ''} from {number(speeds.min(), 0)} to "
-            f"{number(speeds.max(), 0)} rpm, by harmonic balance of the forces of all elements.",
-            f"The largest amplitude is {number(MM_PER_M * values[point, sensor])} mm at sensor "
-            f"{case.response.sensor.values[sensor]} with load {case.load}, {_gasket(case)}, at "
-            f"{number(rpm, 0)} rpm.",
-            "All motions are stable."
-            if not unstable
-            else f"{len(unstable)} of them have speeds without a stable motion of the drum's "
-            "period on the branch.",
-            "No branch folds back." if not folded else f"{len(folded)} fold back, with jumps.",
-        ]
+    sentences = [
+        *(_reachable_sentence(cases) for cases in _by_gasket(study)),
+        *(_contact_sentence(case) for case in study.cases if (case.stable & case.touches).any()),
+        _unstable_sentence(study),
+        f"{count} steady response{'s' if count > 1 else ''} from {number(speeds.min(), 0)} to "
+        f"{number(speeds.max(), 0)} rpm, by harmonic balance of the forces of all elements.",
+        "No branch folds back." if not folded else f"{len(folded)} fold back, with jumps.",
+    ]
+    return " ".join(sentences)
+
+
+def _by_gasket(study: SteadyStudy) -> list[list[SteadyCase]]:
+    """Return the cases with the gasket, then those without it, as far as there are any."""
+    of_kind = ([c for c in study.cases if c.gasket is kind] for kind in (True, False))
+    return [cases for cases in of_kind if cases]
+
+
+def _reachable_sentence(cases: Sequence[SteadyCase]) -> str:
+    """Return the largest amplitude of cases that a machine reaches."""
+    known = [case for case in cases if case.reachable.any()]
+    where = _gasket(cases[0]).capitalize()
+    if not known:
+        return f"{where} no steady motion is stable and without contact."
+    case = max(known, key=lambda case: float(case.largest()[0].max()))
+    size, speed = case.largest()
+    sensor = int(np.argmax(size))
+    return (
+        f"{where} the largest steady amplitude that is stable and without contact is "
+        f"{number(MM_PER_M * size[sensor])} mm at sensor {case.response.sensor.values[sensor]} "
+        f"with load {case.load}, at {number(RPM_PER_RAD_S * speed[sensor], 0)} rpm."
     )
 
 
+def _contact_sentence(case: SteadyCase) -> str:
+    """Return at which speeds the tub touches the housing in stable motions of a case."""
+    inside = case.stable & case.touches
+    depth = -MM_PER_M * float(case.response.smallest_gap.values[inside].min())
+    return (
+        f"With load {case.load}, {_gasket(case)}, the tub touches the housing at "
+        f"{_speeds(case, inside)}, with an overlap of up to {number(depth)} mm."
+    )
+
+
+def _unstable_sentence(study: SteadyStudy) -> str:
+    """Return which branches are unstable, where, and how large their motions are."""
+    unstable = [case for case in study.cases if not case.stable.all()]
+    if not unstable:
+        return "All motions are stable."
+    texts = []
+    for case in unstable:
+        at = _speeds(case, ~case.stable)
+        size = MM_PER_M * float(case.response.amplitude.values[~case.stable].max())
+        texts.append(f"load {case.load}, {_gasket(case)}, at {at}, up to {number(size)} mm")
+    return f"Unstable motions, which a machine leaves for another motion: {'; '.join(texts)}."
+
+
+def _speeds(case: SteadyCase, which: BoolArray) -> str:
+    """Return the speeds of some points of a branch in words, such as "60 to 70 and 82 rpm"."""
+    rpm = [number(value, 0) for value in RPM_PER_RAD_S * case.response.speed.values]
+    changes = np.flatnonzero(np.diff(np.pad(which, 1).astype(int)))
+    ranges = []
+    for begin, end in zip(changes[::2], changes[1::2] - 1, strict=True):
+        ends = dict.fromkeys([rpm[begin], rpm[end]])
+        ranges.append(" to ".join(ends))
+    return f"{listed(ranges)} rpm"
+
+
 def largest_table(study: SteadyStudy) -> Table:
-    """Return the largest amplitude of each sensor, and the speed of the largest of all."""
+    """Return the largest reachable amplitude of each sensor, and the speed of the largest."""
     rows = []
     for case in study.cases:
-        largest = MM_PER_M * case.response.amplitude.values
-        place = int(largest.max(axis=1).argmax())
-        speed = RPM_PER_RAD_S * float(case.response.speed.values[place])
-        rows.append((case.load, "yes" if case.gasket else "no", *largest.max(axis=0), speed))
+        size, speed = case.largest()
+        at = int(np.nan_to_num(size).argmax())
+        gasket = "yes" if case.gasket else "no"
+        rows.append((case.load, gasket, *(MM_PER_M * size), RPM_PER_RAD_S * speed[at]))
     sensors = list(map(str, study.cases[0].response.sensor.values))
     columns = {name: Column(name, decimals=1) for name in sensors} | {"rpm": Column("rpm", "", 0)}
     return table_of(pd.DataFrame(rows, columns=["load", "gasket", *columns]), columns=columns)
@@ -259,16 +318,15 @@ def spin_per_revolution(case: SteadyCase) -> FloatArray:
 def _peaks_table(study: SteadyStudy) -> Table:
     groups = []
     for case in study.cases:
-        steady = case.response.amplitude.max("point")
-        at = case.response.amplitude.argmax("point")
+        steady, speed = case.largest()
         rows = [
             _row("steady, mm", MM_PER_M * steady, 1, "ours"),
-            _row("at, rpm", RPM_PER_RAD_S * case.response.speed[at.values], 0),
+            _row("at, rpm", RPM_PER_RAD_S * speed, 0),
         ]
         if case.run_up is not None:
             size = np.maximum(np.abs(case.run_up.upper), np.abs(case.run_up.lower))
             run = size.max("time")
-            changes = map(percent, 100.0 * (run.values / steady.values - 1.0))
+            changes = map(percent, 100.0 * (run.values / steady - 1.0))
             rows += [
                 _row("run, mm", MM_PER_M * run, 1),
                 _row("at, rpm", RPM_PER_RAD_S * case.run_up.speed[size.argmax("time").values], 0),
@@ -277,19 +335,21 @@ def _peaks_table(study: SteadyStudy) -> Table:
         groups.append(Group(f"{case.load}, {_gasket(case)}", tuple(rows)))
     sensors = [str(name) for name in study.cases[0].response.sensor.values]
     caption = (
-        "Largest amplitude at each sensor and its speed: steady motion, and the run over the spin "
-        "profile of the machine, whose displacements are band-passed as by the command spin."
+        "Largest amplitude at each sensor and its speed: steady motion, stable and without "
+        "contact, and the run over the spin profile of the machine at the speeds of the response, "
+        "whose displacements are band-passed as by the command spin."
     )
     return Table(caption, ("load", "", *sensors), tuple(groups), text_columns=2)
 
 
-def _row(words: str, values: xr.DataArray, decimals: int, kind: str = "") -> Row:
+def _row(words: str, values: Iterable[float], decimals: int, kind: str = "") -> Row:
     return Row((words, *(number(float(value), decimals) for value in values)), kind)
 
 
 def _response_picture(load: str, cases: list[SteadyCase]) -> Picture:
     caption = (
-        f"Load {load}: largest deviation from the mean at each sensor over the drum speed. Dashed: "
+        f"Load {load}: largest deviation from the mean at each sensor over the drum speed. Pale: "
+        "the tub touches the housing. Dotted: unstable; larger motions are cut off. Dashed: "
         "envelope of the run over the spin profile of the machine, while its speed rises."
     )
     return picture(response_figure(cases), f"Amplitudes of load {load} over the speed.", caption)
@@ -320,10 +380,10 @@ def response_frame(study: SteadyStudy) -> pd.DataFrame:
             "stable": response.stable.values,
             "largest_multiplier": response.multiplier.values,
         }
-        every = (*QUANTITIES, *MOUNT_FORCES)
-        for quantity, by_label in zip(every, _by_label(case, every).values(), strict=True):
-            for label, values in by_label.items():
-                columns[f"{quantity.name}_{label}_{quantity.unit}"] = values
+        for quantity in (*QUANTITIES, *MOUNT_FORCES):
+            for label, values in _along_branch(case, quantity).items():
+                name = "_".join(filter(None, [quantity.name, label, quantity.unit]))
+                columns[name] = values
         parts.append(pd.DataFrame(columns))
     return pd.concat(parts, ignore_index=True)
 

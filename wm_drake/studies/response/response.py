@@ -13,6 +13,7 @@ from wm_drake.engines.trajectory import COORDINATES, Trajectory
 from wm_drake.errors import input_error
 from wm_drake.model.build import AnyMachine, machine_of
 from wm_drake.model.machine import Setup
+from wm_drake.model.scene import Scene
 from wm_drake.parameters import Load, SpinProfile
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.mounts import KINDS, force_measures, mount_names
@@ -39,6 +40,7 @@ DECLARED = {
         "N",
         "RMS without the mean of the force on the cabinet in a revolution",
     ),
+    "smallest_gap": ("", "m", "smallest gap between tub and housing in a revolution"),
     "first_harmonic": ("coordinate part", "rad, m", "first harmonic of the pose of the tub"),
     "damper_spin": ("spinning", "rad/s", "mean rate of a damper about its axis"),
 }
@@ -78,8 +80,10 @@ def steady_response(
         largest absolute values as in `Measures`; `spring_tension`, `damper_tension` are half the
         range of a revolution; `mount_force_peak`, `mount_force_rms`, `mount_force_dynamic_rms`
         (mount) are largest size, RMS, and RMS without the mean, of the force of a mount on the
-        cabinet in a revolution; `first_harmonic` (coordinate, part) is the tub's pose;
-        `damper_spin` (spinning) is the mean rate of telescopic dampers about their axes. SI.
+        cabinet in a revolution; `smallest_gap` is that between tub and housing in a revolution (0
+        or less: they touch; NaN without shapes to measure); `first_harmonic` (coordinate, part) is
+        the tub's pose; `damper_spin` (spinning) is the mean rate of telescopic dampers about their
+        axes. SI.
         Where a damper spins, the motion is periodic only as long as it turns little: the values
         hold for tubes near the angle at which they are built, and vary as they turn.
 
@@ -175,8 +179,8 @@ def trajectory_of_period(
 
 def _measured(setup: Setup, balance: HarmonicBalance, points: list[Point]) -> xr.Dataset:
     """Return the dataset of `steady_response`."""
-    samples = balance.series.samples
-    variables = variables_of(setup, _joined(balance, points))
+    samples, motions = balance.series.samples, _joined(balance, points)
+    variables = variables_of(setup, motions)
 
     def by_point(name: str) -> FloatArray:
         values = variables[name][1]
@@ -192,6 +196,7 @@ def _measured(setup: Setup, balance: HarmonicBalance, points: list[Point]) -> xr
         "spring_tension": 0.5 * np.ptp(by_point("spring_tension"), axis=1),
         "damper_tension": 0.5 * np.ptp(by_point("damper_tension"), axis=1),
         **{f"mount_force_{kind}": np.stack(of) for kind, of in zip(KINDS, of_mounts, strict=True)},
+        "smallest_gap": _smallest_gaps(setup, motions, len(points)),
         "first_harmonic": np.stack([point.coefficients[1:3, :6].T for point in points]),
         "damper_spin": np.stack([point.spins for point in points]),
     }
@@ -232,6 +237,18 @@ def _joined(balance: HarmonicBalance, points: list[Point]) -> Trajectory:
         for name in (*names, "stretches", "element_states")
     }
     return Trajectory(**parts)
+
+
+def _smallest_gaps(setup: Setup, motions: Trajectory, count: int) -> FloatArray:
+    """Return the smallest gap in each of the revolutions (count,); NaN without shapes. [m]"""
+    scene = Scene(setup.parameters)
+    gaps = (
+        scene.smallest_gap(time, poses, np.asarray(setup.rest_pose))
+        for time, poses in zip(
+            np.split(motions.time, count), np.split(motions.state[:, :6], count), strict=True
+        )
+    )
+    return np.array([np.nan if gap is None else gap.distance for gap in gaps])
 
 
 def _largest_of_gasket(setup: Setup, values: FloatArray) -> FloatArray:

@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 import xarray as xr
@@ -34,6 +35,8 @@ RESPONSE_SHARE, RUN_SHARE = 1.0, 3.0
 
 RAD_S_PER_RPM = np.pi / 30.0
 
+BoolArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+
 
 @dataclass(frozen=True)
 class SteadyCase:
@@ -43,8 +46,9 @@ class SteadyCase:
         load: Name of the load.
         gasket: Whether the gasket is in place.
         response: As `steady_response` returns it.
-        run_up: Speed and upper and lower envelope of the run over the machine's spin profile:
-            dataset over time with `speed`, `upper` and `lower` (time, sensor). SI
+        run_up: Speed and upper and lower envelope of the run over the machine's spin profile, at
+            the speeds of the response: dataset over time with `speed`, `upper` and `lower` (time,
+            sensor). SI
         wall_s: Time that the response took.
     """
 
@@ -53,6 +57,33 @@ class SteadyCase:
     response: xr.Dataset
     run_up: xr.Dataset | None
     wall_s: float
+
+    @property
+    def stable(self) -> BoolArray:
+        """Whether each motion of the branch attracts its neighbours. (points,)"""
+        return np.asarray(self.response.stable.values, dtype=bool)
+
+    @property
+    def touches(self) -> BoolArray:
+        """Whether the tub touches the housing in each motion of the branch. (points,)"""
+        return np.asarray(self.response.smallest_gap.values <= 0.0)  # false for NaN
+
+    @property
+    def reachable(self) -> BoolArray:
+        """Whether a machine moves so: in a stable motion without contact. (points,)"""
+        return self.stable & ~self.touches
+
+    def largest(self) -> tuple[FloatArray, FloatArray]:
+        """Return the largest reachable amplitude of each sensor [m], and its speed [rad/s].
+
+        Both are NaN if no motion is reachable.
+        """
+        values = np.where(self.reachable[:, None], self.response.amplitude.values, -np.inf)
+        at = values.argmax(axis=0)
+        size = values[at, np.arange(values.shape[1])]
+        none = np.isinf(size)
+        speed = self.response.speed.values[at]
+        return np.where(none, np.nan, size), np.where(none, np.nan, speed)
 
 
 @dataclass(frozen=True)
@@ -141,7 +172,7 @@ def run_steady_study(
             pool.shutdown(wait=True, cancel_futures=True)
             raise
     cases = [
-        SteadyCase(name, gasket, response, _envelopes(run), wall)
+        SteadyCase(name, gasket, response, _envelopes(run, settings.speeds), wall)
         for (name, _, gasket), (response, wall), run in zip(pairs, responses, runs, strict=True)
     ]
     return SteadyStudy(machine.parameters, cases, sweeps, time.perf_counter() - begin)
@@ -175,13 +206,18 @@ def _records(machine: Machine, cases: list[Case], workers: int | None) -> list[R
     return [records[index] for index in range(len(cases))]
 
 
-def _envelopes(record: Record | None) -> xr.Dataset | None:
+def _envelopes(record: Record | None, speeds: FloatArray) -> xr.Dataset | None:
+    """Return the `run_up` of a `SteadyCase`; None without samples at these speeds."""
     if record is None:
         return None
     edges = envelopes(record)
     if np.isnan(edges.upper.values).all():
         return None
-    return edges.assign(speed=("time", record.drum_speed.values))
+    speed = record.drum_speed.values
+    inside = (speed >= speeds.min()) & (speed <= speeds.max())
+    if not inside.any():
+        return None
+    return edges.assign(speed=("time", speed)).isel(time=inside)
 
 
 def sweep_profile(first: float, last: float, rate: float) -> SpinProfile:

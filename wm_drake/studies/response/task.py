@@ -33,7 +33,7 @@ class ResponseTask(Task):
         """Return the speeds that the options select. [rad/s]"""
         speed, high = Unit("rad/s", "rpm"), self.options.high
         first = quantities_of(self.options.low, speed, "--from")[0]
-        last = max(self.machine.parameters.profile.speed)
+        last = self.machine.parameters.profile.highest_speed
         if high is not None:
             last = quantities_of(high, speed, "--to")[0]
         if not 0.0 < first < last:

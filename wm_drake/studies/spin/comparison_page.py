@@ -89,10 +89,10 @@ class SpinComparisonResult(Result):
         """Return the amplitudes, the effect of the gasket, and the smallest gaps."""
         amplitudes = self.tables()["amplitudes"]
         gaps = [
-            f"{variant.name}, {case.case.name}: {text}"
+            f"{variant.name}, {case.case.name}: smallest gap {text}"
             for variant in self.variants
             for case in variant.result.results
-            if (text := tables.gap_text(case))
+            if (text := case.gap_text)
         ]
         title = "Displacement amplitudes, in mm"
         shown: list[Any] = [tables.amplitude_lines(title, amplitudes), *gaps]
@@ -428,8 +428,8 @@ def facts_of_comparison(variants: Sequence[Variant], made: Facts) -> list[tuple[
     facts = []
     for variant in variants:
         machine = variant.result.parameters
-        step = f"step {1e3 * variant.result.step:g} ms"
-        facts.append((variant.name, f"{machine.about} {step.capitalize()}.".strip()))
+        how = variant.result.stepping_text
+        facts.append((variant.name, f"{machine.about} Integration: {how}.".strip()))
     versions = versions_of(first.results[0].record.attrs)
     made = replace(made, step=0.0)  # the lines of the variants have it
     return [*facts, ("Engine", first.engine), ("Versions", versions), *made.rows()]

@@ -200,7 +200,8 @@ def summary(result: SpinRuns, table: pd.DataFrame) -> str:
     ended = [case for case in result.results if not case.record.attrs["diverged"]]
     count, diverged = len(result.results), len(result.results) - len(ended)
     cases = "1 case was" if count == 1 else f"{count} cases were"
-    speed = number(RPM_PER_RAD_S * max(max(case.case.profile.speed) for case in result.results), 0)
+    fastest = max(case.case.profile.highest_speed for case in result.results)
+    speed = number(RPM_PER_RAD_S * fastest, 0)
     opening = f"{cases} run with the {result.engine} engine, at drum speeds up to {speed} rpm."
     if not ended:
         return f"{opening} Every run diverged, so there is no result to summarize."
@@ -344,7 +345,7 @@ def facts_of_run(result: SpinRuns, made: Facts) -> list[tuple[str, str]]:
     return [
         ("Machine", result.parameters.name),
         ("SDF model", Path(result.parameters.model).name),
-        ("Engine", f"{result.engine}, step {1e3 * result.step:g} ms"),
+        ("Engine", f"{result.engine}, {result.stepping_text}"),
         ("Versions", versions_of(attrs)),
         ("Computing time", "; ".join(times)),
         *replace(made, step=0.0).rows(),  # the line of the engine has the step

@@ -21,11 +21,11 @@ from wm_drake.model.machine import Machine
 from wm_drake.model.scene import Scene
 from wm_drake.parameters import MachineParameters, Sensor
 from wm_drake.parameters.measured import measured_notes
-from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number
+from wm_drake.report.formatting import MS_PER_S, RPM_PER_RAD_S, gap_size, number
 from wm_drake.simulation.cases import Case, is_as_measured, notice_jumping_friction
 from wm_drake.simulation.displacements import band_of, largest_motion
 from wm_drake.simulation.measures import Measures, measure
-from wm_drake.simulation.records import Record, save_record
+from wm_drake.simulation.records import Record, sample_period, save_record
 from wm_drake.simulation.runs import DEFAULT_ENGINE, DivergenceWarning, simulate
 from wm_drake.simulation.steps import checked_integrator, checked_step
 from wm_drake.studies.spin.processes import can_start_processes, map_in_processes
@@ -58,12 +58,22 @@ class CaseResult:
 
     @property
     def gap_text(self) -> str:
-        """Smallest gap, its parts and the drum speed there; "" without one."""
+        """Smallest gap, its parts, and drum speed and time there; "" without one."""
         gap = self.measures.smallest_gap
         if gap is None:
             return ""
-        size, speed = number(MM_PER_M * gap.distance), number(self.speed_rpm(gap.time), 0)
-        return f"{size} mm between {gap.parts}, at {speed} rpm"
+        at = f"{number(self.speed_rpm(gap.time), 0)} rpm ({number(gap.time, 2)} s)"
+        return f"{gap_size(gap.distance)} between {gap.parts}, at {at}"
+
+    @property
+    def stepping_text(self) -> str:
+        """Integrator and step that the run used, and the time between its samples."""
+        how = self.record.attrs
+        step = f"{how['step_s'] * MS_PER_S:g} ms"
+        words = f"steps of up to {step} with controlled error"
+        if "integrator" in how:
+            words = f"{how['integrator']}, steps of {step}"
+        return f"{words}, samples every {sample_period(self.record) * MS_PER_S:g} ms"
 
     def speed_rpm(self, time: float) -> float:
         """Return the drum speed at a time. [rpm]"""
@@ -120,7 +130,6 @@ class SpinRuns:
 
     parameters: MachineParameters
     engine: str
-    step: float
     results: tuple[CaseResult, ...]
     comparison: Comparison = Comparison.AS_MEASURED
     modes: "NaturalModes | None" = None
@@ -131,6 +140,11 @@ class SpinRuns:
         if self.comparison is not Comparison.AS_MEASURED:
             return self.comparison is Comparison.ALL
         return is_as_measured(self.parameters, result.case)
+
+    @property
+    def stepping_text(self) -> str:
+        """How the cases were integrated and sampled, each way once."""
+        return "; ".join(dict.fromkeys(case.stepping_text for case in self.results))
 
     def sensors_of(self, case: CaseResult) -> dict[str, Sensor]:
         """Return the displacement sensors of the machine that a case was run with."""
@@ -228,7 +242,7 @@ def run_spin(
             for index, item in enumerate(work_items)
         ]
     natural = _modes_of(built, cases[0]) if modes else None
-    return SpinRuns(parameters, engine, step, tuple(results), comparison, natural)
+    return SpinRuns(parameters, engine, tuple(results), comparison, natural)
 
 
 def _modes_of(machine: Machine, case: Case) -> "NaturalModes | None":

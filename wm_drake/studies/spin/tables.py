@@ -11,7 +11,6 @@ import xarray as xr
 
 from wm_drake.parameters import MachineParameters, measured_amplitudes, quantities
 from wm_drake.parameters.measured import BAND, EXPERIMENT
-from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number, percent, shape_name
 from wm_drake.report.table import (
     MOST_SHOWN,
@@ -390,7 +389,8 @@ def amplitude_lines(title: str, amplitudes: pd.DataFrame) -> "TerminalTable":
 
 def case_lines(parameters: MachineParameters, case: CaseResult) -> list[str]:
     """Return a line for each measure of a case beside its amplitudes."""
-    measures, lines = case.measures, [gap_text(case)]
+    measures, gap = case.measures, case.gap_text
+    lines = [f"smallest gap {gap}"] if gap else []
     tensions = measures.smallest_tension
     shown = zip(tensions.spring.values, tensions.values, strict=True)
     words = ", ".join(f"{name} {tension:.1f} N" for name, tension in shown)
@@ -408,17 +408,7 @@ def case_lines(parameters: MachineParameters, case: CaseResult) -> list[str]:
     if (walk := measures.walk) is not None:
         turn = math.degrees(walk.turn)
         lines.append(f"the cabinet walks {1e3 * walk.distance:.1f} mm and turns by {turn:.1f} deg")
-    return [f"{case.case.name}: {line}" for line in lines if line]
-
-
-def gap_text(case: CaseResult) -> str:
-    """Return the smallest gap of a case as text; "" if there is none."""
-    gap = case.measures.smallest_gap
-    if not gap:
-        return ""
-    distance = Unit("m", "mm").from_si(gap.distance)
-    parts = f"{gap.moving} and {gap.fixed}"
-    return f"smallest gap {distance:.1f} mm between {parts}, at {gap.time:.2f} s"
+    return [f"{case.case.name}: {line}" for line in lines]
 
 
 def _drive_text(measures: Measures) -> str:

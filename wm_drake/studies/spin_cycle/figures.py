@@ -17,7 +17,7 @@ WHITE_TEXT_FROM = 0.55
 
 def profile_figure(profile: SpinProfile) -> fig.Figure:
     """Return the drum speed over time, with shaded and named regions."""
-    top = RPM_PER_RAD_S * max(profile.speed)
+    top = RPM_PER_RAD_S * profile.highest_speed
     marks: list[fig.Mark] = []
     for index, region in enumerate(profile.regions):
         marks.append(fig.Span(region.begin, region.end, opacity=0.16 if index % 2 else 0.07))

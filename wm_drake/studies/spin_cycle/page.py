@@ -8,7 +8,15 @@ import numpy as np
 import pandas as pd
 
 from wm_drake.parameters.unbalance_cases import UnbalanceCase
-from wm_drake.report.formatting import MM_PER_M, number, plain, slack_warning
+from wm_drake.report.formatting import (
+    MM_PER_M,
+    MS_PER_S,
+    gap_size,
+    listed,
+    number,
+    plain,
+    slack_warning,
+)
 from wm_drake.report.page import Picture, Section, SectionedPage, picture
 from wm_drake.report.terminal import Printed
 from wm_drake.simulation.measures.as_json import as_json
@@ -22,6 +30,7 @@ from wm_drake.studies.spin_cycle.study import (
     disagreement,
     largest,
     mean_and_deviation,
+    missing_regions,
     region_errors,
 )
 from wm_drake.studies.study import Facts, Result
@@ -73,6 +82,7 @@ class SpinCycleReport(Result):
                 "by_region_mean": mean,
                 "by_region_deviation": deviation,
                 "by_case_average": average_errors(result.displacement, result.measured),
+                "missing_regions": missing_regions(result.displacement, result.measured),
             }
         return plain(shown)
 
@@ -80,6 +90,10 @@ class SpinCycleReport(Result):
         """Return the table of the cases."""
         title = f"Spin cycle of machine '{self.result.parameters.name}'"
         return [tables.cases(self.result).terminal(title)]
+
+    def warnings(self) -> list[str]:
+        """Return a warning of the regions that the errors leave out, if there are any."""
+        return _missing(self.result)
 
     def failures(self) -> list[str]:
         """Return a line for each case that diverged."""
@@ -117,6 +131,12 @@ class SpinCycleReport(Result):
             result.parameters,
             [*facts.warnings, *warnings_of(result)],
         ).html()
+
+
+def _missing(result: SpinCycleResult) -> list[str]:
+    if result.measured is None:
+        return []
+    return tables.missing_warnings(result.displacement, result.measured)
 
 
 def _case_as_json(result: SpinCycleResult, case: UnbalanceCase, diverged: str) -> dict[str, Any]:
@@ -157,7 +177,7 @@ def summary(result: SpinCycleResult, engine: str) -> str:
         nearest = str(gaps.case.values[int(np.argmin(gaps.values))])
         sentences.append(
             "The smallest gap between tub and housing is "
-            f"{number(MM_PER_M * float(gaps.min()))} mm, in case {nearest} "
+            f"{gap_size(float(gaps.min()))}, in case {nearest} "
             f"({case_description(_case(result, nearest))})."
         )
     apart = float(disagreement(result).max(skipna=True))
@@ -174,10 +194,12 @@ def summary(result: SpinCycleResult, engine: str) -> str:
             number(100.0 * float(value))
             for value in (errors.mean(skipna=True), errors.std(skipna=True))
         )
+        missing = missing_regions(result.displacement, result.measured)
+        without = f" without {listed(list(missing))}" if missing else ""
         sentences.append(
-            f"Compared with the measurement, the average error is {mean} %, with a standard "
-            f"deviation of {deviation} % over the cases. ([A] reports 20.1 % and 4.1 % for its own "
-            "model and machine.)"
+            f"Compared with the measurement{without}, the average error is {mean} %, with a "
+            f"standard deviation of {deviation} % over the cases. ([A] reports 20.1 % and 4.1 % "
+            "for its own model and machine.)"
         )
     return " ".join(sentences)
 
@@ -217,6 +239,7 @@ def warnings_of(result: SpinCycleResult) -> list[str]:
         for case, text in zip(result.cases, result.diverged, strict=True)
         if text
     ]
+    texts += _missing(result)
     gaps = result.smallest_gap
     touching = list(map(str, gaps.case.values[gaps.values <= 0.0]))
     if touching:
@@ -233,7 +256,7 @@ def warnings_of(result: SpinCycleResult) -> list[str]:
         texts.append(
             "In at least one region, the RMS displacements from integrated acceleration differ by "
             f"{number(100 * apart, 1)} % from the direct ones. The motion there is too small for "
-            "the integration, or too fast for a sampling interval of 5 ms."
+            f"the integration, or too fast for a sampling interval of {_sample_period(result)}."
         )
     faults = result.parameters.imperfections
     if faults.residual_imbalance.mass > 0.0:
@@ -253,6 +276,12 @@ def warnings_of(result: SpinCycleResult) -> list[str]:
             f"{number(radial, 0)} N/mm and the tilting stiffness {number(tilting, 0)} N m/rad."
         )
     return texts
+
+
+def _sample_period(result: SpinCycleResult) -> str:
+    """Return the time between the samples of a run."""
+    period = result.profile.sample_period(result.parameters.output_period)
+    return f"{MS_PER_S * period:g} ms"
 
 
 def _case(result: SpinCycleResult, name: str) -> UnbalanceCase:
@@ -316,7 +345,7 @@ def _facts(result: SpinCycleResult, engine: str, facts: Facts) -> list[tuple[str
         (
             "Displacement",
             "from the rest position, with a high-pass filter of 0.5 Hz; RMS over all samples of a "
-            "region, one every 5 ms",
+            f"region, one every {_sample_period(result)}",
         ),
         *facts.rows(),
     ]

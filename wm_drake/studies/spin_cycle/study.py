@@ -193,6 +193,23 @@ def average_errors(computed: xr.DataArray, measured: xr.DataArray) -> xr.DataArr
     return xr.DataArray(single, computed.coords, computed.dims).mean(DIMS[1:], skipna=True)
 
 
+def missing_regions(computed: xr.DataArray, measured: xr.DataArray) -> dict[str, list[str]]:
+    """Return the measured cases whose errors leave a region out, by the name of the region.
+
+    They have no value there that is both computed and measured.
+    """
+    is_measured = measured.notnull()
+    compared = (is_measured & computed.notnull()).any(DIMS[2:])
+    left_out = ~compared & is_measured.any(DIMS[1:])
+    cases = {
+        str(region): [str(case) for case in left_out.case.values[of_region]]
+        for region, of_region in zip(
+            left_out.region.values, left_out.transpose("region", "case").values, strict=True
+        )
+    }
+    return {region: of_region for region, of_region in cases.items() if of_region}
+
+
 def mean_and_deviation(errors: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
     """Return mean and standard deviation of errors over the cases.
 

@@ -11,12 +11,14 @@ from wm_drake.report.formatting import MISSING, MM_PER_M, RPM_PER_RAD_S, number
 from wm_drake.report.table import Column, Columns, Table, line, table_of
 from wm_drake.simulation.feet import MARGINS
 from wm_drake.simulation.measures.as_json import as_json
+from wm_drake.simulation.vibration import MOST_MISSING
 from wm_drake.studies.spin_cycle.study import (
     SpinCycleResult,
     average_errors,
     disagreement,
     largest,
     mean_and_deviation,
+    missing_regions,
     region_errors,
 )
 
@@ -128,6 +130,19 @@ def regions(result: SpinCycleResult) -> Table:
             "(9); mean and standard deviation over the cases."
         )
     return Table(caption, columns, tuple(groups))
+
+
+def missing_warnings(computed: xr.DataArray, measured: xr.DataArray) -> list[str]:
+    """Return a warning of the regions that the errors leave out, or none."""
+    missing = missing_regions(computed, measured)
+    if not missing:
+        return []
+    parts = [f"{region} in case {', '.join(cases)}" for region, cases in missing.items()]
+    return [
+        f"The errors leave regions out, which have no measured value or were not completed by the "
+        f"run: {'; '.join(parts)}. A record counts for a region if at most "
+        f"{number(100.0 * MOST_MISSING, 0)} % of it is missing at its end."
+    ]
 
 
 def displacements(result: SpinCycleResult, case: str, title: str) -> Table:

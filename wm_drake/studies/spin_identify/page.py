@@ -20,6 +20,7 @@ from wm_drake.studies.spin_cycle.figures import bars_figure, profile_figure
 from wm_drake.studies.spin_cycle.measured import rms_table
 from wm_drake.studies.spin_cycle.page import case_description
 from wm_drake.studies.spin_cycle.study import average_errors, region_errors
+from wm_drake.studies.spin_cycle.tables import missing_warnings
 from wm_drake.studies.spin_identify.study import KNOWN, SpinIdentification, identified_machine
 from wm_drake.studies.study import Facts, Result
 
@@ -165,6 +166,7 @@ def judged(result: SpinIdentification) -> str:
 def warnings_of(result: SpinIdentification) -> list[str]:
     """Return a warning for a fit that is not good and for each search that ended at a bound."""
     warnings = [] if result.verdict == "good" else [judged(result)]
+    warnings += missing_warnings(result.after, result.measured)
     return warnings + [
         f"The search for {e.name} ended at its {e.at_bound} bound. Widen the range, or check "
         "whether the model is right."
