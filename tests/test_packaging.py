@@ -134,7 +134,7 @@ wm-drake study response --quick --load middle --out response
 wm-drake study spin-cycle --quick --profile eight_regions.yaml --out spin_cycle
 wm-drake study spin-identify --quick --case 2 --unknown 'gasket.stiffness_y=(1, 4) N/mm' --profile short_cycle.yaml --out spin_identify
 wm-drake study tolerance laundry --samples 32 --subset 0 --profile short_cycle.yaml --out tolerance
-wm-drake studio --no-browser --quiet & sleep 5; kill -INT $!; wait $! || test $? = 130
+wm-drake studio --no-browser > studio.txt & until grep -q http studio.txt; do kill -0 $!; sleep 1; done; kill $!; wait $! || test $? = 143
 """  # fmt: skip
 
 
