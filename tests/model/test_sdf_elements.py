@@ -14,10 +14,10 @@ from wm_drake.model.bodies import SDF_FOLDER
 from wm_drake.model.sdf_elements import (
     SHAPES,
     Choice,
+    Empty,
     Kind,
     Limit,
     Name,
-    Empty,
     Numbers,
     Pose,
     Refused,
