@@ -20,10 +20,14 @@ from wm_drake.studies.inputs import changed_parameters
 def test_set_takes_percents_and_distances(key, text, factor, distance):
     machine = wm.load_machine("reference")
     changed = number_at(changed_parameters(machine, [f"{key}={text}"]), key).nominal
-    if key.startswith("bodies"):  # only the SDF has it
-        assert changed > 1.0
+    if key.startswith(("bodies", "frames")):  # only the SDF has it
+        plant = wm.build_machine(machine).plant
+        point = plant.GetFrameByName("detergent_point").GetFixedPoseInBodyFrame().translation()
+        in_sdf = {"bodies": plant.GetBodyByName("drum").default_mass(), "frames": point[0]}
+        before = in_sdf[key.partition(".")[0]]
     else:
-        assert changed == pytest.approx(factor * number_at(machine, key).nominal + distance)
+        before = number_at(machine, key).nominal
+    assert changed == pytest.approx(factor * before + distance)
 
 
 def test_percent_of_zero_is_refused_in_set():
