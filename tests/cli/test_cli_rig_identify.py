@@ -15,19 +15,25 @@ from wm_drake.parameters import load_component, load_machine
 COULOMB = "law: coulomb\nfriction_force: 60 N\n"
 KINDS = (("", "N/mm"), ("rotational_", "N mm/rad"))
 ONE_LOOP = {
-    "component", "wall_s", "frequency_hz", "amplitude_mm", "peak_force_N", "energy_per_cycle_J",
-    "equivalent_damping_Ns_per_m", "dynamic_stiffness_N_per_m", "loss_angle_deg",
+    "frequency_Hz", "amplitude_mm", "peak_force_N", "energy_per_cycle_mJ",
+    "equivalent_damping_Ns_per_mm", "dynamic_stiffness_N_per_mm", "loss_angle_deg",
 }  # fmt: skip
+
+
+def loop_of(ended):
+    """Return what the JSON of a command says of its one loop."""
+    (loop,) = json.loads(ended.out)["measures"]
+    return loop
 
 
 def test_one_loop_as_json(wm_drake):
     Path("coulomb.yaml").write_text(COULOMB)
     ended = wm_drake("rig damper --component coulomb.yaml -f '3 Hz' -a '5 mm' --json")
     assert ended.code == 0
-    (line,) = ended.out.splitlines()
-    loop = json.loads(line)
+    assert len(ended.out.splitlines()) == 1
+    loop = loop_of(ended)
     assert set(loop) == ONE_LOOP
-    assert loop["energy_per_cycle_J"] == pytest.approx(4.0 * 60.0 * 5e-3, rel=1e-4)
+    assert loop["energy_per_cycle_mJ"] == pytest.approx(4.0 * 60.0 * 5.0, rel=1e-4)
     assert loop["peak_force_N"] == 60.0
 
 
@@ -35,7 +41,7 @@ def test_rotations_give_moments(wm_drake):
     straight = ("--set", "gasket.rotational_stiffness_x=60 N m/rad")
     ended = wm_drake("rig gasket --axis tilt -f 3Hz -a '2 deg' --json", *straight)
     gasket = load_machine("reference").gasket
-    loop = json.loads(ended.out)
+    loop = loop_of(ended)
     stiffness = np.hypot(60.0, gasket.rotational_damping_x * 2.0 * np.pi * 3.0)
     assert loop["dynamic_stiffness_Nm_per_rad"] == pytest.approx(stiffness, rel=1e-6)
     assert loop["peak_moment_Nm"] == pytest.approx(stiffness * np.deg2rad(2.0), rel=1e-4)
@@ -51,8 +57,8 @@ def test_the_machine_may_be_changed_on_the_command_line(wm_drake):
         )
         for more in ((), (*change, "--overwrite"))
     )
-    assert changed["peak_force_N"] > 3.0 * plain["peak_force_N"]
-    assert "sponge of 10 g" in changed["component"]
+    assert changed["measures"][0]["peak_force_N"] > 3.0 * plain["measures"][0]["peak_force_N"]
+    assert "sponge of 10 g" in changed["title"]
 
 
 def test_changes_that_need_each_other_come_in_any_order(wm_drake):
@@ -87,10 +93,10 @@ def test_a_whole_matrix_writes_loops_and_one_page(wm_drake):
     [("bushing --machine free_stroke --axis tilt", 8, True), ("gasket --axis axial", 9, False)],
 )
 def test_matrices_of_bushing_and_gasket(wm_drake, arguments, count, has_arm):
-    loops = json.loads(wm_drake(f"rig {arguments} --matrix A --json").out)
-    assert len(loops["loops"]) == count
-    assert all(loop["energy_per_cycle_J"] > 0.0 for loop in loops["loops"])
-    assert ("arm of 100 mm" in loops["component"]) == has_arm
+    found = json.loads(wm_drake(f"rig {arguments} --matrix A --json").out)
+    assert len(found["measures"]) == count
+    assert all(loop["energy_per_cycle_mJ"] > 0.0 for loop in found["measures"])
+    assert ("arm of 100 mm" in found["title"]) == has_arm
 
 
 @pytest.fixture
@@ -145,7 +151,7 @@ def test_a_radial_axis_serves_x_and_z_and_a_component_file_serves_the_bench(wm_d
         8e3, rel=1e-3
     )
     again = wm_drake("rig gasket --component alone/identified.yaml --axis x -f 1Hz -a 1mm --json")
-    assert json.loads(again.out)["peak_force_N"] == pytest.approx(8.0, rel=1e-3)
+    assert loop_of(again)["peak_force_N"] == pytest.approx(8.0, rel=1e-3)
 
 
 def test_fixed_numbers_are_written_with_the_identified_ones(wm_drake, loops_of):
@@ -156,10 +162,9 @@ def test_fixed_numbers_are_written_with_the_identified_ones(wm_drake, loops_of):
         ended = wm_drake("identify", "gasket", *files, "--axis", axis, *fix, "--out", axis)
         assert ended.code == 0
         assert "fixed" in ended.out
-    energy = json.loads(
-        wm_drake("rig gasket --machine x/identified.yaml --axis x -f '5 Hz' -a '5 mm' --json").out
-    )["energy_per_cycle_J"]  # fmt: skip
-    assert energy == pytest.approx(np.pi * 60.0 * 2.0 * np.pi * 5.0 * 5e-3**2, rel=1e-6)
+    ended = wm_drake("rig gasket --machine x/identified.yaml --axis x -f '5 Hz' -a '5 mm' --json")
+    energy = 1e3 * np.pi * 60.0 * 2.0 * np.pi * 5.0 * 5e-3**2
+    assert loop_of(ended)["energy_per_cycle_mJ"] == pytest.approx(energy, rel=1e-6)
     reference, one, two = (
         load_machine(m).gasket for m in ("reference", "x/identified.yaml", "radial/identified.yaml")
     )

@@ -32,24 +32,28 @@ def test_curves_of_a_drawing_give_a_machine_that_spins(wm_drake):
     ended = wm_drake("gasket", "curves", "folded", *SMALL, "--out", "out")
     assert ended.code == 0, ended.err
     assert {path.name for path in Path("out").iterdir()} == {
-        "checks.csv", "curves.csv", "gasket.yaml", "machine.yaml", "report.html", "run.json",
+        "checks.csv", "curves.csv", "gasket.yaml", "machine.yaml", "numbers.csv", "report.html",
+        "rotational_checks.csv", "rotational_curves.csv", "rotational_values.csv", "run.json",
         "values.csv",
     }  # fmt: skip
-    machine, values = load_machine("out/machine.yaml"), pd.read_csv("out/values.csv", index_col=0)
-    gasket = machine.gasket
+    gasket = load_machine("out/machine.yaml").gasket
+    values, rotational = (
+        pd.read_csv(f"out/{kind}values.csv", index_col=0) for kind in ("", "rotational_")
+    )
     damping = 0.15 / (2.0 * math.pi * 2.5)
     for axis in "xyz":
-        along, about = values.loc[axis], values.loc[f"about_{axis}"]
-        for kind, row in (("", along), ("rotational_", about)):
+        along = 1e3 * values.stiffness_first_20_percent_N_per_mm[axis]
+        about = rotational.stiffness_first_20_percent_Nm_per_rad[f"about_{axis}"]
+        for kind, stiffness in (("", along), ("rotational_", about)):
             table = getattr(gasket, f"{kind}stiffness_{axis}")
-            assert table.nominal_stiffness == pytest.approx(
-                row.stiffness_first_20_percent, rel=1e-5
-            )
+            assert table.nominal_stiffness == pytest.approx(stiffness, rel=1e-5)
             assert getattr(gasket, f"{kind}damping_{axis}") == pytest.approx(
                 damping * table.nominal_stiffness, rel=1e-9
             )
-    assert values.loc["y"].stiffness_at_rest < 0.3 * values.loc["x"].stiffness_at_rest
-    assert values.loc["about_y"].stiffness_at_rest > values.loc["about_x"].stiffness_at_rest
+    at_rest = values.stiffness_at_rest_N_per_mm
+    assert at_rest["y"] < 0.3 * at_rest["x"]
+    at_rest = rotational.stiffness_at_rest_Nm_per_rad
+    assert at_rest["about_y"] > at_rest["about_x"]
     assert gasket.cross_stiffness_x_about_z == -gasket.cross_stiffness_z_about_x > 0.0
     assert gasket.tub_frame == load_machine("reference").gasket.tub_frame
     # the section in a machine file of the user's
@@ -68,11 +72,13 @@ def test_python_and_json_give_the_same(wm_drake):
     printed = json.loads(
         wm_drake("gasket curves bellows --quick --points 2 --tilt '1 deg' --json --out o").out
     )
+    name = "stiffness_at_rest_N_per_mm"
     for ours, theirs in zip(result.as_json()["values"], printed["values"], strict=True):
         assert ours["axis"] == theirs["axis"]
-        assert ours["stiffness_at_rest"] == pytest.approx(theirs["stiffness_at_rest"], rel=1e-9)
-    assert max(row["work_error"] for row in printed["checks"]) < 0.01
-    by_axis = {row["axis"]: row["stiffness_at_rest"] for row in printed["values"]}
+        assert ours[name] == pytest.approx(theirs[name], rel=1e-9)
+    checks = [*printed["checks"], *printed["rotational_checks"]]
+    assert max(row["work_error_percent"] for row in checks) < 1.0
+    by_axis = {row["axis"]: row[name] for row in printed["values"]}
     assert by_axis["x"] == by_axis["z"]
 
 
@@ -197,7 +203,7 @@ def test_a_load_step_without_equilibrium_keeps_what_was_computed(wm_drake, monke
     ended = wm_drake(f"{words} --out out")
     assert ended.code == 1
     assert "radial: no equilibrium was found beyond 2.99 mm; the curve ends there" in ended.err
-    curves = pd.read_csv("out/curves.csv").groupby("curve").value.max()
+    curves = pd.read_csv("out/curves.csv").groupby("curve").displacement_mm.max()
     assert curves["radial"] == 2.0
     assert curves["axial"] == 1.0
     assert load_machine("out/machine.yaml").gasket.stiffness_x.displacement[-1] == 2e-3

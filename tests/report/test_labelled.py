@@ -45,6 +45,7 @@ def dataset():
 def test_a_value_is_text_in_its_unit_for_reading(quantity, value, text, suffix):
     assert quantity.text(value) == text
     assert quantity.suffix == suffix
+    np.testing.assert_allclose(quantity.to_si(quantity.values(value)), value)
 
 
 def test_a_variable_carries_its_quantity_through_selection_and_concatenation():
@@ -102,10 +103,20 @@ def test_single_numbers_are_one_row():
 
 def test_the_part_in_short_is_a_box_of_the_page_and_lines_of_the_terminal():
     table = LabelledTable("gaps", dataset()[["gap"]])
-    short = Part("In short", (table,), facts=[("Capacity", "all of it")])
+    short = Part("In short", (table,), facts=[("Capacity", "all of it")], body=lambda: "<b/>")
     answer = Answer("Title", "The answer.", None, (), short=short)
     assert answer.terminal() == ["The answer.", "Capacity: all of it"]
     box = answer.page(Facts()).partition('<div class="answer">')[2].partition("</div>")[0]
     assert "In short" in box
     assert "all of it" in box
+    assert "<b/>" in box or "&lt;b/&gt;" in box
     assert list(answer.tables()) == ["gaps"]
+
+
+def test_a_long_table_is_in_files_only_and_a_warning_on_page_and_terminal():
+    table = LabelledTable("gaps", dataset()[["gap"]], is_in_json=False)
+    answer = Answer("Title", "The answer.", None, (Part("", (table,)),), warned=("Careful.",))
+    assert answer.as_json() == {"title": "Title", "answer": "The answer."}
+    assert list(answer.tables()) == ["gaps"]
+    assert answer.warnings() == ("Careful.",)
+    assert "Careful." in answer.page(Facts())

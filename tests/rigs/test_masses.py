@@ -57,7 +57,7 @@ def test_command_prints_the_effect_of_masses(wm_drake):
     ended = wm_drake(*bench, "--outer-mass", "150 g", "--jig-mass", "2 kg", "--out", "out")
     assert ended.code == 0
     largest = 2.15 * (2.0 * np.pi * 7.0) ** 2 * 5e-3
-    assert f"The masses change the force by up to {largest:.3g} N" in ended.out
+    assert f"The masses change the force by up to {largest:.2f} N" in ended.out
     table = pd.read_csv("out/masses.csv")
     assert table.largest_difference_N[0] == pytest.approx(largest, rel=1e-6)
 

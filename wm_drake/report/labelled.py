@@ -32,6 +32,7 @@ class LabelledTable:
             `report.table.Row`. The variable is no column on page and terminal.
         words: Words for labels on page and terminal, by the labels.
         is_in_terminal: Whether the terminal shows it.
+        is_in_json: Whether JSON has it; a long history is in files and notebooks only.
     """
 
     name: str
@@ -42,6 +43,7 @@ class LabelledTable:
     marked: tuple[str, str] = ("", "")
     words: Mapping[str, str] = field(default_factory=dict)
     is_in_terminal: bool = False
+    is_in_json: bool = True
 
     def frame(self) -> pd.DataFrame:
         """Return the numbers in units for reading, with the unit in each name, for a file."""

@@ -5,10 +5,10 @@ variables carry their quantities (`wm_drake.report.quantity`) and returns an `An
 them; it declares no class of its own.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import pandas as pd
 import xarray as xr
@@ -47,6 +47,8 @@ class Part:
         links: Names of files beside the page, and the words that link to them.
         remarks: Sentences of a list.
         facts: Pairs of word and text.
+        body: Function that returns other parts as HTML, from `report.page.fragment`; called by each
+            page, whose figures it makes.
         has_long_words: Whether the words of the tables are broken into lines.
         is_folded: Whether a reader must open the section to see more than its heading.
     """
@@ -57,6 +59,7 @@ class Part:
     links: Sequence[tuple[str, str]] = ()
     remarks: Sequence[str] = ()
     facts: Sequence[tuple[str, str]] = ()
+    body: Callable[[], str] | None = None
     has_long_words: bool = False
     is_folded: bool = False
 
@@ -82,6 +85,7 @@ class Answer(Result):
             the terminal.
         short: Part in a box between the answer and the contents. Its facts are also printed.
         diverged: A line for each run that diverged.
+        script: Script of the page, beside that of the pictures.
     """
 
     title: str
@@ -94,6 +98,8 @@ class Answer(Result):
     warned: tuple[str, ...] = ()
     short: Part | None = None
     diverged: tuple[str, ...] = ()
+    script: Path | None = None
+    float_format: ClassVar[str] = "%.9g"
 
     def labelled(self) -> dict[str, LabelledTable]:
         """Return the tables by name."""
@@ -105,10 +111,10 @@ class Answer(Result):
         return {name: table.frame() for name, table in self.labelled().items()}
 
     def as_json(self) -> dict[str, Any]:
-        """Return machine, answer, and each table as a list of rows."""
+        """Return title, machine, answer, and each table as a list of rows."""
         about = {} if self.machine is None else {"machine": self.machine.name}
-        tables = {name: table.records() for name, table in self.labelled().items()}
-        return {**about, "answer": self.answer, **tables}
+        tables = {n: table.records() for n, table in self.labelled().items() if table.is_in_json}
+        return {"title": self.title, **about, "answer": self.answer, **tables}
 
     def terminal(self) -> "list[TerminalTable | str]":
         """Return some tables, the answer, and the facts of the part in short."""
@@ -136,6 +142,7 @@ class Answer(Result):
             [*facts.warnings, *self.warned],
             method=self.method,
             advice=_section(self.short) if self.short else None,
+            script=self.script,
         ).html()
 
     def write(self, folder: Path) -> None:
@@ -173,6 +180,7 @@ def _section(part: Part) -> Any:
         links=part.links,
         remarks=part.remarks,
         facts=part.facts,
+        body=part.body() if part.body else "",
         has_long_words=part.has_long_words,
         is_folded=part.is_folded,
     )

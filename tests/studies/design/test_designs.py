@@ -14,7 +14,7 @@ from wm_drake.parameters import load_machine
 from wm_drake.parameters.designs import DESIGNS, DesignFile, load_design
 from wm_drake.parameters.tolerances import Tolerances
 from wm_drake.simulation.cases import Case, case_of
-from wm_drake.studies.design.page import DesignResult, front_table, promises_table
+from wm_drake.studies.design.page import design_answer
 from wm_drake.studies.design.problem import machine_designs
 from wm_drake.studies.design.search import SearchSettings
 from wm_drake.studies.design.study import (
@@ -110,27 +110,27 @@ def test_front_under_a_constraint_is_found(machine, tmp_path):
     task = task_of(constraints=({"quantity": "Dx", "at_most": "2.5 mm"},))
     designs = designs_of(machine, task)
     front = run_designs(designs, run_of(machine), SearchSettings(640, 32))
-    dx, fx = front.objectives.T
+    dx, fx = 1e3 * front.Dx.values, front.Fx.values
     assert dx * fx == pytest.approx(20.0)  # 2/k mm times 10 k N
     assert (dx.min(), dx.max()) == pytest.approx((2.0 / 1.5, 2.5), rel=0.01)
-    assert front.constraints[:, 0] == pytest.approx(dx)
-    assert front.nominal_objectives == pytest.approx([2.0, 10.0])
-    data = DesignResult(front, [], None, "").as_json()
-    assert data["evaluations"] == 640
-    assert set(data["front"][0]) == {"objectives", "constraints", "variables"}
-    assert len(front_table(front)) == len(data["front"])
-    DesignResult(front, [], None, "").write(tmp_path)
-    for name, number in front.chosen.items():
+    assert 1e3 * front.constrained_Dx.values == pytest.approx(dx)
+    assert (front.nominal_Dx, front.nominal_Fx) == (pytest.approx(2e-3), pytest.approx(10.0))
+    assert front.evaluations[-1] == 640
+    shown = front_envelopes(designs, front, histories_of(machine))
+    answer = design_answer(designs, front, xr.Dataset(), shown, "about")
+    assert answer.tables()["front"].columns.tolist() == [
+        "design", "Dx_mm", "Fx_N", "constrained_Dx_mm", "k_percent",
+    ]  # fmt: skip
+    answer.write(tmp_path)
+    for name, number in front.attrs["chosen"].items():
         loaded = load_machine(tmp_path / f"machine_{name.replace(' ', '_')}.yaml")
         assert loaded.name == f"reference, {name}"
-        wanted = front.machine(number).spring_types["suspension"].stiffness
+        part = front.k.sel(design=number).item()
+        wanted = part * machine.spring_types["suspension"].stiffness
         assert loaded.spring_types["suspension"].stiffness == pytest.approx(wanted, rel=1e-12)
-    shown = front_envelopes(front, histories_of(machine))
-    page = DesignResult(front, [], shown, "about").page(Facts())
-    assert "compromise" in page
-    assert "loads middle, counter" in page
+    page = answer.page(Facts())
     (shown,) = (one for one in data_of(page) if "envelopes" in one)
-    assert np.shape(shown["objectives"]) == np.shape(front.objectives)
+    assert np.array(shown["objectives"]) == pytest.approx(np.column_stack([dx, fx]))
     assert len(drawings(page)) == 3  # front, envelopes, search
 
 
@@ -157,15 +157,15 @@ def histories_of(machine):
 
 
 def test_envelopes_are_the_largest_over_the_loads(machine):
-    front = run_designs(designs_of(machine, task_of()), run_of(machine), SearchSettings(32, 16))
-    shown = front_envelopes(front, histories_of(machine))
-    assert shown.sensors == tuple(machine.sensors)
+    designs = designs_of(machine, task_of())
+    front = run_designs(designs, run_of(machine), SearchSettings(32, 16))
+    shown = front_envelopes(designs, front, histories_of(machine))
+    assert shown["sensor"].values.tolist() == list(machine.sensors)
     # 2 mm / k of the counterweight's load; far from the ends, where the filter has settled
     middle = slice(30, 90)
-    assert shown.nominal[:, middle] == pytest.approx(2e-3, rel=0.01)
-    assert shown.designs.shape == (len(front.objectives), len(machine.sensors), len(shown.time))
-    for (x,), lines in zip(front.search.designs, shown.designs, strict=True):
-        k = front.designs.dimensions[0].number(float(x))
+    assert shown.nominal.values[:, middle] == pytest.approx(2e-3, rel=0.01)
+    assert shown["design"].equals(front["design"])
+    for k, lines in zip(front.k.values, shown.envelope.values, strict=True):
         assert lines[:, middle] == pytest.approx(2e-3 / k, rel=0.01)
 
 
@@ -207,29 +207,32 @@ def test_robust_front_keeps_its_promise_on_fresh_samples(machine):
             base_samples(1, 256, seed)[0],
         )
 
-    front = run_designs(designs(0), run_of(machine), SearchSettings(96, 32))
-    fresh, _ = designs(7).evaluate(front.search.designs, run_of(machine))
+    robust = designs(0)
+    front = run_designs(robust, run_of(machine), SearchSettings(96, 32))
+    fresh, _ = designs(7).evaluate(front.place.values, run_of(machine))
     # Fx = 10 k N with k within 5 %: its 95 % quantile is 1 + 1.645 * 0.05 times the nominal one
-    k = front.designs.dimensions[0]
-    nominal = np.array([10.0 * k.number(float(x)) for (x,) in front.search.designs])
-    assert front.objectives[:, 0] == pytest.approx((1.0 + 1.645 * 0.05) * nominal, rel=2e-3)
-    assert fresh == pytest.approx(front.objectives, rel=5e-3)
-    kept = promises(front, run_of(machine), 0)
-    assert {p.design for p in kept} == {"best Fx", "best Dx", "compromise"}
-    assert all(p.is_kept for p in kept)
-    number = front.chosen["best Fx"]
-    (best,) = (p for p in kept if (p.design, p.goal.given.quantity) == ("best Fx", "Fx"))
-    assert best.promised.value == pytest.approx(front.objectives[number, 0])
+    nominal = 10.0 * front.k
+    assert front.Fx.values == pytest.approx((1.0 + 1.645 * 0.05) * nominal.values, rel=2e-3)
+    assert fresh == pytest.approx(np.column_stack([front.Fx, 1e3 * front.Dx]), rel=5e-3)
+    kept = promises(robust, front, run_of(machine), 0)
+    assert kept["chosen"].values.tolist() == ["best Fx", "best Dx", "compromise"]
+    assert set(np.concatenate([kept.Fx_kept, kept.Dx_kept])) == {"yes"}
+    assert not (kept.Fx_is_broken | kept.Dx_is_broken).any()
+    number = front.attrs["chosen"]["best Fx"]
+    best = kept.sel(chosen="best Fx")
+    assert best.Fx.sel(samples="promised") == pytest.approx(front.Fx.sel(design=number).item())
     # the quantile of the normal distribution lies in both intervals
-    exact = (1.0 + stats.norm.ppf(0.95) * 0.05) * nominal[number]
-    for found in (best.promised, best.fresh):
-        assert found.lower < exact < found.upper
-    assert best.fresh.upper - best.fresh.lower < best.promised.upper - best.promised.lower
-    table = promises_table(kept)
-    assert list(table["kept"]) == [True] * 6
-    assert DesignResult(front, kept, None, "").as_json()["robust"][0]["fresh_value"] > 0.0
-    page = DesignResult(front, kept, None, "about").page(Facts())
-    assert "On fresh samples 6 of 6 values" in page
+    exact = (1.0 + stats.norm.ppf(0.95) * 0.05) * nominal.sel(design=number)
+    assert ((best.Fx_lower < exact) & (exact < best.Fx_upper)).all()
+    promised, of_fresh = (best.Fx_upper - best.Fx_lower).sel(samples=["promised", "fresh"]).values
+    assert of_fresh < promised
+    envelopes = front_envelopes(robust, front, histories_of(machine))
+    answer = design_answer(robust, front, kept, envelopes, "about")
+    assert "On fresh samples 6 of 6 values" in answer.answer
+    assert answer.tables()["robust_Dx"].columns.tolist() == [
+        "chosen", "Dx_kept", "Dx_is_broken", "Dx_promised_mm", "Dx_lower_promised_mm",
+        "Dx_upper_promised_mm", "Dx_fresh_mm", "Dx_lower_fresh_mm", "Dx_upper_fresh_mm",
+    ]  # fmt: skip
 
 
 def test_promise_of_too_few_samples_is_seen_to_break(machine):
@@ -254,8 +257,8 @@ def test_failed_runs_are_not_on_the_front(machine):
         return table.assign(diverged=("run", np.where(stiff, "at 3 s", "").astype(object)))
 
     front = run_designs(designs_of(machine, task_of()), run, SearchSettings(96, 32))
-    assert len(front.objectives)
-    assert (front.objectives[:, 1] <= 10.0 + 1e-9).all()
+    assert front.sizes["design"]
+    assert (front.Fx <= 10.0 + 1e-9).all()
 
 
 def test_shipped_files_fit_the_reference_machine(machine):

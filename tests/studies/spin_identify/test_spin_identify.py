@@ -87,29 +87,26 @@ def test_true_numbers_are_recovered_and_differ_from_the_machines(reference):
     starts = np.array([sought.unknown.start for sought in model.sought])
     assert np.abs(planted / starts - 1.0).min() > 0.03
     measured = virtual_experiment(model, planted, noise=0.0, seed=3)
-    result = identify_from_spin(model, measured, planted=planted)
-    np.testing.assert_allclose(result.fit.values, planted, rtol=1e-4)
-    assert result.identifiable == (True, True, True)
-    assert (
-        float(abs(result.after / measured - 1.0).max())
-        < 1e-5
-        < float(abs(result.before / measured - 1.0).max())
-    )
+    fit, found = identify_from_spin(model, measured, planted=planted)
+    np.testing.assert_allclose(fit.values, planted, rtol=1e-4)
+    assert found.is_identified.all()
+    after, before = (float(abs(found[n] / measured - 1.0).max()) for n in ("after", "before"))
+    assert after < 1e-5 < before
 
 
 def test_numbers_that_the_data_do_not_determine_are_named(reference):
     model = made_up(reference, seen=False)
     planted = planted_values(model.sought, seed=4)
-    result = identify_from_spin(
+    fit, found = identify_from_spin(
         model, virtual_experiment(model, planted, noise=1e-3, seed=4), planted=planted
     )
-    assert result.identifiable == (True, True, False)
-    assert np.abs(result.recovered[:2]).max() < 0.02
-    assert result.uncertainty[2] == np.inf
-    assert any("gasket.damping_x" in direction.names for direction in result.fit.undetermined)
-    machine = identified_machine(result)
+    assert found.is_identified.values.tolist() == [True, True, False]
+    assert np.abs(found.error[:2]).max() < 0.02
+    assert found.half_width[2] == np.inf
+    assert any("gasket.damping_x" in direction.names for direction in fit.undetermined)
+    machine = identified_machine(model, fit, is_virtual=True)
     assert machine.name == "reference_identified"
-    assert machine.gasket.stiffness_x == result.fit["gasket.stiffness_x"].value
+    assert machine.gasket.stiffness_x == fit["gasket.stiffness_x"].value
     assert machine.gasket.damping_x == reference.gasket.damping_x
     assert "virtual experiment: identified" in machine.sources["gasket.stiffness_z"]
     assert machine.sources.get("gasket.damping_x") == reference.sources.get("gasket.damping_x")
@@ -121,22 +118,19 @@ def test_verdict_is_that_of_the_displacements_not_of_the_intervals(reference):
     planted = planted_values(model.sought, seed=3)
     measured = virtual_experiment(model, planted, noise=0.0, seed=3)
     good = identify_from_spin(model, measured)
-    assert good.verdict == "good"
+    assert good[1].average_error_after < 1e-3
     other = measured * (1.0 + 0.6 * np.sin(7.0 * np.arange(measured.size)).reshape(measured.shape))
     poor = identify_from_spin(model, other)
-    assert poor.verdict == "poor"
-    assert poor.error_after > 0.15
-    assert not warnings_of(good)
-    assert any("Poor" in warning for warning in warnings_of(poor))
+    assert poor[1].average_error_after > 0.15
+    assert not warnings_of(*good)
+    assert any("Poor" in warning for warning in warnings_of(*poor))
 
 
 def test_noise_widens_intervals_until_a_number_is_not_identified(reference):
     model = made_up(reference, seen=True)
     planted = planted_values(model.sought, seed=5)
     halves = [
-        identify_from_spin(
-            model, virtual_experiment(model, planted, noise, 5), planted=planted
-        ).uncertainty
+        identify_from_spin(model, virtual_experiment(model, planted, noise, 5))[1].half_width
         for noise in (1e-3, 1e-2)
     ]
     assert (halves[1] > 3.0 * halves[0]).all()
@@ -186,11 +180,13 @@ def test_command_names_its_experiment_virtual_and_recovers_the_true_numbers(iden
     ended = identify("--json", "--noise", "0", *unknowns)
     assert (ended.code, len(ended.out.splitlines())) == (0, 1)
     shown = json.loads(ended.out)
-    assert shown["virtual_experiment"] is True
+    (numbers,) = shown["numbers"]
+    assert numbers["is_virtual_experiment"] is True
     assert all(
-        entry["identifiable"] and abs(entry["error"]) < 0.02 for entry in shown["unknowns"].values()
+        entry["is_identified"] and abs(entry["error_percent"]) < 2.0
+        for entry in shown["parameters"]
     )
-    assert shown["average_error_after"] < 1e-3 < shown["average_error_before"]
+    assert numbers["average_error_after_percent"] < 0.1 < numbers["average_error_before_percent"]
     page = Path("out/report.html").read_text(encoding="utf-8")
     assert "This is a virtual experiment: nothing was measured." in page
     written = load_machine("out/identified.yaml")
@@ -204,10 +200,10 @@ def test_command_names_its_experiment_virtual_and_recovers_the_true_numbers(iden
     assert written.name == "reference_identified"
     real = identify("--json", "--measured", "out/measured.csv", "--overwrite", *unknowns)
     told = json.loads(real.out)
-    assert told["virtual_experiment"] is False
-    for name, entry in told["unknowns"].items():
+    assert told["numbers"][0]["is_virtual_experiment"] is False
+    for entry, other in zip(told["parameters"], shown["parameters"], strict=True):
         assert "planted" not in entry
-        assert entry["found"] == pytest.approx(shown["unknowns"][name]["found"], rel=1e-3)
+        assert entry["value"] == pytest.approx(other["value"], rel=1e-3)
     assert (
         "virtual" not in Path("out/report.html").read_text(encoding="utf-8").split("references")[0]
     )

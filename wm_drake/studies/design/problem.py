@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from wm_drake.errors import InputError, Problem, input_error
 from wm_drake.parameters import MachineParameters, Variation, quantities, variation_of, with_values
@@ -13,6 +14,7 @@ from wm_drake.parameters.tolerances import fraction
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.parameters.variation import value_at
+from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.cases import Case, load_of
 from wm_drake.simulation.measures.responses import Response, chosen_responses
 from wm_drake.studies.executor import RunCases
@@ -47,12 +49,12 @@ class Range:
         """Return new values of the machine by key path, at a place from 0 to 1."""
         return self.variation.changes(self.number(place))
 
-    def shown(self, place: float) -> tuple[float | str, str]:
-        """Return value and unit for reading."""
-        unit = self.variation.unit
-        return unit.from_si(self.number(place)), unit.shown
+    def variable(self, places: FloatArray) -> xr.Variable:
+        """Return the values of designs at places from 0 to 1."""
+        quantity = Quantity(self.name, self.variation.unit)
+        return quantity.variable("design", self.number(places))
 
-    def number(self, place: float) -> float:
+    def number(self, place: Any) -> Any:
         """Return the value of the variation at a place from 0 to 1. [1 for percent, else SI]"""
         return self.low + place * (self.high - self.low)
 
@@ -77,9 +79,9 @@ class OptionVariable:
         """Return new values of the machine by key path, at a place from 0 to 1."""
         return self.options[self._option(place)]
 
-    def shown(self, place: float) -> tuple[float | str, str]:
-        """Return the name of an option, without a unit."""
-        return self._option(place), ""
+    def variable(self, places: FloatArray) -> xr.Variable:
+        """Return the names of the options of designs at places from 0 to 1."""
+        return xr.Variable("design", [self._option(place) for place in places.tolist()])
 
     def _option(self, place: float) -> str:
         names = list(self.options)
@@ -103,9 +105,15 @@ class DesignGoal:
     limit: float = float("nan")
 
     @property
-    def key(self) -> str:
-        """Name with unit, such as Dx_mm."""
-        return f"{self.given.quantity}_{self.unit.shown.replace('*', '')}"
+    def name(self) -> str:
+        """Name in datasets; a quantity may be an objective and have a limit."""
+        is_objective = isinstance(self.given, Objective)
+        return self.given.quantity if is_objective else f"constrained_{self.given.quantity}"
+
+    @property
+    def quantity(self) -> Quantity:
+        """Words and unit."""
+        return Quantity(self.given.quantity, self.unit)
 
     @property
     def is_small_better(self) -> bool:

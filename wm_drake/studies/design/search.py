@@ -182,7 +182,7 @@ def minimized(
         settings: Designs of a generation, and seed.
         note: Called after each generation with pymoo's algorithm.
     """
-    from pymoo.core.problem import DesignProblem as PymooProblem
+    from pymoo.core.problem import Problem as PymooProblem
     from pymoo.optimize import minimize
 
     class Bounded(PymooProblem):

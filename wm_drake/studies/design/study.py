@@ -2,20 +2,22 @@
 
 import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import TypeAlias
+from dataclasses import replace
+from typing import Any, TypeAlias
 
 import numpy as np
+import xarray as xr
 from scipy import stats
 
-from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.tolerances import fraction
 from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import Unit
+from wm_drake.report.quantity import TIME, Quantity
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.displacements import envelopes
 from wm_drake.simulation.records import Record, sample_period
 from wm_drake.studies.design.problem import DesignGoal, MachineDesigns
-from wm_drake.studies.design.search import DesignProblem, SearchResult, SearchSettings, search_front
+from wm_drake.studies.design.search import DesignProblem, SearchSettings, search_front
 from wm_drake.studies.design.surrogate import search_with_surfaces
 from wm_drake.studies.executor import RunCases
 from wm_drake.studies.tolerance.distributions import base_samples
@@ -28,48 +30,25 @@ COMPROMISE = "compromise"
 """Name of the chosen design that is nearest to the best of all objectives."""
 
 
-@dataclass(frozen=True)
-class ParetoFront:
-    """Result of a design study.
-
-    Attributes:
-        objectives, constraints: Values of the front, in units for reading. (n, m) and (n, k)
-        nominal_objectives: Those of the machine itself, moved into the bounds. (m,)
-        chosen: Numbers of chosen designs, from 0, by name: best Dx, ..., compromise.
-    """
-
-    designs: MachineDesigns
-    search: SearchResult
-    objectives: FloatArray
-    constraints: FloatArray
-    nominal_objectives: FloatArray
-    chosen: dict[str, int]
-
-    def machine(self, number: int) -> MachineParameters:
-        """Return the machine of a design of the front."""
-        return self.designs.machine_at(self.search.designs[number])
-
-    def goals(
-        self, number: int
-    ) -> tuple[list[tuple[DesignGoal, float]], list[tuple[DesignGoal, float]]]:
-        """Return objectives and constraints of a design with their values, in units for reading."""
-        objectives = zip(self.designs.objectives, self.objectives[number].tolist(), strict=True)
-        constraints = zip(self.designs.constraints, self.constraints[number].tolist(), strict=True)
-        return list(objectives), list(constraints)
-
-    def variables(self, number: int) -> list[tuple[str, float | str, str]]:
-        """Return name, value and unit for reading of each variable of a design."""
-        places = zip(self.designs.dimensions, self.search.designs[number].tolist(), strict=True)
-        return [(dimension.name, *dimension.shown(place)) for dimension, place in places]
+EVALUATIONS = Quantity("evaluated designs", decimals=0)
+HYPERVOLUME = Quantity("hypervolume")
+ENVELOPE = Quantity("largest envelope", Unit("m", "mm"))
 
 
 def run_designs(
     designs: MachineDesigns, run: RunCases, settings: SearchSettings, search: str = "genetic"
-) -> ParetoFront:
+) -> xr.Dataset:
     """Search the Pareto front of the designs of a machine.
 
     Args:
         search: Name in `SEARCHES`.
+
+    Returns:
+        Over `design`, numbers from 1: objectives and constraints by the names of the goals, the
+        variables, and the `place` of the design in the unit cube, over `dimension` too. Over
+        `generation`: `evaluations` and `hypervolume`. Over no dimension: the objectives of the
+        machine itself, moved into the bounds, as `nominal_Dx`. Attribute `chosen`: numbers of
+        chosen designs by name: best Dx, ..., compromise.
     """
     problem = DesignProblem(
         lambda x: designs.costs(x, run),
@@ -79,18 +58,31 @@ def run_designs(
     )
     result = SEARCHES[search](problem, settings)
     nominal, _ = designs.evaluate(designs.nominal()[None], run)
-    return ParetoFront(
-        designs,
-        result,
-        _values(designs.objectives, result.objectives),
-        _values(designs.constraints, result.constraints),
-        nominal[0],
-        chosen_designs(designs.objectives, result.objectives),
+    costs = [*result.objectives.T, *result.constraints.T]
+    evaluations, volumes = zip(*result.history, strict=True)
+    places = zip(designs.dimensions, result.designs.T, strict=True)
+    return xr.Dataset(
+        {
+            **{
+                goal.name: goal.quantity.variable("design", _values(goal, cost))
+                for goal, cost in zip(designs.goals, costs, strict=True)
+            },
+            **{dimension.name: dimension.variable(place) for dimension, place in places},
+            "place": (("design", "dimension"), result.designs),
+            "evaluations": EVALUATIONS.variable("generation", evaluations),
+            "hypervolume": HYPERVOLUME.variable("generation", volumes),
+            **{
+                f"nominal_{goal.name}": goal.quantity.variable((), goal.quantity.to_si(value))
+                for goal, value in zip(designs.objectives, nominal[0], strict=True)
+            },
+        },
+        {"design": np.arange(len(result.designs)) + 1},
+        {"chosen": chosen_designs(designs.objectives, result.objectives)},
     )
 
 
 def chosen_designs(goals: tuple[DesignGoal, ...], costs: FloatArray) -> dict[str, int]:
-    """Return the best design of each objective, and a compromise, by name.
+    """Return the number of the best design of each objective, and of a compromise, by name.
 
     The compromise has the smallest distance to the best of all objectives, which are scaled to the
     range of the front.
@@ -98,22 +90,20 @@ def chosen_designs(goals: tuple[DesignGoal, ...], costs: FloatArray) -> dict[str
     if not len(costs):
         return {}
     chosen = {
-        f"best {g.given.quantity}": int(np.argmin(c)) for g, c in zip(goals, costs.T, strict=True)
+        f"best {g.given.quantity}": 1 + int(np.argmin(c))
+        for g, c in zip(goals, costs.T, strict=True)
     }
     if len(goals) > 1:
         low, high = costs.min(axis=0), costs.max(axis=0)
         scaled = (costs - low) / np.where(high > low, high - low, 1.0)
-        chosen[COMPROMISE] = int(np.argmin(np.linalg.norm(scaled, axis=1)))
+        chosen[COMPROMISE] = 1 + int(np.argmin(np.linalg.norm(scaled, axis=1)))
     return chosen
 
 
-def _values(goals: tuple[DesignGoal, ...], costs: FloatArray) -> FloatArray:
-    """Return values in units for reading from what the search made small."""
-    columns = []
-    for goal, column in zip(goals, costs.T, strict=True):
-        signed = column if goal.is_small_better else -column
-        columns.append(signed if np.isnan(goal.limit) else signed + goal.limit)
-    return np.column_stack(columns) if columns else np.empty((len(costs), 0))
+def _values(goal: DesignGoal, cost: FloatArray) -> FloatArray:
+    """Return SI values of a goal from what the search made small."""
+    signed = cost if goal.is_small_better else -cost
+    return goal.quantity.to_si(signed if np.isnan(goal.limit) else signed + goal.limit)
 
 
 FRESH = 4
@@ -123,47 +113,66 @@ OTHER_SEED = 1_000_003
 """Added to the seed of the search for the fresh samples."""
 
 
-@dataclass(frozen=True)
-class Promise:
-    """One goal of a chosen design, as the search saw it and on fresh samples.
+def promises(designs: MachineDesigns, front: xr.Dataset, run: RunCases, seed: int) -> xr.Dataset:
+    """Return what the chosen designs of a robust front promise, and keep on fresh samples.
 
-    Attributes:
-        promised: Its value over the samples of the search, with the 95 % interval. [unit for
-            reading]
-        fresh: The same over fresh samples.
-        is_kept: Whether the fresh value is not worse than the worse end of the promised interval;
-            None for the worst of the samples, which grows with their number and has no interval.
+    Returns:
+        Over `chosen`, names of designs, and `samples`, `promised` or `fresh`: each goal by its
+        name, and the ends of its 95 % interval, as `Dx_lower` and `Dx_upper`. Over `chosen`:
+        whether the promise is kept, `Dx_kept`, "yes", "no", or "" for the worst of the samples,
+        which grows with their number and has no interval; and whether it `Dx_is_broken`. Empty for
+        a nominal front.
     """
-
-    design: str
-    goal: DesignGoal
-    promised: Percentile
-    fresh: Percentile
-    is_kept: bool | None
-
-
-def promises(front: ParetoFront, run: RunCases, seed: int) -> list[Promise]:
-    """Return the promises of the chosen designs of a robust front; none of a nominal one."""
-    designs, scores = front.designs, front.designs.scores
-    if scores is None or not front.chosen:
-        return []
-    numbers = sorted(set(front.chosen.values()))
-    points = front.search.designs[numbers]
+    scores, chosen = designs.scores, front.attrs["chosen"]
+    if scores is None or not chosen:
+        return xr.Dataset()
+    numbers = sorted(set(chosen.values()))
+    points = front.place.sel(design=numbers).values
     count, size = scores.shape
     fresh, _ = base_samples(size, FRESH * count, seed + OTHER_SEED)
     before = designs.scenario_values(points, run)
     after = replace(designs, scores=fresh).scenario_values(points, run)
-    promises = []
-    for name, number in front.chosen.items():
-        row = numbers.index(number)
-        for goal, old, new in zip(designs.goals, before, after, strict=True):
-            if goal.response is not None:
-                promised, kept = summary_of(goal, old[row]), summary_of(goal, new[row])
-                promises.append(Promise(name, goal, promised, kept, _is_kept(goal, promised, kept)))
-    return promises
+    rows = [numbers.index(number) for number in chosen.values()]
+    data = xr.Dataset(coords={"chosen": list(chosen), "samples": ["promised", "fresh"]})
+    for goal, old, new in zip(designs.goals, before, after, strict=True):
+        if goal.response is not None:
+            pairs = [(summary_of(goal, old[row]), summary_of(goal, new[row])) for row in rows]
+            data = data.assign(_promise(goal, pairs))
+    return data
+
+
+def _promise(goal: DesignGoal, pairs: Sequence[tuple[Percentile, Percentile]]) -> dict[str, Any]:
+    """Return the variables of a goal in the dataset of promises.
+
+    Args:
+        pairs: Promised and fresh value of each chosen design. [unit for reading]
+    """
+    quantity, words = goal.quantity, goal.quantity.words
+    ends = {
+        goal.name: ("value", words),
+        f"{goal.name}_lower": ("lower", f"{words}, 95 % from"),
+        f"{goal.name}_upper": ("upper", f"{words}, 95 % to"),
+    }
+    kept = [_is_kept(goal, *pair) for pair in pairs]
+    texts = {None: "", True: "yes", False: "no"}
+    return {
+        **{
+            name: quantity.named(shown).variable(
+                ("chosen", "samples"),
+                quantity.to_si([[getattr(one, field) for one in pair] for pair in pairs]),
+            )
+            for name, (field, shown) in ends.items()
+        },
+        f"{goal.name}_kept": ("chosen", [texts[one] for one in kept]),
+        f"{goal.name}_is_broken": ("chosen", [one is False for one in kept]),
+    }
 
 
 def _is_kept(goal: DesignGoal, promised: Percentile, fresh: Percentile) -> bool | None:
+    """Return whether a fresh value is not worse than the worse end of the promised interval.
+
+    It is None for the worst of the samples.
+    """
     if goal.given.over == "worst":
         return None
     if goal.is_small_better:
@@ -199,31 +208,17 @@ INTERVALS = 120
 """Number of intervals of time, each with the largest value of an envelope in it."""
 
 
-@dataclass(frozen=True)
-class Envelopes:
-    """Envelopes of the filtered displacements, the largest over the loads of each design.
+def front_envelopes(designs: MachineDesigns, front: xr.Dataset, histories: Histories) -> xr.Dataset:
+    """Return the envelopes of the filtered displacements, the largest over the loads of a design.
 
-    Attributes:
-        time: Middle of each interval. (n,) [s]
-        designs: (designs, sensors, n) [m] NaN behind the end of a run that failed.
-        nominal: Those of the machine itself. (sensors, n) [m]
-        of: What was run for each design, in words.
+    Returns:
+        Over `sensor` and `time`, the middle of each interval [s]: `envelope` over `design` too, and
+        `nominal`, that of the machine itself [m]. NaN behind the end of a run that failed.
     """
-
-    time: FloatArray
-    sensors: tuple[str, ...]
-    designs: FloatArray
-    nominal: FloatArray
-    of: str
-
-
-def front_envelopes(front: ParetoFront, histories: Histories) -> Envelopes:
-    """Return the envelopes of all designs of a front and of the machine itself."""
-    designs = front.designs
-    points = [*front.search.designs, designs.nominal()]
+    points = [*front.place.values, designs.nominal()]
     runs = [designs.shown_runs(designs.machine_at(p), f"{i}") for i, p in enumerate(points, 1)]
     owners = [number for number, cases in enumerate(runs) for _ in cases]
-    sensors = tuple(designs.parameters.sensors)
+    sensors = list(designs.parameters.sensors)
     largest = np.full((len(points), len(sensors), INTERVALS), np.nan)
     duration = max(case.profile.duration for cases in runs for case in cases)
 
@@ -233,7 +228,17 @@ def front_envelopes(front: ParetoFront, histories: Histories) -> Envelopes:
 
     histories([case for cases in runs for case in cases], add)
     time = (np.arange(INTERVALS) + 0.5) * duration / INTERVALS
-    return Envelopes(time, sensors, largest[:-1], largest[-1], designs.shown)
+    return xr.Dataset(
+        {
+            "envelope": ENVELOPE.variable(("design", "sensor", "time"), largest[:-1]),
+            "nominal": ENVELOPE.variable(("sensor", "time"), largest[-1]),
+        },
+        {
+            "design": front["design"].values,
+            "sensor": sensors,
+            "time": TIME.variable("time", time),
+        },
+    )
 
 
 def envelope_of(record: Record, duration: float) -> FloatArray:

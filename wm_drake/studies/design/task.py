@@ -11,8 +11,9 @@ from wm_drake.parameters import MachineParameters
 from wm_drake.parameters import designs as design_files
 from wm_drake.parameters.tolerances import TOLERANCES, Tolerances, check_load, load_tolerances
 from wm_drake.simulation.measures import MEASURES
+from wm_drake.studies.answer import Answer
 from wm_drake.studies.design.options import DesignOptions
-from wm_drake.studies.design.page import DesignResult
+from wm_drake.studies.design.page import design_answer
 from wm_drake.studies.design.problem import MachineDesigns, machine_designs
 from wm_drake.studies.design.search import SearchSettings
 from wm_drake.studies.design.study import SEARCHES, front_envelopes, promises, run_designs
@@ -85,15 +86,15 @@ class DesignTask(Task):
             "seed": str(self.options.seed),
         }
 
-    def run(self, executor: Executor) -> DesignResult:
+    def run(self, executor: Executor) -> Answer:
         """Search the front, check a robust one on fresh samples, and run it with histories."""
         options, run = self.options, partial(executor.simulate, self.machine, self.measures)
         total = (options.evaluations + 1) * self.designs.scenarios  # and the machine itself
         with executor.progress(total):
             front = run_designs(self.designs, run, self.settings, options.search)
-        checked = promises(front, partial(run, what="fresh samples"), options.seed)
+        checked = promises(self.designs, front, partial(run, what="fresh samples"), options.seed)
         envelopes = None
-        if len(front.objectives):
+        if front.sizes["design"]:
             histories = partial(executor.records, self.machine, what="envelopes of the front")
-            envelopes = front_envelopes(front, histories)
-        return DesignResult(front, checked, envelopes, self.file.about)
+            envelopes = front_envelopes(self.designs, front, histories)
+        return design_answer(self.designs, front, checked, envelopes, self.file.about)

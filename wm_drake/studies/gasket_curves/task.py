@@ -5,25 +5,27 @@ from functools import partial
 from wm_drake.errors import WmDrakeError
 from wm_drake.model.machine import Machine
 from wm_drake.parameters.gasket_drawing import load_gasket_drawing
-from wm_drake.parameters.units import Unit
 from wm_drake.solid.curves import MOTIONS, Curve, Gasket, Mesh
 from wm_drake.solid.deformed import deformed, wrinkles
 from wm_drake.solid.touching import Faces
+from wm_drake.studies.answer import Answer
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.gasket_curves.options import GasketCurvesOptions
-from wm_drake.studies.gasket_curves.page import GasketCurvesResult
+from wm_drake.studies.gasket_curves.page import curves_answer
 from wm_drake.studies.gasket_curves.study import (
+    FREQUENCY,
     WRINKLED,
     Checked,
     _first,
     check_gasket,
     curve_values,
     damping_per_stiffness,
+    numbers_data,
     positive,
     stiffness_of,
     with_gasket,
 )
-from wm_drake.studies.study import Result, Task
+from wm_drake.studies.study import Task
 
 
 class GasketCurvesTask(Task):
@@ -35,11 +37,11 @@ class GasketCurvesTask(Task):
         check_gasket(self.machine)
         self.drawing = load_gasket_drawing(options.file)
         self.values = curve_values(options, options.points)
-        self.frequency = positive(options.frequency, Unit("Hz", "Hz"), "--frequency")
+        self.frequency = positive(options.frequency, FREQUENCY.unit, "--frequency")
         self.mesh = Mesh(options.elements, options.around)
         self.gasket = Gasket(self.drawing, self.mesh)
 
-    def run(self, executor: Executor) -> Result:
+    def run(self, executor: Executor) -> Answer:
         """Compute all curves."""
         curves = {}
         with executor.fractions([motion.name for motion in MOTIONS]) as progress:
@@ -53,7 +55,8 @@ class GasketCurvesTask(Task):
             damping_per_stiffness(self.drawing, self.frequency),
             f"wm-drake gasket curves {name}, {options.elements} by {options.around} elements",
         )
-        return GasketCurvesResult(name, self.drawing, self.mesh, curves, self.frequency, machine)
+        numbers = numbers_data(self.drawing, self.mesh, self.frequency, curves)
+        return curves_answer(name, self.drawing, curves, numbers, machine)
 
     def _checked(self, curve: Curve) -> Checked:
         """Return a curve with stretch, stress, touching folds and wrinkles.

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from pydantic import ValidationError
@@ -10,9 +11,14 @@ from pydantic import ValidationError
 from wm_drake.errors import input_error
 from wm_drake.parameters.gasket_drawing import GasketDrawing, MeridianPoint, Rubber
 from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import Share
+from wm_drake.report.quantity import Quantity
 
 FOLDS, MOST_FOLDS = "folds", 6
 """Name of the factor that repeats the folds, and its largest value."""
+
+HARDNESS = Quantity("Shore A hardness", form="{:.3g}".format)
+REPEATED = Quantity("times that the folds of the drawing are repeated", decimals=0)
 
 
 @dataclass(frozen=True)
@@ -21,15 +27,13 @@ class DrawingFactor:
 
     Attributes:
         name: Name in tables.
-        words: Words for reading.
-        unit: Unit of its values.
+        quantity: Words, unit and digits of its values.
         middle, half: Value of the drawing, and half the range.
         values: The only values that it may have; empty if it has all of its range.
     """
 
     name: str
-    words: str
-    unit: str
+    quantity: Quantity
     middle: float
     half: float
     values: tuple[float, ...] = ()
@@ -41,8 +45,8 @@ class DrawingFactor:
         chosen = np.array(self.values)[(evenly * len(self.values)).astype(int)]
         return np.asarray((chosen - self.middle) / self.half)
 
-    def value(self, coded: float) -> float:
-        """Return the value at a level from -1 to 1."""
+    def value(self, coded: Any) -> Any:
+        """Return the value at a level from -1 to 1, or the values at several."""
         return self.middle + coded * self.half
 
 
@@ -66,20 +70,23 @@ def factors_of(drawing: GasketDrawing, folds: Sequence[int] = (1,)) -> tuple[Dra
             0.5 * (ends[1] - ends[0]),
             tuple(map(float, numbers)),
         )
-        repeated = (
-            DrawingFactor(FOLDS, "folds of the drawing repeated", "times", middle, half, values),
-        )
+        repeated = (DrawingFactor(FOLDS, REPEATED, middle, half, values),)
     if drawing.rubber.shore_a is None:
         raise input_error(
             "needs shore_a: the hardness is a factor of this study", key="rubber.shore_a"
         )
     return (
-        DrawingFactor("thickness", "wall thickness, of that of the drawing", "%", 100.0, 15.0),
-        DrawingFactor("depth", "depth of folds, of that of the drawing", "%", 100.0, 12.0),
-        DrawingFactor("fillet", "radius of folds, of that of the drawing", "%", 92.0, 8.0),
-        DrawingFactor("hardness", "hardness", "Shore A", drawing.rubber.shore_a, 6.0),
+        DrawingFactor("thickness", _part("wall thickness"), 1.0, 0.15),
+        DrawingFactor("depth", _part("depth of folds"), 1.0, 0.12),
+        DrawingFactor("fillet", _part("radius of folds"), 0.92, 0.08),
+        DrawingFactor("hardness", HARDNESS, drawing.rubber.shore_a, 6.0),
         *repeated,
     )
+
+
+def _part(words: str) -> Quantity:
+    """Return the quantity of a part of a number of the drawing."""
+    return Quantity(f"{words}, of that of the drawing", Share(), form="{:.3g}".format)
 
 
 def with_folds(drawing: GasketDrawing, times: int) -> GasketDrawing:
@@ -123,7 +130,7 @@ def values_at(factors: Sequence[DrawingFactor], levels: FloatArray) -> dict[str,
 def text_at(factors: Sequence[DrawingFactor], levels: FloatArray) -> str:
     """Return the values of factors at levels from -1 to 1 as text."""
     values = values_at(factors, levels)
-    return ", ".join(f"{f.name} {values[f.name]:.3g} {f.unit}" for f in factors)
+    return ", ".join(f"{f.name} {f.quantity.text(values[f.name])}" for f in factors)
 
 
 def changed(
@@ -142,7 +149,7 @@ def changed(
     values = values_at(factors, coded)
     if FOLDS in values:
         drawing = with_folds(drawing, round(values[FOLDS]))
-    thickness, depth, fillet = (0.01 * values[name] for name in ("thickness", "depth", "fillet"))
+    thickness, depth, fillet = (values[name] for name in ("thickness", "depth", "fillet"))
     places = np.array([(point.radius, point.y) for point in drawing.meridian])
     along = places[-1] - places[0]
     along /= np.linalg.norm(along)

@@ -1,4 +1,4 @@
-"""The study: a design of drawings, finite elements of each, runs, surfaces, the best drawing."""
+"""Response surfaces over drawings of a gasket, and what each factor does."""
 
 import itertools
 from collections.abc import Mapping, Sequence
@@ -6,15 +6,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from wm_drake.errors import input_error
-from wm_drake.parameters.elements import ForceTable, TorqueTable
 from wm_drake.parameters.gasket_drawing import GasketDrawing
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import plain_number
+from wm_drake.parameters.units import Share, Unit, plain_number
+from wm_drake.report.quantity import Quantity
 from wm_drake.solid.curves import MOTIONS, Gasket, Mesh
 from wm_drake.solid.deformed import deformed
 from wm_drake.studies.gasket_curves.study import GasketStiffness, stiffness_of
+from wm_drake.studies.gasket_geometry.drawings import DrawingFactor
 from wm_drake.studies.inputs import pairs_of
 
 MEASURES = ("amplitudes", "gap", "extremes")
@@ -26,20 +28,25 @@ POINTS = 3
 CANDIDATES = 4096
 """Drawings among which the best is chosen on the response surface."""
 
-RESPONSES = {
-    "radial_N_per_mm": "radial stiffness, N/mm",
-    "axial_N_per_mm": "axial stiffness, N/mm",
-    "twist_Nm_per_rad": "twist stiffness, N m/rad",
-    "tilt_Nm_per_rad": "tilt stiffness, N m/rad",
-    "smallest_gap_mm": "smallest gap, mm",
-    "largest_amplitude_mm": "largest amplitude of a sensor, mm",
-    "largest_gasket_force_N": "largest gasket force, N",
-    "largest_stretch": "largest stretch of the rubber",
-}
-"""Responses of a drawing: words by names."""
+MM, STIFFNESS, TURN = Unit("m", "mm"), Unit("N/m", "N/mm"), Unit("N*m/rad", "N*m/rad")
 
-GAP = "smallest_gap_mm"
+RESPONSES = {
+    "radial": Quantity("radial stiffness", STIFFNESS, 2),
+    "axial": Quantity("axial stiffness", STIFFNESS, 2),
+    "twist": Quantity("twist stiffness", TURN, 2),
+    "tilt": Quantity("tilt stiffness", TURN, 2),
+    "smallest_gap": Quantity("smallest gap", MM, 2),
+    "largest_amplitude": Quantity("largest amplitude of a sensor", MM, 2),
+    "largest_gasket_force": Quantity("largest gasket force", Unit("N", "N"), 2),
+    "largest_stretch": Quantity("largest stretch of the rubber", decimals=2),
+}
+"""Responses of a drawing by name. Options and files name them with their units."""
+
+GAP = "smallest_gap"
 """Response that the best drawing makes largest."""
+
+PART = Quantity("part of the variance", Share(), 0)
+ERROR = Quantity("error on fresh, of the range", Share(), 1)
 
 
 @dataclass(frozen=True)
@@ -69,7 +76,7 @@ def basis(levels: FloatArray, degree: int) -> FloatArray:
 
 @dataclass(frozen=True)
 class Surface:
-    """Response surface.
+    """Response surface: a class, as it is evaluated at any levels.
 
     Attributes:
         factors: Number of factors.
@@ -126,22 +133,25 @@ def ranked(responses: Mapping[str, FloatArray], limits: Mapping[str, float]) -> 
 
 
 def limits_of(entries: Sequence[str]) -> dict[str, float]:
-    """Return limits by responses.
+    """Return limits by responses, in SI.
 
     Raises:
         InputError: a response is unknown, or a limit is not a number above 0.
     """
+    known = {f"{name}{quantity.suffix}": name for name, quantity in RESPONSES.items()}
     limits = {}
-    for name, text in pairs_of(entries, "--limit"):
-        if name not in RESPONSES or name == GAP:
-            allowed = ", ".join(response for response in RESPONSES if response != GAP)
-            raise input_error(f"'{name}': allowed are {allowed}", where="--limit")
+    for option, text in pairs_of(entries, "--limit"):
+        name = known.get(option, GAP)
+        if name == GAP:
+            allowed = ", ".join(option for option, name in known.items() if name != GAP)
+            raise input_error(f"'{option}': allowed are {allowed}", where="--limit")
         try:
-            limits[name] = plain_number(text)
+            number = plain_number(text)
         except ValueError:
-            limits[name] = 0.0
-        if not 0.0 < limits[name] < np.inf:
-            raise input_error(f"'{name}={text}': allowed is a number above 0", where="--limit")
+            number = 0.0
+        if not 0.0 < number < np.inf:
+            raise input_error(f"'{option}={text}': allowed is a number above 0", where="--limit")
+        limits[name] = float(RESPONSES[name].to_si(number))
     return limits
 
 
@@ -170,7 +180,102 @@ def computed_curves(
     return {**tables, "coupling": made.coupling, "stretch": stretch}
 
 
-def _table(rotates: bool, curve: FloatArray) -> ForceTable | TorqueTable:
-    """Return a table of its abscissas and ordinates. (2, n)"""
-    x, y = map(tuple, curve.tolist())
-    return TorqueTable(angle=x, torque=y) if rotates else ForceTable(displacement=x, force=y)
+def drawings_data(
+    factors: Sequence[DrawingFactor],
+    levels: FloatArray,
+    responses: Mapping[str, FloatArray],
+    surfaces: Mapping[str, Surface],
+    kinds: Sequence[str],
+) -> xr.Dataset:
+    """Return drawings that were run.
+
+    Args:
+        levels: Levels of all drawings. (n, factors)
+        responses: Their responses by name, in SI. (n,) each
+        kinds: What each drawing is for. (n,)
+
+    Returns:
+        Over `drawing`: `kind`, the factors, the responses, and each again on its surface, as
+        `smallest_gap_on_surface`; over `factor` too: `level`.
+    """
+    shown: dict[str, Any] = {"kind": ("drawing", list(kinds))}
+    for factor, column in zip(factors, levels.T, strict=True):
+        shown[factor.name] = factor.quantity.variable("drawing", factor.value(column))
+    for name, quantity in RESPONSES.items():
+        shown[name] = quantity.variable("drawing", responses[name])
+    for name, quantity in RESPONSES.items():
+        words = f"{quantity.words} on the surface"
+        expected = quantity.named(words).variable("drawing", surfaces[name].at(levels))
+        shown[f"{name}_on_surface"] = expected
+    shown["level"] = (("drawing", "factor"), levels)
+    return xr.Dataset(shown, {"factor": [factor.name for factor in factors]})
+
+
+SECTION = np.linspace(-1.0, 1.0, 41)
+"""Levels of a factor at which the surface of the gap is drawn."""
+
+
+def surfaces_data(
+    surfaces: Mapping[str, Surface], sample: FloatArray, drawings: xr.Dataset
+) -> xr.Dataset:
+    """Return what each factor does.
+
+    Args:
+        sample: Levels over which the variance is taken. (m, factors)
+        drawings: As of `drawings_data`.
+
+    Returns:
+        `share` of each factor and of all pairs in the variance, over `response` and `source`;
+        `error_on_fresh` over `response`, RMS error on fresh drawings by the range of the design;
+        each response over `surface`: its mean over the sample, and its change from the low to the
+        high end of each factor, with the others in the middle; `section`, the gap over `factor` and
+        `level`, with the others in the middle.
+    """
+    names, fresh = drawings["factor"].values.tolist(), drawings.kind.values == "fresh"
+    ends, section = (
+        np.eye(len(names))[:, None, :] * levels[None, :, None]
+        for levels in (np.array([-1.0, 1.0]), SECTION)
+    )
+    changes = {}
+    for name, quantity in RESPONSES.items():
+        low, high = np.array([surfaces[name].at(at) for at in ends]).T
+        values = [surfaces[name].at(sample).mean(), *(high - low)]
+        changes[name] = quantity.variable("surface", values)
+    errors = []
+    for name in RESPONSES:
+        design = drawings[name].values[drawings.kind.values == "design"]
+        error = (drawings[f"{name}_on_surface"] - drawings[name]).values[fresh]
+        spread = float(np.ptp(design))
+        errors.append(float(np.sqrt(np.mean(error**2))) / spread if spread else 0.0)
+    shares = [surface.contributions(sample) for surface in surfaces.values()]
+    gaps = [surfaces[GAP].at(at) for at in section]
+    return xr.Dataset(
+        {
+            "share": PART.variable(("response", "source"), shares),
+            "error_on_fresh": ERROR.variable("response", errors),
+            **changes,
+            "section": RESPONSES[GAP].variable(("factor", "level"), gaps),
+        },
+        {
+            "response": list(RESPONSES),
+            "source": [*names, "pairs"],
+            "surface": ["mean", *(f"change over {name}" for name in names)],
+            "factor": names,
+            "level": SECTION,
+        },
+    )
+
+
+def conditions_data(
+    limits: Mapping[str, float], responses: Mapping[str, FloatArray], degree: int
+) -> xr.Dataset:
+    """Return the limits, whether the best drawing keeps them, and the degree of the surfaces."""
+    best = ranked(responses, limits)[0]
+    return xr.Dataset(
+        {
+            **{name: RESPONSES[name].variable((), limit) for name, limit in limits.items()},
+            "keeps_limits": ((), not excess(responses, limits)[best]),
+            "degree": Quantity("degree of the surfaces", decimals=0).variable((), degree),
+            "best": Quantity("number of the best drawing", decimals=0).variable((), best),
+        }
+    )

@@ -1,4 +1,4 @@
-"""Check the options of the study of drawings of a gasket, and run it."""
+"""Check the options of the study of drawings; compute, run, fit, and verify the best drawing."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -12,11 +12,13 @@ from wm_drake.errors import WmDrakeError
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters
+from wm_drake.parameters.elements import ForceTable, TorqueTable
 from wm_drake.parameters.gasket_drawing import load_gasket_drawing
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.simulation.cases import Case
 from wm_drake.solid.curves import MOTIONS, Gasket, Mesh
+from wm_drake.studies.answer import Answer
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.gasket_curves.study import (
     GasketStiffness,
@@ -28,22 +30,27 @@ from wm_drake.studies.gasket_curves.study import (
 )
 from wm_drake.studies.gasket_geometry import drawings
 from wm_drake.studies.gasket_geometry.options import GasketGeometryOptions
-from wm_drake.studies.gasket_geometry.page import GasketGeometryResult
+from wm_drake.studies.gasket_geometry.page import geometry_answer
 from wm_drake.studies.gasket_geometry.study import (
     CANDIDATES,
     GAP,
     MEASURES,
     POINTS,
+    RESPONSES,
     ComputedDrawing,
     Surface,
-    _table,
     computed_curves,
+    conditions_data,
+    drawings_data,
     fit,
     limits_of,
     ranked,
+    surfaces_data,
 )
 from wm_drake.studies.inputs import selected_cases
-from wm_drake.studies.study import Result, Task
+from wm_drake.studies.study import Task
+
+FREQUENCY = Unit("Hz", "Hz")
 
 
 class GasketGeometryTask(Task):
@@ -60,7 +67,7 @@ class GasketGeometryTask(Task):
         if len(set(options.folds)) == 1:
             self.drawing = drawings.with_folds(self.drawing, options.folds[0])
         self.cases = selected_cases(self.machine, options.load, True, options.profile)
-        self.frequency = positive(options.frequency, Unit("Hz", "Hz"), "--frequency")
+        self.frequency = positive(options.frequency, FREQUENCY, "--frequency")
         self.values = curve_values(options, POINTS)
         self.mesh = Mesh(options.elements, options.around)
         sampler = LatinHypercube(len(self.factors), rng=options.seed)
@@ -98,7 +105,7 @@ class GasketGeometryTask(Task):
             "seed": str(options.seed),
         }
 
-    def run(self, executor: Executor) -> Result:
+    def run(self, executor: Executor) -> Answer:
         """Compute all drawings, fit the surfaces, and verify the best drawing."""
         assert executor.ledger is not None
         levels = np.concatenate([self.design, self.fresh])
@@ -106,26 +113,22 @@ class GasketGeometryTask(Task):
             computed = self._all_computed(executor, levels, progress)
         responses = self._responses(executor, levels, computed)
         count = len(self.design)
-        surfaces = {
-            name: fit(self.design, response[:count]) for name, response in responses.items()
-        }
+        surfaces = {name: fit(self.design, responses[name][:count]) for name in RESPONSES}
         proposed = self._best(surfaces)
         (made,) = self._all_computed(executor, proposed[None], lambda _: None)
         verified = self._responses(executor, proposed[None], [made])
         levels = np.vstack([levels, proposed])
         every = {name: np.concatenate([responses[name], verified[name]]) for name in responses}
-        return GasketGeometryResult(
-            self.options.file,
-            self.factors,
-            levels,
-            every,
-            count,
-            surfaces,
-            drawings.changed(self.drawing, self.factors, levels[ranked(every, self.limits)[0]]),
-            tuple(case.name for case in self.cases),
-            self.limits,
-            self.candidates,
-        )
+        kinds = ["design"] * count + ["fresh"] * len(self.fresh) + ["best of surface"]
+        data = drawings_data(self.factors, levels, every, surfaces, kinds)
+        conditions = conditions_data(self.limits, every, surfaces[GAP].degree)
+        conditions.attrs |= {
+            "gasket": self.options.file,
+            "loads": ", ".join(case.name for case in self.cases),
+        }
+        best = drawings.changed(self.drawing, self.factors, levels[int(conditions.best)])
+        fitted = surfaces_data(surfaces, self.candidates, data)
+        return geometry_answer(self.factors, data, fitted, conditions, best)
 
     def _best(self, surfaces: dict[str, Surface]) -> FloatArray:
         """Return the levels of the best candidate on the surfaces that can be built."""
@@ -182,7 +185,7 @@ class GasketGeometryTask(Task):
     def _responses(
         self, executor: Executor, levels: FloatArray, computed: Sequence[ComputedDrawing]
     ) -> dict[str, FloatArray]:
-        """Return the responses of drawings: stiffness, then worst of all loads. (n,) each"""
+        """Return the responses of drawings in SI: stiffness, then worst of all loads. (n,)"""
         machines = [
             self._machine(at, one.stiffness) for at, one in zip(levels, computed, strict=True)
         ]
@@ -203,13 +206,10 @@ class GasketGeometryTask(Task):
         }
         force = np.linalg.norm(of_runs("gasket_force"), axis=-1)
         return {
-            "radial_N_per_mm": 1e-3 * slopes["radial"],
-            "axial_N_per_mm": 1e-3 * slopes["axial"],
-            "twist_Nm_per_rad": slopes["twist"],
-            "tilt_Nm_per_rad": slopes["tilt"],
-            GAP: 1e3 * of_runs("smallest_gap").min(axis=(1, 2)),
-            "largest_amplitude_mm": 1e3 * of_runs("amplitude").max(axis=(1, 2)),
-            "largest_gasket_force_N": force.max(axis=1),
+            **slopes,
+            GAP: of_runs("smallest_gap").min(axis=(1, 2)),
+            "largest_amplitude": of_runs("amplitude").max(axis=(1, 2)),
+            "largest_gasket_force": force.max(axis=1),
             "largest_stretch": np.array([one.stretch for one in computed]),
         }
 
@@ -217,3 +217,9 @@ class GasketGeometryTask(Task):
         drawing = drawings.changed(self.drawing, self.factors, levels)
         damping = damping_per_stiffness(drawing, self.frequency)
         return with_gasket(self.machine, stiffness, damping, "gasket-geometry")
+
+
+def _table(rotates: bool, curve: FloatArray) -> ForceTable | TorqueTable:
+    """Return a table of its abscissas and ordinates. (2, n)"""
+    x, y = map(tuple, curve.tolist())
+    return TorqueTable(angle=x, torque=y) if rotates else ForceTable(displacement=x, force=y)

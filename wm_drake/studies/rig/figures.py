@@ -8,10 +8,11 @@ import numpy as np
 
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report import figure as fig
-from wm_drake.report.formatting import MM_PER_M
+from wm_drake.report.quantity import TIME
 from wm_drake.rigs import ForceLoop, RigRun
 from wm_drake.rigs.run import slider_friction_curves
-from wm_drake.studies.rig.units import units_of
+from wm_drake.studies.rig.study import FREQUENCY
+from wm_drake.studies.rig.units import LINEAR, units_of
 
 COLUMNS = 4
 """Largest number of panels in a row."""
@@ -19,7 +20,7 @@ COLUMNS = 4
 
 def frequency_text(loop: ForceLoop) -> str:
     """Return the frequency of a loop with its unit."""
-    return f"{loop.motion.frequency:.3g} Hz"
+    return FREQUENCY.text(loop.motion.frequency)
 
 
 def amplitude_text(loop: ForceLoop) -> str:
@@ -57,7 +58,7 @@ def overlaid_figure(
     for title in panels:
         marks: list[fig.Mark] = []
         for loop in (loop for loop in loops if panel(loop) == title):
-            values = units.factor * (loop.displacement if over == "displacement" else loop.velocity)
+            values = units.over(over).values(getattr(loop, over))
             key = line(loop)
             color = _color(lines.index(key), len(lines))
             marks.append(fig.Line(_closed(values), _closed(loop.force), color=color, key=key))
@@ -73,10 +74,11 @@ def time_figure(loop: ForceLoop, points: Mapping[str, int]) -> fig.Figure:
         points: Samples that get a letter on the force, from `stroke_points`.
     """
     units = units_of(loop.rotates)
-    factor, force = units.factor, units.force_label
+    force = units.force_label
     time = np.append(loop.time, 1.0 / loop.motion.frequency)
     at = list(points.values())
-    motion = fig.Line(time, factor * _closed(loop.displacement), color=fig.QUIET, dash="dashed")
+    displacement = units.displacement.values(_closed(loop.displacement))
+    motion = fig.Line(time, displacement, color=fig.QUIET, dash="dashed")
     of_time = fig.Line(time, _closed(loop.force), width=2.2, is_second=True)
     reach, largest = (1.13 * float(np.abs(one.y).max()) or 1.0 for one in (motion, of_time))
     panels = [
@@ -87,7 +89,7 @@ def time_figure(loop: ForceLoop, points: Mapping[str, int]) -> fig.Figure:
                 of_time,
                 *_letters(points, loop.time[at], loop.force[at], is_second=True),
             ),
-            x=fig.Axis(label="time, s"),
+            x=fig.Axis(label=TIME.label),
             y=fig.Axis(
                 label=f"{units.label('displacement')} (dashed)",
                 color=fig.QUIET,
@@ -96,9 +98,10 @@ def time_figure(loop: ForceLoop, points: Mapping[str, int]) -> fig.Figure:
             second=fig.Axis(label=force, color=fig.OURS, range=(-largest, largest)),
         )
     ]
-    for x, over in ((loop.displacement, "displacement"), (loop.velocity, "velocity")):
-        curve = fig.Line(factor * _closed(x), _closed(loop.force), width=2.2)
-        letters = _letters(points, factor * x[at], loop.force[at])
+    for over in ("displacement", "velocity"):
+        x = units.over(over).values(getattr(loop, over))
+        curve = fig.Line(_closed(x), _closed(loop.force), width=2.2)
+        letters = _letters(points, x[at], loop.force[at])
         panels.append(loop_panel("", [curve, *letters], units.label(over), force))
     return fig.Figure(panels=fig.in_grid(panels, 3), height=220.0)
 
@@ -123,22 +126,23 @@ def friction_law_figure(run: RigRun) -> fig.Figure | None:
 
     The result is None for a law without MSTV friction.
     """
-    rates_mm_s = (1.0, 5.0, 20.0, 60.0)
+    rates = (0.001, 0.005, 0.02, 0.06)
     w = np.concatenate([-np.geomspace(0.08, 1e-5, 200), np.geomspace(1e-5, 0.08, 200)])
-    curves = slider_friction_curves(run.bench, [u / MM_PER_M for u in rates_mm_s], w)
+    curves = slider_friction_curves(run.bench, rates, w)
     if curves is None:
         return None
     marks = [
         fig.Line(
-            MM_PER_M * w,
+            LINEAR.velocity.values(w),
             curve,
-            color=_color(k, len(rates_mm_s)),
+            color=_color(k, len(rates)),
             width=2.0,
-            key=f"deformation rate of the sponge {u:g} mm/s",
+            key=f"deformation rate of the sponge {LINEAR.velocity.text(rate)}",
         )
-        for k, (u, curve) in enumerate(zip(rates_mm_s, curves, strict=True))
+        for k, (rate, curve) in enumerate(zip(rates, curves, strict=True))
     ]
-    x, y = "sliding velocity of the sponge on the tube, mm/s", "friction force on the sponge, N"
+    x = LINEAR.velocity.named("sliding velocity of the sponge on the tube").label
+    y = LINEAR.load.named("friction force on the sponge").label
     return fig.Figure(panels=(loop_panel("", marks, x, y),), height=240.0)
 
 

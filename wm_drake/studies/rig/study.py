@@ -1,13 +1,26 @@
-"""Errors that [A] prints of its bench tests."""
+"""A bench test: what is derived from its loops, the effect of masses, and the errors of [A]."""
 
 from collections.abc import Sequence
 
+import numpy as np
 import pandas as pd
+import xarray as xr
 
 from wm_drake.parameters.components import COMPONENTS_FOLDER
-from wm_drake.rigs import Bench, BushingBench, Harmonic
+from wm_drake.parameters.units import Share, Unit
+from wm_drake.report.quantity import TIME, Quantity
+from wm_drake.rigs import Bench, BushingBench, ForceLoop, Harmonic, RigRun
+from wm_drake.studies.rig.units import LINEAR, units_of
 
-MM = 1e-3
+SAMPLES_KEPT = 4
+"""Step between the samples of a loop that are kept."""
+
+FREQUENCY = Quantity("frequency", Unit("Hz", "Hz"), form="{:.3g}".format)
+ENERGY = Quantity("energy per cycle", Unit("J", "mJ"))
+LOSS_ANGLE = Quantity("loss angle", Unit("rad", "deg"), 1)
+RMSE_OF_A = Quantity("RMSE in [A]", decimals=4)
+CHANGE = Quantity("largest difference by peak", Share(), form="{:.2g}".format)
+
 WITHIN = "[A] calls all of them within 10 % of the largest force"
 VERDICTS = {
     ("damper", ""): WITHIN,
@@ -47,7 +60,10 @@ def printed_errors(kind: str, bench: Bench, motions: Sequence[Harmonic]) -> list
     table = printed_table()
     rows = table[(table.component == kind) & (table.axis == printed_axis(bench))]
     rmse = rows.set_index(["frequency_hz", "amplitude_mm"])["rmse"]
-    return [float(rmse[m.frequency, round(m.amplitude / MM, 6)]) for m in motions]
+    return [
+        float(rmse[m.frequency, LINEAR.displacement.values(m.amplitude).round(6).item()])
+        for m in motions
+    ]
 
 
 def printed_verdict(kind: str, bench: Bench) -> str:
@@ -56,3 +72,66 @@ def printed_verdict(kind: str, bench: Bench) -> str:
         "RMSE in [A]: of its own model against its tests, in a unit of force that is not printed. "
         f"{VERDICTS[kind, printed_axis(bench)]}."
     )
+
+
+def loop_data(loop: ForceLoop) -> xr.Dataset:
+    """Return a loop over its samples: time, displacement, velocity, force; or angle, moment."""
+    units = units_of(loop.rotates)
+    values = {
+        TIME: loop.time,
+        units.displacement: loop.displacement,
+        units.velocity: loop.velocity,
+        units.load: loop.force,
+    }
+    return xr.Dataset(
+        {q.words: q.variable("sample", signal[::SAMPLES_KEPT]) for q, signal in values.items()}
+    )
+
+
+def measures_data(run: RigRun) -> xr.Dataset:
+    """Return the quantities derived from each loop, as of `LoopMeasures`, over `loop`."""
+    units, measures = units_of(run.bench.rotates), run.measures
+    numbers = {
+        **_motions_of(run),
+        f"peak_{units.force}": (
+            units.load.named(f"peak {units.force}"),
+            [m.peak_force for m in measures],
+        ),
+        "energy_per_cycle": (ENERGY, [m.energy_per_cycle for m in measures]),
+        "equivalent_damping": (units.damping, [m.equivalent_damping for m in measures]),
+        "dynamic_stiffness": (units.stiffness, [m.dynamic_stiffness for m in measures]),
+        "loss_angle": (LOSS_ANGLE, [m.loss_angle for m in measures]),
+    }
+    return xr.Dataset({name: q.variable("loop", values) for name, (q, values) in numbers.items()})
+
+
+def effect_of_masses(run: RigRun, massless: RigRun) -> xr.Dataset:
+    """Return differences of each loop from that without masses, over `loop`.
+
+    Returns:
+        `frequency` [Hz], `amplitude` [m], `peak_force_without` masses, `peak_force`,
+        `rms_difference` and `largest_difference` [N], the last one by the peak without masses.
+    """
+    load = units_of(run.bench.rotates).load
+    loops, bare = (np.array([loop.force for loop in one.loops]) for one in (run, massless))
+    peaks, largest = (np.abs(forces).max(axis=1) for forces in (bare, loops - bare))
+    by_peak = np.divide(largest, peaks, out=np.full(len(peaks), np.nan), where=peaks > 0.0)
+    rms = np.sqrt(np.mean(np.square(loops - bare), axis=1))
+    numbers = {
+        **_motions_of(run),
+        "peak_force_without": (load.named("peak force without masses"), peaks),
+        "peak_force": (load.named("peak force"), np.abs(loops).max(axis=1)),
+        "rms_difference": (load.named("root mean square of the difference"), rms),
+        "largest_difference": (load.named("largest difference"), largest),
+        "largest_difference_by_peak": (CHANGE, by_peak),
+    }
+    return xr.Dataset({name: q.variable("loop", values) for name, (q, values) in numbers.items()})
+
+
+def _motions_of(run: RigRun) -> dict[str, tuple[Quantity, list[float]]]:
+    """Return frequency and amplitude of each loop."""
+    amplitude = units_of(run.bench.rotates).displacement.named("amplitude")
+    return {
+        "frequency": (FREQUENCY, [loop.motion.frequency for loop in run.loops]),
+        "amplitude": (amplitude, [loop.motion.amplitude for loop in run.loops]),
+    }

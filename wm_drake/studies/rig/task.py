@@ -1,10 +1,11 @@
-"""Check the options of a bench test, and run it."""
+"""Check the options of a bench test: component and motions, and run it."""
 
 from typing import Any
 
 from wm_drake.errors import check_known, input_error
 from wm_drake.parameters import Component, quantities
 from wm_drake.parameters.units import Unit
+from wm_drake.report.quantity import Quantity
 from wm_drake.report.table import readable
 from wm_drake.rigs import (
     JIG_ARM,
@@ -17,13 +18,25 @@ from wm_drake.rigs import (
     damper_bench,
     run_rig,
 )
+from wm_drake.studies.answer import Answer
 from wm_drake.studies.components import axes_of, mass_of, target_of
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import quantities_of
 from wm_drake.studies.rig.options import RigAxisOptions, RigDamperOptions, RigOptions
-from wm_drake.studies.rig.page import RigResult
-from wm_drake.studies.rig.study import printed_errors, printed_verdict
+from wm_drake.studies.rig.page import rig_answer
+from wm_drake.studies.rig.study import (
+    FREQUENCY,
+    RMSE_OF_A,
+    effect_of_masses,
+    measures_data,
+    printed_errors,
+    printed_verdict,
+)
+from wm_drake.studies.rig.units import LINEAR, units_of
 from wm_drake.studies.study import Task
+
+SPONGE_MASS = Quantity("mass of the sponge", Unit("kg", "g"), form="{:g}".format)
+DRIVEN_MASS = Quantity("mass at the driven end", Unit("kg", "kg"), form="{:g}".format)
 
 
 class RigTask(Task):
@@ -39,11 +52,7 @@ class RigTask(Task):
             assert isinstance(options, RigAxisOptions)
             self._set_axis(kind, options)
         self.motions = _motions(kind, self.bench, options)
-        self.printed = (
-            (printed_errors(kind, self.bench, self.motions), printed_verdict(kind, self.bench))
-            if options.matrix == "A"
-            else None
-        )
+        self.kind, self.is_of_a = kind, options.matrix == "A"
 
     def _set_damper(self, options: RigDamperOptions) -> None:
         sponge = mass_of(options.sponge_mass, "--sponge-mass")
@@ -54,30 +63,36 @@ class RigTask(Task):
         if sponge or driven:
             self.massless = damper_bench(damper)
         parts = [f"damper {self.component.name}", f"law {damper.law}"]
-        parts += [f"sponge of {1e3 * sponge:g} g"] if sponge else []
-        parts += [f"{driven:g} kg at the driven end"] if driven else []
+        parts += [f"sponge of {SPONGE_MASS.text(sponge)}"] if sponge else []
+        parts += [f"{DRIVEN_MASS.text(driven)} at the driven end"] if driven else []
         self.title = ", ".join(parts)
 
     def _set_axis(self, kind: str, options: RigAxisOptions) -> None:
         axis, name = axes_of(options.axis)[0], self.component.name
-        arm = quantities_of(options.arm, Unit("m", "mm"), "--arm")[0] if options.arm else 0.0
+        arm = (
+            quantities_of(options.arm, LINEAR.displacement.unit, "--arm")[0] if options.arm else 0.0
+        )
         if options.matrix is not None and axis.startswith("about") and not options.arm:
             arm = JIG_ARM
         bushing: Any = self.component.parameters
         self.bench = bushing_bench(bushing, axis, arm)
         what = kind if name == kind else f"{kind} {name}"
-        through = f", through an arm of {1e3 * arm:g} mm" if arm else ""
+        through = f", through an arm of {LINEAR.text(arm)}" if arm else ""
         self.title = f"{what}, axis {axis.replace('_', ' ')}{through}"
 
-    def run(self, executor: Executor) -> RigResult:
+    def run(self, executor: Executor) -> Answer:
         """Run all motions, also without the masses if there are any."""
         numbers = _numbers(self.component)
         with executor.progress(len(self.motions), "loops") as progress:
             run = run_rig(self.title, self.bench, self.motions, numbers, progress)
-        massless = None
+        measures, masses = measures_data(run), None
+        if self.is_of_a:
+            errors = printed_errors(self.kind, self.bench, self.motions)
+            measures["printed_rmse"] = RMSE_OF_A.variable("loop", errors)
+            measures.attrs["verdict"] = printed_verdict(self.kind, self.bench)
         if self.massless is not None:
-            massless = run_rig(self.title, self.massless, self.motions)
-        return RigResult(run, massless, beyond_tables(self.bench, self.motions), self.printed)
+            masses = effect_of_masses(run, run_rig(self.title, self.massless, self.motions))
+        return rig_answer(run, measures, masses, beyond_tables(self.bench, self.motions))
 
 
 def _motions(kind: str, bench: Bench, options: RigOptions) -> list[Harmonic]:
@@ -102,10 +117,10 @@ def _motions(kind: str, bench: Bench, options: RigOptions) -> list[Harmonic]:
         raise input_error(
             "needs -f and -a (for example -f '3 Hz' -a '5 mm'), or --matrix", where=f"rig {kind}"
         )
-    unit = Unit("rad", "deg") if bench.rotates else Unit("m", "mm")
+    unit = units_of(bench.rotates).displacement.unit
     return [
         Harmonic(f, a)
-        for f in quantities_of(frequency, Unit("Hz", "Hz"), "--frequency")
+        for f in quantities_of(frequency, FREQUENCY.unit, "--frequency")
         for a in quantities_of(amplitude, unit, "--amplitude")
     ]
 

@@ -1,28 +1,27 @@
-"""Page of an identification from a spin cycle."""
+"""Show an identification from a spin cycle: values found, and how well they fit."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar
 
 import numpy as np
-import pandas as pd
+import xarray as xr
 
 from wm_drake.parameters import machine_yaml
-from wm_drake.parameters.units import Unit
-from wm_drake.report.formatting import MISSING, number
-from wm_drake.report.page import Picture, Section, SectionedPage, picture
-from wm_drake.report.table import Column, Table, line, table_of
-from wm_drake.report.terminal import Printed
-from wm_drake.simulation.records import versions
-from wm_drake.studies.fitting.page import estimate_rows, search_facts, undetermined_sentences
+from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import Share
+from wm_drake.report.labelled import LabelledTable
+from wm_drake.report.quantity import HIDDEN, Quantity, text_of
+from wm_drake.studies.answer import Answer, Part, Plot
+from wm_drake.studies.fitting.fit import Fit, verdict_of
+from wm_drake.studies.fitting.page import estimates_of, fit_parts, search_facts
 from wm_drake.studies.spin_cycle.figures import bars_figure, profile_figure
-from wm_drake.studies.spin_cycle.measured import rms_table
 from wm_drake.studies.spin_cycle.page import case_description
-from wm_drake.studies.spin_cycle.study import average_errors, region_errors
 from wm_drake.studies.spin_cycle.tables import missing_warnings
-from wm_drake.studies.spin_identify.study import KNOWN, SpinIdentification, identified_machine
-from wm_drake.studies.study import Facts, Result
+from wm_drake.studies.spin_identify.study import (
+    KNOWN,
+    RELATIVE_ERROR,
+    SpinModel,
+    identified_machine,
+)
 
 VIRTUAL = (
     "This is a virtual experiment: nothing was measured. A machine with randomly planted values "
@@ -30,244 +29,178 @@ VIRTUAL = (
 )
 """First sentences of the summary of a virtual experiment."""
 
-
-@dataclass(frozen=True)
-class SpinIdentifyResult(Result):
-    """An identification, as it is shown."""
-
-    identification: SpinIdentification
-    float_formats: ClassVar[Mapping[str, str]] = {"parameters": "%.7g"}
-
-    def tables(self) -> dict[str, pd.DataFrame]:
-        """Return the unknowns, and measured and computed RMS displacements."""
-        return {
-            "parameters": values_table(self.identification),
-            "measured": rms_table(self.identification.measured),
-            "rms": rms_table(self.identification.after),
-        }
-
-    def texts(self) -> dict[str, str]:
-        """Return the result machine."""
-        return {"result.yaml": machine_yaml(identified_machine(self.identification))}
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the result for JSON."""
-        result = self.identification
-        shown = result.fit.as_dict()
-        entries = zip(result.sought, shown["unknowns"].values(), strict=True)
-        for k, (sought, entry) in enumerate(entries):
-            value, identifiable = result.fit.estimates[k].value, result.identifiable[k]
-            entry |= {"keys": list(sought.keys), "found": value, "identifiable": identifiable}
-            if result.planted is not None and result.recovered is not None:
-                entry |= {"planted": float(result.planted[k]), "error": float(result.recovered[k])}
-        return {
-            "machine": result.parameters.name,
-            "virtual_experiment": result.planted is not None,
-            "cases": [case.name for case in result.cases],
-            "average_error_before": float(average_errors(result.before, result.measured).mean()),
-            "average_error_after": result.error_after,
-            "verdict": result.verdict,
-            **shown,
-        }
-
-    def terminal(self) -> Printed:
-        """Return summary, values, and what the data do not determine."""
-        return terminal_lines(self.identification)
-
-    def page(self, facts: Facts) -> str:
-        """Return the page."""
-        return spin_identify_page(self.identification, facts)
+WITHIN = f"±{Quantity('', Share(), 0).text(KNOWN)} (95 % confidence interval)"
 
 
-def spin_identify_page(result: SpinIdentification, facts: Facts) -> str:
-    """Return the page as text of one self-contained HTML file."""
-    bars = tuple(_bars(result, index) for index in range(len(result.cases)))
-    sections = [
-        Section("comparison", "Measured and fitted", bars),
-        Section("profile", "Spin profile", (_profile_picture(result),)),
-        Section(
-            "unknowns",
-            "Values found",
-            tables=(unknowns(result),),
-            text=" ".join(undetermined_sentences(result.fit)),
-        ),
-        Section("errors", "Errors", tables=(errors(result),)),
-    ]
-    return SectionedPage(
-        f"Parameters of machine {result.parameters.name} identified from a spin cycle",
-        summary(result),
-        sections,
-        _facts(result, facts),
-        result.parameters,
-        [*facts.warnings, *warnings_of(result)],
-    ).html()
+def spin_identify_answer(
+    model: SpinModel, fit: Fit, identified: xr.Dataset, planted: FloatArray | None
+) -> Answer:
+    """Return the answer of the study.
 
-
-def terminal_lines(result: SpinIdentification) -> list[str]:
-    """Return summary, values and undetermined directions for the terminal.
-
-    Each key has a line of its own, so that no terminal breaks it.
+    Args:
+        fit, identified: As of `identify_from_spin` in `wm_drake.studies.spin_identify.study`.
+        planted: True numbers of a virtual experiment; None for a real one. [SI]
     """
-    table = unknowns(result)
-    rows = [table.header[2:], *(tuple(map(str, g.rows[0].cells[1:])) for g in table.shown)]
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    heads, *values = ["  " + "  ".join(map(str.rjust, row, widths)) for row in rows]
-    lines = [summary(result), *warnings_of(result), f"\n{heads}"]
-    for sought, text in zip(result.sought, values, strict=True):
-        lines += ["\n= ".join(sought.keys), text]
-    return [*lines, "", *undetermined_sentences(result.fit)]
+    is_virtual = planted is not None
+    names = [sought.unknown.name for sought in model.sought]
+    truth = dict(zip(names, planted, strict=True)) if planted is not None else None
+    bars = [_bars(model, identified, index) for index in range(len(model.cases))]
+    estimates, *parts = fit_parts(fit, RELATIVE_ERROR, truth)
+    cases = identified[["error_before", "error_after"]].assign(
+        about=("case", [case_description(case) for case in model.cases])
+    )
+    numbers = identified[["average_error_before", "average_error_after"]].assign(
+        verdict=((), _verdict(identified)), is_virtual_experiment=((), is_virtual)
+    )
+    errors = LabelledTable(
+        "cases",
+        cases[["about", "error_before", "error_after"]],
+        "Errors of the cases",
+        "Relative error, [A] Eq. (9), with norms over sensors and axes: mean over the regions, "
+        "before and after the search.",
+    )
+    return Answer(
+        f"Parameters of machine {model.parameters.name} identified from a spin cycle",
+        summary(model, identified, is_virtual=is_virtual),
+        model.parameters,
+        (
+            Part(
+                "Measured and fitted",
+                (
+                    *bars,
+                    _displacements("measured", identified),
+                    _displacements("after", identified),
+                ),
+            ),
+            Part("Spin profile", (_profile(model),)),
+            Part(
+                "Values found",
+                (_parameters(model, fit, identified, truth),),
+                remarks=estimates.remarks,
+            ),
+            Part("Errors", (errors, LabelledTable("numbers", numbers))),
+            *parts,
+        ),
+        (
+            ("SDF model", Path(model.parameters.model).name),
+            *search_facts(fit),
+            ("Runs of a point", str(len(model.cases))),
+            (
+                "Objective",
+                "root mean square of |measured − computed|, divided by the norm of the measured "
+                "values of the same case and region, [A] Eq. (9)",
+            ),
+        ),
+        files={
+            "identified.yaml": machine_yaml(identified_machine(model, fit, is_virtual=is_virtual))
+        },
+        warned=tuple(warnings_of(fit, identified)),
+    )
 
 
-def summary(result: SpinIdentification) -> str:
+def summary(model: SpinModel, identified: xr.Dataset, *, is_virtual: bool) -> str:
     """Return one paragraph about what the data determine and how well the machine agrees."""
-    count, known = len(result.sought), sum(result.identifiable)
-    begin, end = (
-        100.0 * float(average_errors(values, result.measured).mean())
-        for values in (result.before, result.after)
-    )
-    opening = ("" if result.planted is None else VIRTUAL) + f"{judged(result)} "
+    is_known = identified.is_identified.values
+    count, known = len(is_known), int(is_known.sum())
     unknowns_were = f"{count} unknown{'s were' if count > 1 else ' was'}"
-    cases = f"{len(result.cases)} case{'s' if len(result.cases) > 1 else ''}"
+    cases = f"{len(model.cases)} case{'s' if len(model.cases) > 1 else ''}"
     text = (
-        f"{opening}{unknowns_were} fitted to the RMS displacements of {cases}. The data determine "
-        f"{known} of {count} to within ±{number(100 * KNOWN, 0)} % (95 % confidence interval)."
+        f"{VIRTUAL if is_virtual else ''}{judged(identified)} {unknowns_were} fitted to the RMS "
+        f"displacements of {cases}. The data determine {known} of {count} to within {WITHIN}."
     )
-    if result.recovered is not None and known:
-        worst = np.max(np.abs(result.recovered[np.array(result.identifiable)]))
+    if is_virtual and known:
+        worst = np.abs(identified.error.values[is_known]).max()
         text += (
             " The determined unknowns differ from their planted values by at most "
-            f"{number(100 * worst, 2)} %."
+            f"{RELATIVE_ERROR.text(worst)}."
         )
     text += (
-        f" The search reduced the average error of an RMS displacement from {number(begin)} % to "
-        f"{number(end)} %."
+        " The search reduced the average error of an RMS displacement from "
+        f"{text_of(identified.average_error_before)} to {text_of(identified.average_error_after)}."
     )
-    left = [
-        s.unknown.name
-        for s, fine in zip(result.sought, result.identifiable, strict=True)
-        if not fine
-    ]
-    if left:
-        text += f" Not determined to this accuracy: {', '.join(left)}."
-    return text
+    left = identified["unknown"].values[~is_known].tolist()
+    return f"{text} Not determined to this accuracy: {', '.join(left)}." if left else text
 
 
-def judged(result: SpinIdentification) -> str:
+def _verdict(identified: xr.Dataset) -> str:
+    """Return whether the machine with the identified numbers fits the measured displacements."""
+    return verdict_of(identified.average_error_after.item())
+
+
+def judged(identified: xr.Dataset) -> str:
     """Return the verdict on the fit as a sentence."""
+    verdict = _verdict(identified)
     text = (
-        f"{result.verdict.capitalize()} fit: the computed RMS displacements miss the measured ones "
-        f"by {number(100.0 * result.error_after)} % on average."
+        f"{verdict.capitalize()} fit: the computed RMS displacements miss the measured ones by "
+        f"{text_of(identified.average_error_after)} on average."
     )
-    if result.verdict == "poor":
+    if verdict == "poor":
         text += " The machine does not describe the measurement: do not use the values identified."
     return text
 
 
-def warnings_of(result: SpinIdentification) -> list[str]:
+def warnings_of(fit: Fit, identified: xr.Dataset) -> list[str]:
     """Return a warning for a fit that is not good and for each search that ended at a bound."""
-    warnings = [] if result.verdict == "good" else [judged(result)]
-    warnings += missing_warnings(result.after, result.measured)
+    warnings = [] if _verdict(identified) == "good" else [judged(identified)]
+    warnings += missing_warnings(identified.after, identified.measured)
     return warnings + [
         f"The search for {e.name} ended at its {e.at_bound} bound. Widen the range, or check "
         "whether the model is right."
-        for e in result.fit.estimates
+        for e in fit.estimates
         if e.at_bound
     ]
 
 
-def unknowns(result: SpinIdentification) -> Table:
-    """Return the value of each unknown before the search, planted and found, with its interval."""
-    rows = []
-    for k, (sought, estimate) in enumerate(zip(result.sought, result.fit.estimates, strict=True)):
-        unit, half = sought.unknown.unit, 100.0 * float(result.uncertainty[k])
-        row = {
-            "unknown": sought.keys[0],
-            "set to the same value": ", ".join(key.rsplit(".", 1)[-1] for key in sought.keys[1:]),
-            "before": _with_unit(sought.unknown.start, unit),
-        }
-        if result.planted is not None:
-            row["planted"] = _with_unit(float(result.planted[k]), unit)
-        row["found"] = _with_unit(estimate.value, unit)
-        row["95 % interval, ±%"] = number(half, 2) if np.isfinite(half) else "not determined"
-        if result.recovered is not None:
-            row["error, %"] = number(100.0 * float(result.recovered[k]), 2)
-        rows.append(row)
-    caption = (
-        "Values of the unknowns. Bold: determined to within "
-        f"±{number(100 * KNOWN, 0)} % (95 % confidence interval)."
+def _parameters(
+    model: SpinModel, fit: Fit, identified: xr.Dataset, truth: dict[str, float] | None
+) -> LabelledTable:
+    """Return the estimates with a row for each key of the machine file."""
+    starts = [
+        np.nan if one.start is None else one.unit.from_si(one.start)
+        for one in (sought.unknown for sought in model.sought)
+    ]
+    rows = estimates_of(fit, truth).assign(before=("unknown", starts))
+    accuracy = [name for name in ("half_width", "error", "is_identified") if name in identified]
+    for name in accuracy:
+        rows[name] = identified[name].variable
+    for name in ("lower_bound", "upper_bound"):
+        rows[name].attrs[HIDDEN] = True
+    first = ["before", *(["planted"] if truth else []), "value", "lower_95", "upper_95", "unit"]
+    owners = [index for index, sought in enumerate(model.sought) for _ in sought.keys]
+    keys = [key for sought in model.sought for key in sought.keys]
+    return LabelledTable(
+        "parameters",
+        rows[[*first, *accuracy, "remark", "lower_bound", "upper_bound"]]
+        .isel(unknown=owners)
+        .assign_coords(unknown=keys),
+        "Values found",
+        "Values of the unknowns, each in its unit, with 95 % confidence intervals; keys of one "
+        f"unknown have the same value. Bold: determined to within {WITHIN}.",
+        marked=("is_identified", "ours"),
+        is_in_terminal=True,
     )
-    kinds = ["ours" if identifiable else "other" for identifiable in result.identifiable]
-    shown = table_of(pd.DataFrame(rows).replace("", MISSING), caption, kinds=kinds)
-    return replace(shown, text_columns=2)
 
 
-def values_table(result: SpinIdentification) -> pd.DataFrame:
-    """Return the unknowns as numbers in their unit, one row for each key."""
-    rows = []
-    for k, (sought, row) in enumerate(zip(result.sought, estimate_rows(result.fit), strict=True)):
-        unit, estimate = sought.unknown.unit, result.fit.estimates[k]
-        start = np.nan if sought.unknown.start is None else unit.from_si(sought.unknown.start)
-        numbers = {name: value for name, value in row.items() if name != "unknown"}
-        numbers |= {"identifiable": result.identifiable[k], "at_bound": estimate.at_bound}
-        if result.planted is not None and result.recovered is not None:
-            numbers["planted"] = unit.from_si(float(result.planted[k]))
-            numbers["error_percent"] = 100.0 * float(result.recovered[k])
-        rows += [{"unknown": key, "before": start, **numbers} for key in sought.keys]
-    return pd.DataFrame(rows)
+def _displacements(name: str, identified: xr.Dataset) -> LabelledTable:
+    """Return RMS displacements, in the form of files with measured ones."""
+    data = identified[[name]].rename({name: "rms", "accelerometer": "sensor"})
+    return LabelledTable("measured" if name == "measured" else "rms", data)
 
 
-def _with_unit(value: float | None, unit: Unit) -> str:
-    return MISSING if value is None else unit.reading(value, 5)
-
-
-def errors(result: SpinIdentification) -> Table:
-    """Return the relative error, [A] Eq. (9), of each case before and after the search."""
-    both = [region_errors(v, result.measured).mean("region") for v in (result.before, result.after)]
-    rows = (
-        line(
-            f"{case.name}: {case_description(case)}",
-            [100.0 * float(error.sel(case=case.name)) for error in both],
-        )
-        for case in result.cases
-    )
-    caption = (
-        "Relative error, [A] Eq. (9), with norms over sensors and axes: mean over the regions, "
-        "before and after the search."
-    )
-    columns = ("case", Column("before", "%", 2), Column("after", "%", 2))
-    return Table(caption, columns, tuple(rows))
-
-
-def _profile_picture(result: SpinIdentification) -> Picture:
-    return picture(
-        profile_figure(result.profile),
+def _profile(model: SpinModel) -> Plot:
+    return Plot(
+        profile_figure(model.profile),
         "Spin profile with its regions.",
         "Drum speed over time. Shaded areas: regions.",
     )
 
 
-def _bars(result: SpinIdentification, index: int) -> Picture:
-    case = result.cases[index]
-    measured, after = (values.sel(case=case.name) for values in (result.measured, result.after))
+def _bars(model: SpinModel, identified: xr.Dataset, index: int) -> Plot:
+    case = model.cases[index]
+    of_case = identified.sel(case=case.name)
     title = f"Case {case.name}: {case_description(case)}"
-    return picture(
-        bars_figure(after, None, measured),
+    return Plot(
+        bars_figure(of_case.after, None, of_case.measured),
         f"{title}.",
         f"{title}. RMS displacement per region, computed with the values found and measured.",
     )
-
-
-def _facts(result: SpinIdentification, facts: Facts) -> list[tuple[str, str]]:
-    return [
-        ("Machine", result.parameters.name),
-        ("SDF model", Path(result.parameters.model).name),
-        *search_facts(result.fit),
-        ("Runs of a point", str(len(result.cases))),
-        (
-            "Objective",
-            "root mean square of |measured − computed|, divided by the norm of the measured values "
-            "of the same case and region, [A] Eq. (9)",
-        ),
-        ("Versions", ", ".join(f"{name} {text}" for name, text in versions().items())),
-        *facts.rows(),
-    ]

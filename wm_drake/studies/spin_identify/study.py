@@ -5,6 +5,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -21,20 +22,27 @@ from wm_drake.parameters import (
 from wm_drake.parameters.keys import allowed_range
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.unbalance_cases import UnbalanceCase
+from wm_drake.parameters.units import Share, Unit
 from wm_drake.parameters.variation import number_at, range_of
+from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.executor import RunCases
-from wm_drake.studies.fitting.fit import Fit, FitVerdict, verdict_of
+from wm_drake.studies.fitting.fit import Fit
 from wm_drake.studies.fitting.methods import least_squares
 from wm_drake.studies.fitting.problem import FitProblem, Measurement, Progress, Unknown
 from wm_drake.studies.spin_cycle.measured import DIMS
-from wm_drake.studies.spin_cycle.study import average_errors, labels_of, runs_of
+from wm_drake.studies.spin_cycle.study import average_errors, labels_of, region_errors, runs_of
 
 SPAN = 1.5
 """Default bounds of an unknown: the number of the machine divided and multiplied by this."""
 
 PLANTED = (0.8, 1.25)
 """Range of the ratio of true number to machine's number in a virtual experiment."""
+
+AVERAGE_ERROR = Quantity("average error of an RMS displacement", Share(), 1)
+RELATIVE_ERROR = Quantity("relative error", Share(), 2)
+HALF_WIDTH = Quantity("95 % interval, ±", Share(), 2)
+DISPLACEMENT = Quantity("RMS displacement", Unit("m", "mm"), 2)
 
 KNOWN = 0.02
 """Largest relative half-width of the 95 % confidence interval of an identified unknown."""
@@ -76,62 +84,6 @@ class Sought:
     def guess(self) -> float:
         """Start of the search; without one, the geometric mean of the bounds. [SI]"""
         return float(self.unknown.start or np.sqrt(self.unknown.lower * self.unknown.upper))
-
-
-@dataclass(frozen=True)
-class SpinIdentification:
-    """Result of an identification.
-
-    Attributes:
-        parameters: The machine before the identification.
-        profile: Spin profile with regions.
-        measured: (case, region, accelerometer, axis) measured RMS displacements. [m]
-        before, after: RMS displacements of the machine before the identification and with the
-            identified numbers. [m]
-        planted: True numbers of a virtual experiment, in SI units; None for a real experiment.
-    """
-
-    parameters: MachineParameters
-    profile: SpinProfile
-    cases: tuple[UnbalanceCase, ...]
-    sought: tuple[Sought, ...]
-    fit: Fit
-    measured: xr.DataArray
-    before: xr.DataArray
-    after: xr.DataArray
-    planted: FloatArray | None = None
-
-    @property
-    def uncertainty(self) -> FloatArray:
-        """Relative half-width of the 95 % confidence interval of each unknown.
-
-        It is infinite if the data do not determine the unknown.
-        """
-        halves = [
-            0.5 * (e.upper - e.lower) / abs(e.value) if e.value else np.nan
-            for e in self.fit.estimates
-        ]
-        return np.where(np.isfinite(halves), halves, np.inf)
-
-    @property
-    def identifiable(self) -> tuple[bool, ...]:
-        """Whether the relative half-width of each unknown is at most `KNOWN`."""
-        return tuple(bool(half <= KNOWN) for half in self.uncertainty)
-
-    @property
-    def error_after(self) -> float:
-        """Average relative error of an RMS displacement with the identified numbers."""
-        return float(average_errors(self.after, self.measured).mean())
-
-    @property
-    def verdict(self) -> FitVerdict:
-        """Whether the machine with the identified numbers fits the measured displacements."""
-        return verdict_of(self.error_after)
-
-    @property
-    def recovered(self) -> FloatArray | None:
-        """Relative error of each unknown in a virtual experiment; None for a real experiment."""
-        return None if self.planted is None else self.fit.values / self.planted - 1.0
 
 
 def unknowns_of(parameters: MachineParameters, texts: Sequence[str]) -> tuple[Sought, ...]:
@@ -224,36 +176,6 @@ def planted_values(sought: Sequence[Sought], seed: int) -> FloatArray:
     return np.clip(guesses * np.exp(drawn), 1.02 * lower, 0.98 * upper)
 
 
-def identified_machine(result: SpinIdentification) -> MachineParameters:
-    """Return the machine with the identified numbers and the source of each.
-
-    A number that the data do not determine stays as it is. The machine has a name of its own.
-    """
-    virtual = "virtual experiment: " if result.planted is not None else ""
-    cases = ", ".join(case.name for case in result.cases)
-    values: dict[str, float] = {}
-    sources: dict[str, str] = {}
-    for sought, estimate in zip(result.sought, result.fit.estimates, strict=True):
-        if not estimate.determined:
-            continue
-        text = f"{virtual}identified from spin cycle, cases {cases}"
-        if estimate.at_bound:
-            text += f"; at the {estimate.at_bound} bound of the search"
-        elif np.isfinite(estimate.lower):
-            unit = sought.unknown.unit
-            lower, upper = (unit.from_si(value) for value in (estimate.lower, estimate.upper))
-            text += f"; 95 % interval {lower:.4g} to {upper:.4g} {unit.shown}"
-        values |= dict.fromkeys(sought.keys, estimate.value)
-        sources |= dict.fromkeys(sought.keys, text)
-    changed = with_values(result.parameters, values)
-    return changed.model_copy(
-        update={
-            "name": f"{result.parameters.name}_identified",
-            "sources": {**changed.sources, **sources},
-        }
-    )
-
-
 @dataclass(frozen=True)
 class SpinModel:
     """RMS displacements of unbalance cases as a function of the unknowns."""
@@ -314,7 +236,7 @@ def identify_from_spin(
     planted: FloatArray | None = None,
     seed: int = 0,
     progress: Progress = lambda fraction, least: None,
-) -> SpinIdentification:
+) -> tuple[Fit, xr.Dataset]:
     """Identify the unknowns from measured RMS displacements.
 
     The fit minimizes the root mean square of the relative errors [A] Eq. (9) of all regions and
@@ -326,25 +248,78 @@ def identify_from_spin(
         planted: True numbers of a virtual experiment, in SI units.
         progress: Called with the fraction done and the lowest error so far.
 
+    Returns:
+        The fit; and over case, region, accelerometer and axis, RMS displacements [m]: `measured`,
+        `before` the identification, and `after` it, with the identified numbers. Over `case` alone:
+        relative errors, [A] Eq. (9), `error_before` and `error_after`, means over the regions. Over
+        no dimension: `average_error_before` and `average_error_after`. Over `unknown`:
+        `half_width` of the 95 % interval by the value, infinite if the data do not determine it;
+        whether it `is_identified` to within `KNOWN`; in a virtual experiment the relative `error`.
+
     Raises:
         InputError: nothing was measured in the cases of the study.
     """
     problem = _problem(model, measured)
     fit = least_squares(problem, seed=seed, starts=1, screened=8, progress=progress)
     start = np.array([s.guess for s in model.sought])
-    before, after = (
+    computed = [
         measured.copy(data=values) for values in model.displacements(np.stack([start, fit.values]))
-    )
-    return SpinIdentification(
-        model.parameters,
-        model.profile,
-        model.cases,
-        model.sought,
-        fit,
-        measured,
-        before,
-        after,
-        planted,
+    ]
+    data: dict[str, Any] = {"measured": DISPLACEMENT.variable(DIMS, measured)}
+    for name, values in zip(("before", "after"), computed, strict=True):
+        error = region_errors(values, measured).mean("region")
+        average = average_errors(values, measured).mean()
+        data[name] = DISPLACEMENT.named(name).variable(DIMS, values)
+        data[f"error_{name}"] = RELATIVE_ERROR.named(name).variable("case", error)
+        words = f"{AVERAGE_ERROR.words} {name}"
+        data[f"average_error_{name}"] = AVERAGE_ERROR.named(words).variable((), average)
+    halves = half_widths(fit)
+    data["half_width"] = HALF_WIDTH.variable("unknown", halves)
+    data["is_identified"] = ("unknown", halves <= KNOWN)
+    if planted is not None:
+        data["error"] = RELATIVE_ERROR.named("error").variable(
+            "unknown", fit.values / planted - 1.0
+        )
+    coords = {str(dim): measured[dim].values for dim in DIMS}
+    names = [sought.unknown.name for sought in model.sought]
+    return fit, xr.Dataset(data, {**coords, "unknown": names})
+
+
+def half_widths(fit: Fit) -> FloatArray:
+    """Return half the 95 % interval of each estimate by its value; infinite without an interval."""
+    halves = [
+        0.5 * (e.upper - e.lower) / abs(e.value) if e.value else np.nan for e in fit.estimates
+    ]
+    return np.where(np.isfinite(halves), halves, np.inf)
+
+
+def identified_machine(model: SpinModel, fit: Fit, *, is_virtual: bool) -> MachineParameters:
+    """Return the machine with the identified numbers and the source of each.
+
+    A number that the data do not determine stays as it is. The machine has a name of its own.
+    """
+    virtual = "virtual experiment: " if is_virtual else ""
+    cases = ", ".join(case.name for case in model.cases)
+    values: dict[str, float] = {}
+    sources: dict[str, str] = {}
+    for sought, estimate in zip(model.sought, fit.estimates, strict=True):
+        if not estimate.determined:
+            continue
+        text = f"{virtual}identified from spin cycle, cases {cases}"
+        if estimate.at_bound:
+            text += f"; at the {estimate.at_bound} bound of the search"
+        elif np.isfinite(estimate.lower):
+            unit = sought.unknown.unit
+            lower, upper = (unit.from_si(value) for value in (estimate.lower, estimate.upper))
+            text += f"; 95 % interval {lower:.4g} to {upper:.4g} {unit.shown}"
+        values |= dict.fromkeys(sought.keys, estimate.value)
+        sources |= dict.fromkeys(sought.keys, text)
+    changed = with_values(model.parameters, values)
+    return changed.model_copy(
+        update={
+            "name": f"{model.parameters.name}_identified",
+            "sources": {**changed.sources, **sources},
+        }
     )
 
 

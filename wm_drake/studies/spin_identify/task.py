@@ -4,11 +4,12 @@ from functools import partial
 from typing import Any
 
 from wm_drake.model.machine import Machine
+from wm_drake.studies.answer import Answer
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import runnable_profile
 from wm_drake.studies.spin_cycle.study import cases_of_table, measured_displacements
 from wm_drake.studies.spin_identify.options import SpinIdentifyOptions
-from wm_drake.studies.spin_identify.page import SpinIdentifyResult
+from wm_drake.studies.spin_identify.page import spin_identify_answer
 from wm_drake.studies.spin_identify.study import (
     SpinModel,
     identify_from_spin,
@@ -48,7 +49,7 @@ class SpinIdentifyTask(Task):
             "noise": f"{self.options.noise:g}, seed {self.options.seed}",
         }
 
-    def run(self, executor: Executor) -> SpinIdentifyResult:
+    def run(self, executor: Executor) -> Answer:
         """Identify the unknowns, from measurements or from a virtual experiment."""
         seed, measured, planted = self.options.seed, self.measured, None
         with executor.fraction("search") as report:
@@ -59,11 +60,11 @@ class SpinIdentifyTask(Task):
             if measured is None:
                 planted = planted_values(self.sought, seed)
                 measured = virtual_experiment(model, planted, self.options.noise, seed)
-            identified = identify_from_spin(
+            fit, identified = identify_from_spin(
                 model,
                 measured,
                 planted=planted,
                 seed=seed,
                 progress=lambda fraction, least: report(fraction),
             )
-        return SpinIdentifyResult(identified)
+        return spin_identify_answer(model, fit, identified, planted)
