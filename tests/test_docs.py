@@ -191,9 +191,10 @@ def test_upper_bounds_of_the_compiler_allow_what_is_installed():
         assert installed < (int(bound[1]), int(bound[2]))
 
 
-def test_the_page_of_keys_has_those_of_the_program():
+@pytest.mark.parametrize("name", ["machine_keys.py", "sdf_elements.py"])
+def test_pages_of_keys_and_of_elements_have_those_of_the_program(name):
     """Run in a process of its own: other tests register kinds of elements."""
-    script = CHECKOUT / "docs" / "extensions" / "machine_keys.py"
+    script = CHECKOUT / "docs" / "extensions" / name
     done = subprocess.run([sys.executable, script, "--check"], cwd=CHECKOUT, check=False)
     assert done.returncode == 0, f"run: python {script.relative_to(CHECKOUT)}"
 

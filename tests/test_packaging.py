@@ -118,7 +118,7 @@ wm-drake rig gasket --axis axial -f '1,5 Hz' -a '1 mm' --out ring
 wm-drake identify gasket ring/loop_*.csv --axis axial --law voigt --out ring_fit
 wm-drake identify table2 --quick --out table2
 wm-drake gasket curves folded --points 2 --elements 6 --around 3 --axial '1 mm' --radial '1 mm' --tilt '1 deg' --twist '1 deg' --out curves
-wm-drake spin --load middle --profile short_cycle.yaml --out spin
+wm-drake spin --load middle --out spin
 wm-drake record orders spin/record_middle.nc --out orders
 wm-drake calibrate --machine short.yaml --free free.yaml --targets measured.csv --quick --out calibrate
 wm-drake verdict short.yaml --samples 16 --out verdict
@@ -127,14 +127,14 @@ wm-drake study balancer --quick --place '0 mm' --damping '100 %' --release '80 r
 wm-drake study design gasket --quick --profile short_cycle.yaml --out design
 wm-drake study drive --quick --load middle --out drive
 wm-drake study gasket --quick --response D --profile short_cycle.yaml --out gasket
-wm-drake study gasket-damping --quick --record middle=spin/record_middle.nc --out gasket_damping
+wm-drake study gasket-damping --mesh 20 --record middle=spin/record_middle.nc --out gasket_damping
 wm-drake study gasket-geometry --quick --profile short_cycle.yaml --out gasket_geometry
 wm-drake study modes --quick --out modes
 wm-drake study response --quick --load middle --out response
 wm-drake study spin-cycle --quick --profile eight_regions.yaml --out spin_cycle
 wm-drake study spin-identify --quick --case 2 --unknown 'gasket.stiffness_y=(1, 4) N/mm' --profile short_cycle.yaml --out spin_identify
 wm-drake study tolerance laundry --samples 32 --subset 0 --profile short_cycle.yaml --out tolerance
-wm-drake studio --no-browser --quiet & sleep 5; kill -INT $!; wait $! || test $? = 130
+wm-drake studio --no-browser > studio.txt & until grep -q http studio.txt; do kill -0 $!; sleep 1; done; kill $!; wait $! || test $? = 143
 """  # fmt: skip
 
 

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from wm_drake.model.sdf_elements import Nothing, Refused, kinds
+from wm_drake.model.sdf_elements import Empty, Refused, kinds
 
 PAGE = Path(__file__).parents[1] / "reference" / "sdf-elements.md"
 """Page with the elements."""
@@ -27,7 +27,7 @@ def rows() -> Iterator[str]:
         if isinstance(kind, Refused):
             refused.setdefault(kind.why, []).append(_place(path))
             continue
-        text = "" if isinstance(kind.value, Nothing) else kind.value.allowed
+        text = "" if isinstance(kind.value, Empty) else kind.value.allowed
         names = ", ".join(f"`{name}`" for name in kind.attributes)
         honoured.setdefault(f"{kind.meaning} | {text} | {names}", []).append(_place(path))
     yield "## Honoured\n"
@@ -49,7 +49,7 @@ def _table(places: dict[str, list[str]]) -> Iterator[str]:
 
 def _place(path: tuple[str, ...]) -> str:
     """Return the last two names of a path, which tell elements of one name apart."""
-    return f"`{'/'.join(path[-2:])}`"
+    return f"`{'/'.join(path[-2:])}`" if len(path) > 2 else f"`<{path[-1]}>`"
 
 
 def filled(text: str) -> str:

@@ -222,7 +222,7 @@ CASES = {  # command -> arguments, message, more files
     "study gasket-damping --out out": [
         ("--record r.csv", "does not have the form LOAD=FILE with a load of the machine", {"r.csv": "time_s,Xr\n0,1\n"}),
         ("--record middle=nosuch.csv", "no such file 'nosuch.csv'"),
-        ("--record middle=r.csv", "r.csv: needs the columns time_s,Xr,Yr", {"r.csv": "time_s,Xr\n0,1\n"}),
+        ("--record middle=r.csv", "r.csv: has no channel 'Yr'; its channels are time_s, Xr", {"r.csv": "time_s,Xr\n0,1\n1,2\n"}),
         ("--planted-linear '3 N'", "unit 'N' does not fit"),
     ],
     "study tolerance t.yaml --profile p.yaml --subset 0 --out out": [
@@ -255,8 +255,11 @@ CASES = {  # command -> arguments, message, more files
     ],
     "record orders a.csv --out out": [
         ("", "speed_rpm", {"a.csv": "time_s,A\n0,1\n1,2\n"}),
-        ("", "differ", {"a.csv": "time_s,speed_rpm,A\n0,60,1\n0.1,60,2\n0.5,60,1\n"}),
-        ("", "revolutions", {"a.csv": "time_s,speed_rpm,A\n0,60,1\n0.1,60,2\n0.2,60,1\n"}),
+        ("", "differ", {"a.csv": "time_s,speed_rpm,A [g]\n0,60,1\n0.1,60,2\n0.5,60,1\n"}),
+        ("", "revolutions", {"a.csv": "time_s,speed_rpm,A [g]\n0,60,1\n0.1,60,2\n0.2,60,1\n"}),
+        ("", "resolve no order", {"a.csv": "time [s],speed [rpm],A [g]\n" + "".join(f"{10 * k},1400,{k % 2}\n" for k in range(99))}),
+        ("--unit 'A=furl'", "--unit: unit 'furl' is not known", {"a.csv": "time_s,speed_rpm,A\n0,60,1\n"}),
+        ("--unit 'B=g'", "--unit: a.csv has no channel 'B'", {"a.csv": "time_s,speed_rpm,A\n0,60,1\n1,60,2\n"}),
     ],
 }  # fmt: skip
 COMMA = "the decimal sign is a point"

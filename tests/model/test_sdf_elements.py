@@ -14,10 +14,10 @@ from wm_drake.model.bodies import SDF_FOLDER
 from wm_drake.model.sdf_elements import (
     SHAPES,
     Choice,
+    Empty,
     Kind,
     Limit,
     Name,
-    Nothing,
     Numbers,
     Pose,
     Refused,
@@ -30,7 +30,7 @@ from wm_drake.model.sdf_text import read_sdf
 KINDS = dict(kinds())
 HONOURED = {path: kind for path, kind in KINDS.items() if isinstance(kind, Kind)}
 REFUSED = [path for path, kind in KINDS.items() if isinstance(kind, Refused)]
-WITH_VALUE = [path for path, kind in HONOURED.items() if not isinstance(kind.value, Nothing)]
+WITH_VALUE = [path for path, kind in HONOURED.items() if not isinstance(kind.value, Empty)]
 NUMBERS = [p for p in WITH_VALUE if isinstance(HONOURED[p].value, Numbers | Pose | Limit)]
 
 
@@ -45,7 +45,7 @@ def value_of(path):
         return "inf"
     if isinstance(kind, Choice):
         return kind.words[0]
-    return "" if isinstance(kind, Nothing) else "text"
+    return "" if isinstance(kind, Empty) else "text"
 
 
 def element(path, inside=""):

@@ -9,7 +9,7 @@ from lab_writers import WRITERS
 
 from wm_drake.errors import InputError
 from wm_drake.parameters import read_loop
-from wm_drake.parameters.lab_files import read_channels
+from wm_drake.parameters.recorded import ChannelNames, read_recording
 
 TIME = np.linspace(0.0, 2.0, 201)
 MM, KN = 5.0 * np.sin(TIME), 0.1 * np.cos(TIME)
@@ -52,7 +52,7 @@ def test_channels_are_chosen_by_name(tmp_path, suffix):
 
 
 def read_named(path, channels):
-    return read_loop(path, None, channels)
+    return read_loop(path, ChannelNames(channels))
 
 
 def test_columns_of_a_csv_are_chosen_by_name(tmp_path):
@@ -61,7 +61,9 @@ def test_columns_of_a_csv_are_chosen_by_name(tmp_path):
     path.write_text("\n".join(["time [s],Pos 1 [mm],Load cell [kN]", *rows]))
     loop = read_named(path, {"displacement": "Pos 1", "force": "Load cell"})
     assert loop.force == pytest.approx(1e3 * KN)
-    with pytest.raises(InputError, match="no column 'Pos' among"):
+    with pytest.raises(
+        InputError, match="has no channel 'Pos'; its channels are time, Pos 1, Load cell"
+    ):
         read_named(path, {"displacement": "Pos"})
 
 
@@ -70,7 +72,7 @@ def test_a_mat_file_that_matlab_wrote_is_read():
     path = folder / "testdouble_7.4_GLNX86.mat"
     if not path.is_file():
         pytest.skip("scipy is installed without its test files")
-    (channel,) = read_channels(path)
+    (channel,) = read_recording(path).signals
     assert channel.name == "testdouble"
     assert channel.values == pytest.approx(np.arange(9) * np.pi / 4.0)
 
@@ -91,5 +93,5 @@ def test_a_unit_of_another_dimension_is_refused(tmp_path):
     with pytest.raises(InputError, match="unit 'N' does not fit"):
         read_loop(path)
     scipy.io.savemat(path, {"t_s": TIME[:50], "displacement_mm": MM, "force_N": KN})
-    with pytest.raises(InputError, match="different numbers of samples"):
+    with pytest.raises(InputError, match="the file has no time for this channel"):
         read_loop(path)

@@ -5,6 +5,7 @@ import pytest
 
 from wm_drake.errors import InputError
 from wm_drake.parameters import load_component, read_loop, read_loops, shipped_components
+from wm_drake.parameters.recorded import ChannelNames
 
 TIME = np.linspace(0.0, 1.0, 40)
 DISPLACEMENT, FORCE = 5.0 * np.sin(TIME), 30.0 * np.cos(TIME)
@@ -59,7 +60,8 @@ def test_columns_may_be_in_any_order_among_others(tmp_path):
 
 
 def test_units_may_come_from_the_command_line(tmp_path):
-    loop = read_loop(written(tmp_path, "time,displacement,force"), ("s", "mm", "N"))
+    names = ChannelNames(units={"time": "s", "displacement": "mm", "force": "N"})
+    loop = read_loop(written(tmp_path, "time,displacement,force"), names)
     assert loop.displacement[-1] == pytest.approx(5e-3 * np.sin(1.0), abs=1e-8)
 
 
@@ -72,20 +74,19 @@ def test_angle_and_moment_are_a_rotation(tmp_path):
 @pytest.mark.parametrize(
     ("head", "lines", "message"),
     [
-        ("time [s], force [N]", None, ":2: no column displacement among 'time [s], force [N]'"),
-        ("time [s], displacement [mm], d [mm]", None, ":2: 'd [mm]' is a second column of displacement"),
-        ("time [s], displacement [mm], moment [N m]", None, ":2: mixes a rotation with a translation"),
-        ("time [s], displacement [mm], force", None, ":2: force: has no unit; write 'force [N]' in the header or use --units"),
-        ("time [s], displacement [N], force [N]", None, ":2: displacement [N]: unit 'N' does not fit; allowed is a unit such as mm"),
-        ("time [s], displacement [furl], force [N]", None, ":2: displacement [furl]: unit 'furl' is not known"),
-        (HEAD, changed(3, "0.1,nan,2.0"), ":6: displacement [mm]: 'nan' is not a finite number"),
-        (HEAD, changed(3, "0.1,1.0,inf"), ":6: force [N]: 'inf' is not a finite number"),
+        ("time [s], force [N]", [f"{t},1" for t in TIME], ": has no channel of displacement; its channels are time, force; choose one: --channels displacement=NAME"),
+        ("time [s], displacement [mm], d [mm], force [N]", [f"{row},0" for row in rows()], ": has several channels of displacement: displacement, d; choose one"),
+        ("time [s], displacement [mm], moment [N m]", None, ": mixes a rotation with a translation"),
+        ("time [s], displacement [mm], force", None, ": force: has no unit; write 'force [N]' in the header, or name it: --unit 'force=N'"),
+        ("time, displacement [mm], force [N]", None, ": time: has no unit; write 'time [s]' in the header, or name it: --unit time=s"),
+        ("time [s], displacement [N], force [N]", None, ": displacement [N]: unit 'N' does not fit; allowed is a unit such as mm"),
+        ("time [s], displacement [furl], force [N]", None, ": displacement [furl]: unit 'furl' is not known"),
         (HEAD, changed(3, "0.1,1.0,-"), ":6: force [N]: '-' is not a number"),
         (HEAD, changed(3, "0.1,5 mm,3.0"), ":6: displacement [mm]: '5 mm' is not a number"),
         (HEAD, changed(3, "0.1,1.0"), ":6: has 2 values but the header has 3 columns"),
         (HEAD, changed(5, "0.01,1.0,2.0"), ":8: time [s]: time falls: 0.01 after 0.102564"),
-        (HEAD, rows(force=np.full(40, 7.0)), ":3: force [N]: is constant (7 on lines 3 to 42)"),
-        (HEAD, rows(displacement=np.zeros(40)), ":3: displacement [mm]: is constant"),
+        (HEAD, rows(force=np.full(40, 7.0)), ": force [N]: is constant (7 in SI)"),
+        (HEAD, rows(displacement=np.zeros(40)), ": displacement [mm]: is constant"),
         (HEAD, rows()[:19], ": has 19 samples; a loop needs at least 20"),
     ],
 )  # fmt: skip
@@ -98,10 +99,9 @@ def test_a_bad_file_gets_one_message_with_file_and_line(tmp_path, head, lines, m
 
 
 def test_contradicting_units_are_refused(tmp_path):
-    with pytest.raises(
-        InputError, match=r":2: force \[N\]: is in N by the header, in kN by --units"
-    ):
-        read_loop(written(tmp_path), ("s", "mm", "kN"))
+    with pytest.raises(InputError, match="force: is in N by the file, in kN by the option"):
+        read_loop(written(tmp_path), ChannelNames(units={"force": "kN"}))
+    read_loop(written(tmp_path), ChannelNames(units={"force": "newton"}))
 
 
 def test_all_bad_files_are_reported_at_once_and_kinds_are_not_mixed(tmp_path):
@@ -123,7 +123,7 @@ def test_all_bad_files_are_reported_at_once_and_kinds_are_not_mixed(tmp_path):
 def test_empty_file(tmp_path):
     path = tmp_path / "empty.csv"
     path.write_text("# nothing\n")
-    with pytest.raises(InputError, match="is empty; needs the columns time, displacement, force"):
+    with pytest.raises(InputError, match="is empty; a recording has a line of names"):
         read_loop(path)
 
 

@@ -102,3 +102,10 @@ def test_bad_regions_are_refused(tmp_path, regions, message):
     with pytest.raises(InputError) as refused:
         load_profile(path)
     assert message in str(refused.value)
+
+
+def test_names_of_cases_are_texts(tmp_path):
+    path, names = tmp_path / "cases.csv", ["01", "1", "1e3", "NA", "true", "007", "1_0"]
+    rows = "".join(f"{name},300,0,0\n" for name in names)
+    path.write_text(f"case,front_g,rear_g,phase_deg\n{rows}")
+    assert [case.name for case in load_unbalance_cases(path)] == names

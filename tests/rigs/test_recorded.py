@@ -6,6 +6,7 @@ from scipy.integrate import solve_ivp
 from scipy.signal import chirp, sawtooth
 
 from wm_drake.elements.damper_law import damper_response
+from wm_drake.errors import InputNotice
 from wm_drake.parameters import CoulombDamper, MeasuredLoop, load_component, load_machine
 from wm_drake.rigs import Harmonic, bushing_bench, damper_bench, force_loops
 from wm_drake.rigs.forces import damper_tensions
@@ -37,6 +38,17 @@ def recorded(displacement, time=TIME, cutoff=None):
     return measured_motion(
         MeasuredLoop("test", "test.csv", time, displacement, np.ones_like(time), False), cutoff
     )
+
+
+def test_a_motion_with_a_gap_is_cut_to_its_longest_part():
+    kept = (TIME < 1.0) | (TIME > 1.5)
+    gaps = np.array([[TIME[kept & (TIME < 1.0)][-1], TIME[TIME > 1.5][0]]])
+    time, values = TIME[kept], RANDOM[kept]
+    with pytest.warns(InputNotice, match=r"used is the longest part without one, 1\.501 to 3 s"):
+        found = measured_motion(MeasuredLoop("t", "t.csv", time, values, values, False, gaps))
+    np.testing.assert_array_equal(found.loop.time, TIME[TIME > 1.5])
+    whole = recorded(RANDOM[TIME > 1.5], TIME[TIME > 1.5])
+    np.testing.assert_array_equal(found.rate, whole.rate)
 
 
 @pytest.mark.parametrize("name", MOTIONS)

@@ -7,6 +7,7 @@ from lab_writers import WRITERS
 
 from wm_drake.errors import InputError
 from wm_drake.parameters import SpinProfile
+from wm_drake.parameters.recorded import ChannelNames
 from wm_drake.parameters.spin import Region
 from wm_drake.studies.orders.study import read_signals
 from wm_drake.studies.spin_cycle.measured import read_accelerations
@@ -70,7 +71,7 @@ def test_a_record_of_a_laboratory_is_that_of_a_csv(tmp_path, suffix):
     write_csv(
         tmp_path / "run.csv", {"time_s": TIME, "speed_rpm": SPEED, "Xr": 1e3 * ACCELERATIONS[0]}
     )
-    found, expected = read_signals(path, "mm"), read_signals(tmp_path / "run.csv", "mm")
+    found, expected = read_signals(path, unit="mm"), read_signals(tmp_path / "run.csv", unit="mm")
     assert (found.names, found.unit) == (["Xr"], "mm")
     np.testing.assert_allclose(found.angle, expected.angle, rtol=1e-6, atol=1e-6)
     np.testing.assert_allclose(found.values, expected.values, rtol=1e-6, atol=1e-4)
@@ -85,8 +86,8 @@ def test_wrong_files_are_refused(tmp_path):
     with pytest.raises(InputError, match=r"has front\.csv and front\.mat; give one file"):
         read_accelerations(tmp_path, LABELS, PROFILE)
     scipy.io.savemat(tmp_path / "x.mat", {"S1_x": ACCELERATIONS[0]})
-    with pytest.raises(InputError, match="needs one channel speed_rpm or speed"):
-        read_signals(tmp_path / "x.mat", "mm")
+    with pytest.raises(InputError, match="needs one channel of the drum speed"):
+        read_signals(tmp_path / "x.mat")
 
 
 def write_named_csv(path, channels):
@@ -112,10 +113,10 @@ def test_channels_are_chosen_by_name(tmp_path, suffix):
     plain.mkdir()
     write_csv(plain / "front.csv", {"time_s": TIME, **dict(zip(NAMES, ACCELERATIONS, strict=True))})
     wanted = read_accelerations(plain, LABELS, PROFILE)
-    found = read_accelerations(tmp_path, LABELS, PROFILE, names | clock)
+    found = read_accelerations(tmp_path, LABELS, PROFILE, ChannelNames(names | clock))
     np.testing.assert_allclose(found, wanted, rtol=1e-9)
     chosen = {"speed": "Drum", "side": names["S1_y"], **clock}
-    signals = read_signals(tmp_path / f"front{suffix}", "m/s^2", chosen)
+    signals = read_signals(tmp_path / f"front{suffix}", ChannelNames(chosen))
     assert signals.names == ["side"]
     assert signals.unit == ("m/s^2" if suffix == ".mat" else "g")
     size = np.max(np.abs(signals.values)) * (1.0 if suffix == ".mat" else G)
@@ -127,6 +128,6 @@ def test_channels_are_chosen_by_name(tmp_path, suffix):
 def test_wrong_names_of_channels_are_refused(tmp_path):
     write_named_csv(tmp_path / "front.csv", {"Acc 0": (ACCELERATIONS[0], "g")})
     with pytest.raises(InputError, match="no word 'S9_x'"):
-        read_accelerations(tmp_path, LABELS, PROFILE, {"S9_x": "Acc 0"})
+        read_accelerations(tmp_path, LABELS, PROFILE, ChannelNames({"S9_x": "Acc 0"}))
     with pytest.raises(InputError, match="has no channel 'Acc 7'"):
-        read_accelerations(tmp_path, LABELS, PROFILE, {"S1_x": "Acc 7"})
+        read_accelerations(tmp_path, LABELS, PROFILE, ChannelNames({"S1_x": "Acc 7"}))

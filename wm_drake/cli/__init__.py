@@ -47,7 +47,7 @@ COMMANDS = {
     ),
     "machine": ("wm_drake.cli.machine:app", "List, start, check and show machine files."),
     "record": (
-        "wm_drake.studies.orders.options:ORDERS",
+        "wm_drake.cli.record:app",
         "Look at records of runs and at measurements.",
     ),
     "rig": (

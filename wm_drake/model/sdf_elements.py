@@ -39,7 +39,7 @@ class Value(Protocol):
 
 
 @dataclass(frozen=True)
-class Nothing:
+class Empty:
     """No text: the element holds others, or is a sign by itself."""
 
     allowed = ""
@@ -222,7 +222,7 @@ class Kind:
     """
 
     meaning: str
-    value: Value = Nothing()
+    value: Value = Empty()
     children: Mapping[str, "Kind | Refused"] = field(default_factory=dict)
     attributes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     needed: tuple[str, ...] = ()
@@ -550,7 +550,7 @@ def _faults(root: Node, kind: Kind) -> Iterator[_Fault]:
     waiting = [(root, kind)]
     while waiting:
         node, kind = waiting.pop()
-        yield from _own_faults(node, kind)
+        yield from _faults_of(node, kind)
         inside = []
         for child in node.children:
             of = kind.children.get(child.tag)
@@ -564,8 +564,8 @@ def _faults(root: Node, kind: Kind) -> Iterator[_Fault]:
         waiting.extend(reversed(inside))
 
 
-def _own_faults(node: Node, kind: Kind) -> Iterator[_Fault]:
-    if node.has_comment and not isinstance(kind.value, Nothing):
+def _faults_of(node: Node, kind: Kind) -> Iterator[_Fault]:
+    if node.has_comment and not isinstance(kind.value, Empty):
         yield node, node, "has a comment inside; move it out, so that the value is read as a whole"
     elif fault := kind.value.fault(node):
         yield node, node, fault

@@ -74,13 +74,13 @@ class Node:
     @property
     def label(self) -> str:
         """Return what it is, in words, such as `<mass> of link 'tub'`."""
-        own = f"{self.tag} '{self.name}'" if self.name else f"<{self.tag}>"
+        label = f"{self.tag} '{self.name}'" if self.name else f"<{self.tag}>"
         above = self.parent
         while above is not None and not above.name:
             above = above.parent
         if above is None or above.tag == "model":
-            return own
-        return f"{own} of {above.label}" if self.tag != "link" else own
+            return label
+        return f"{label} of {above.label}" if self.tag != "link" else label
 
 
 def read_sdf(text: str) -> Node:

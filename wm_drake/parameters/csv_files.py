@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wm_drake.errors import InputNotice, Problem, input_error
-from wm_drake.parameters.text_files import read_text
+from wm_drake.parameters.text_files import read_any_text
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import LARGEST_NUMBER, comma_hint
 
@@ -22,7 +22,10 @@ _SIGNS = "; columns are separated by commas, and the decimal sign is a point"
 def read_csv(
     path: str | Path, columns: list[str], key: str = "", optional: str = ""
 ) -> "pd.DataFrame":
-    """Read a CSV file with given columns.
+    """Read a CSV file with given columns; all cells are texts.
+
+    So a name stays as it is written, such as ``01``, ``1e3``, ``NA`` or ``true``. `finite_numbers`
+    returns the columns of numbers.
 
     Args:
         columns: Names of the columns that the file must have, in this order.
@@ -35,7 +38,7 @@ def read_csv(
     """
     import pandas as pd  # slow to import: CSV files
 
-    text = read_text(Path(path), key=key)
+    text = read_any_text(Path(path), key=key)
     try:
         named = list(_table(text, nrows=0).columns)
         if named not in (columns, [*columns, optional]):
@@ -88,14 +91,14 @@ def finite_numbers(table: "pd.DataFrame", path: str | Path, key: str = "") -> Fl
 
 def data_lines(path: Path) -> list[int]:
     """Return the numbers of the lines of a CSV file with rows of data: no comment, not blank."""
-    lines = enumerate(read_text(path).splitlines(), start=1)
+    lines = enumerate(read_any_text(path).splitlines(), start=1)
     return [number for number, line in lines if line.partition("#")[0].strip()][1:]
 
 
 def read_header(path: Path, key: str = "") -> list[str]:
     """Return the names of the columns of a CSV file."""
     try:
-        return list(map(str, _table(read_text(path, key=key), nrows=0).columns))
+        return list(map(str, _table(read_any_text(path, key=key), nrows=0).columns))
     except ValueError as error:
         reason = " ".join(str(error).split())
         raise input_error(f"cannot be read as CSV ({reason})", where=str(path), key=key) from None
@@ -103,7 +106,7 @@ def read_header(path: Path, key: str = "") -> list[str]:
 
 def read_note(path: Path, key: str = "") -> str:
     """Return the comment that a CSV file begins with, in one line; "" if there is none."""
-    lines = read_text(path, key=key).splitlines()
+    lines = read_any_text(path, key=key).splitlines()
     comments = itertools.takewhile(lambda line: line.startswith("#"), lines)
     return " ".join(line.lstrip("# ").rstrip() for line in comments)
 
@@ -118,7 +121,15 @@ def _table(text: str, **options: Any) -> "pd.DataFrame":
     head = next((line for line in text.splitlines() if line.partition("#")[0].strip()), "")
     if head.count(",") >= MOST_COLUMNS:
         raise ValueError(f"{head.count(',') + 1} columns; allowed are up to {MOST_COLUMNS}")
-    return pd.read_csv(io.StringIO(text), comment="#", skipinitialspace=True, **options)
+    table = pd.read_csv(
+        io.StringIO(text),
+        comment="#",
+        skipinitialspace=True,
+        dtype=str,
+        keep_default_na=False,
+        **options,
+    )
+    return table.apply(lambda column: column.str.strip()) if len(table) else table
 
 
 def with_distinct_times(samples: FloatArray, where: str) -> FloatArray:

@@ -144,9 +144,7 @@ def load_profile(name_or_path: str | Path) -> SpinProfile:
         )
     }
     if "region" in table:
-        fields["regions"] = _regions(
-            numbers[:, 0].tolist(), table["region"].fillna("").astype(str).tolist()
-        )
+        fields["regions"] = _regions(numbers[:, 0].tolist(), table["region"].tolist())
     return _validated(SpinProfile, fields, path)
 
 

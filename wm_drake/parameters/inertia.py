@@ -66,8 +66,9 @@ class InertiaMatrix(Frozen):
         return inertia_matrix(self.xx, self.yy, self.zz, self.xy, self.xz, self.yz)
 
 
-def inertia_matrix(xx: float, yy: float, zz: float, xy: float, xz: float, yz: float) -> FloatArray:
-    """Return a symmetric matrix from its elements. (3, 3)"""
+def inertia_matrix(*elements: float) -> FloatArray:
+    """Return a symmetric matrix from its elements xx, yy, zz, xy, xz, yz. (3, 3)"""
+    xx, yy, zz, xy, xz, yz = elements
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 

@@ -97,9 +97,7 @@ class _Row:
 
     def text(self, column: str) -> str:
         """Return the text of a cell, which may be empty."""
-        import pandas as pd  # slow to import: CSV files
-
-        return "" if pd.isna(self.cells[column]) else str(self.cells[column]).strip()
+        return str(self.cells[column])
 
     def word(self, column: str) -> str:
         """Return the text of a cell that must not be empty."""

@@ -1,5 +1,7 @@
 """Files that a user names: shipped ones by name, others by path, of limited size and in UTF-8."""
 
+import codecs
+import re
 import stat
 from dataclasses import dataclass
 from pathlib import Path
@@ -90,10 +92,42 @@ def read_text(path: Path, *, key: str = "", largest: int = LARGEST_TABLE) -> str
         key: Key path for messages.
         largest: Largest size. [byte]
     """
-    check_regular(path, key=key, largest=largest)
     try:
-        return path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise input_error(reason_of(error), where=str(path), key=key) from None
+        return _read_bytes(path, key, largest).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise input_error("is not text in UTF-8", where=str(path), key=key) from None
+
+
+def read_any_text(path: Path, *, key: str = "", largest: int = LARGEST_TABLE) -> str:
+    """Return the text of a regular file as spreadsheets and loggers write it.
+
+    It is in UTF-8, in UTF-16 with a byte order mark, or in the code page 1252 of Western Windows,
+    in which ``µ`` and ``°`` are one byte.
+
+    Args:
+        key: Key path for messages.
+        largest: Largest size. [byte]
+    """
+    content = _read_bytes(path, key, largest)
+    is_wide = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    for encoding in ("utf-16",) if is_wide else ("utf-8-sig", "cp1252"):
+        try:
+            text = content.decode(encoding)
+        except UnicodeDecodeError:
+            continue
+        if not _NO_TEXT.search(text):
+            return text
+    message = "is not text in UTF-8, in UTF-16 with a byte order mark, or in code page 1252"
+    raise input_error(message, where=str(path), key=key)
+
+
+_NO_TEXT = re.compile(r"[\x00-\x08\x0e-\x1f]")
+"""Characters that no text has."""
+
+
+def _read_bytes(path: Path, key: str, largest: int) -> bytes:
+    check_regular(path, key=key, largest=largest)
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise input_error(reason_of(error), where=str(path), key=key) from None

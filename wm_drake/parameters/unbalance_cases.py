@@ -107,16 +107,14 @@ def load_unbalance_cases(path: Path = TABLE_9) -> list[UnbalanceCase]:
 
 
 def _case(path: Path, row: Mapping[Hashable, Any]) -> UnbalanceCase:
-    import pandas as pd  # slow to import: CSV files
-
     units = {"front_g": "g", "rear_g": "g", "phase_deg": "deg"}
     fields: dict[str, object] = {
         name: f"{row[column]} {units[column]}" for column, name in _COLUMNS.items()
     }
-    if pd.notna(row.get(_PUBLISHED)):
+    if row.get(_PUBLISHED):
         fields[_PUBLISHED] = row[_PUBLISHED]
     try:
-        return UnbalanceCase.model_validate({"name": str(row["case"]), **fields})
+        return UnbalanceCase.model_validate({"name": row["case"], **fields})
     except ValidationError as error:
         problems = problems_of(error, UnbalanceCase)
         raise InputError(

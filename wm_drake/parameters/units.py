@@ -1,5 +1,6 @@
 """Conversion of text with units to floats in SI units, and back for tables and files."""
 
+import contextlib
 import functools
 import math
 import re
@@ -301,26 +302,85 @@ def _matched(form: re.Pattern[str], text: str, longest: int) -> re.Match[str] | 
 
 
 _INSTRUMENT_UNITS = {
-    "Nm": "N*m",
-    "Nmm": "N*mm",
+    "nm": "N*m",
+    "nmm": "N*mm",
+    "knm": "kN*m",
+    "knmm": "kN*mm",
+    "kn": "kN",
     "g": "g_0",
     "gn": "g_0",
-    "m/s2": "m/s^2",
-    "m/s²": "m/s^2",
-    "1/min": "rpm",
-    "-": None,
-    "": None,
+    "gs": "g_0",
+    "mg": "mg_0",
+    "µg": "µg_0",
+    "ug": "µg_0",
+    "kp": "kgf",
+    "sec": "s",
+    "secs": "s",
+    "sek": "s",
+    "msec": "ms",
+    "usec": "us",
+    "µsec": "us",
+    "hr": "h",
+    "hrs": "h",
+    "°": "deg",
+    **dict.fromkeys(
+        ("1/min", "min^-1", "u/min", "rev/min", "r/min", "revs/min", "upm", "cpm", "rev per min"),
+        "rpm",
+    ),
+    **dict.fromkeys(("hz", "rps", "rev/s", "r/s", "u/s", "cps"), "revolution/s"),
 }
-"""Units as instruments write them, and what they mean."""
+"""Units as instruments write them, in small letters, and what they mean where pint's do not fit."""
+
+_NO_UNIT = ("", "-", "--", "none", "n/a", "1", "[]")
+"""Texts that stand in the place of a unit and name none."""
+
+_SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
+
+
+def plain_unit(text: str) -> str:
+    """Return the text of a unit as an instrument writes it, in the form that pint reads.
+
+    Brackets go; powers get their sign: ``m/s2``, ``m/s²`` and ``[m/s^2]`` become ``m/s^2``. A text
+    that names no unit, such as ``-``, becomes "".
+    """
+    plain = text.strip().strip("[]").strip().translate(_SUPERSCRIPTS).replace("μ", "µ")
+    if plain.lower() in _NO_UNIT:
+        return ""
+    plain = plain.replace("·", "*").replace("×", "*").replace("**", "^")
+    plain = re.sub(r"(?<=[A-Za-z])-(?=[A-Za-z])", "*", plain)
+    return re.sub(r"(?<=[A-Za-z°µ])(-?[0-9])(?![0-9A-Za-z_])", r"^\1", plain)
 
 
 def factor_of(text: str, unit: Unit) -> float:
     """Return the factor that converts numbers in a unit, as instruments write it, to SI.
 
+    A text with several meanings has that of the dimension: ``mg`` is a thousandth of the
+    acceleration of gravity, or a mass; ``Hz`` is a drum speed in revolutions per second.
+
     Raises:
         ValueError: the unit is missing, unknown or of another dimension.
     """
-    return convert(1.0, _INSTRUMENT_UNITS.get(text, text), unit)
+    plain = plain_unit(text)
+    small = plain.lower()
+    try:
+        return convert(1.0, plain or None, unit)
+    except ValueError:
+        if plain:
+            with contextlib.suppress(ValueError):
+                return convert(1.0, _INSTRUMENT_UNITS.get(small, small), unit)
+        raise
+
+
+def is_unit(text: str) -> bool:
+    """Return whether a text is a unit, as instruments write it, of any dimension."""
+    plain = plain_unit(text)
+    if plain.lower() in _INSTRUMENT_UNITS or plain in ("%", "‰"):
+        return True
+    try:
+        dimension(plain)
+    except ValueError:
+        return False
+    return bool(plain)
 
 
 def split(text: str) -> tuple[list[float], str, bool]:

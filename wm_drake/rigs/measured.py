@@ -1,12 +1,14 @@
 """From a recorded test to the motion of the bench: a sine where it is one, else as recorded."""
 
+import warnings
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from wm_drake.parameters.loop_files import MeasuredLoop
+from wm_drake.errors import InputNotice, Problem, input_error
+from wm_drake.parameters.loop_files import FEWEST, MeasuredLoop
 from wm_drake.parameters.types import FloatArray
 from wm_drake.rigs.bench import Harmonic
 from wm_drake.rigs.smoothing import Smoothed, smoothed
@@ -207,8 +209,36 @@ def _baseline(time: FloatArray, frequency: float) -> FloatArray:
     return np.stack(columns, axis=1)
 
 
+def _longest_piece(loop: MeasuredLoop) -> MeasuredLoop:
+    """Return the longest part of a loop without a gap, with a notice if there are several."""
+    if not len(loop.gaps):
+        return loop
+    ends = [loop.time[0], *loop.gaps.ravel(), loop.time[-1]]
+    begin, end = max(zip(ends[::2], ends[1::2], strict=True), key=lambda one: one[1] - one[0])
+    inside = (loop.time >= begin) & (loop.time <= end)
+    message = (
+        f"its motion is no sine and has {len(loop.gaps)} gap{'s' * (len(loop.gaps) > 1)}; used is "
+        f"the longest part without one, {begin:.6g} to {end:.6g} s"
+    )
+    warnings.warn(str(Problem(loop.path, "", message)), InputNotice, stacklevel=2)
+    if np.sum(inside) < FEWEST:
+        raise input_error(
+            f"its longest part without a gap has {np.sum(inside)} samples; a loop needs at least "
+            f"{FEWEST}",
+            where=loop.path,
+        )
+    return replace(
+        loop,
+        time=loop.time[inside],
+        displacement=loop.displacement[inside],
+        force=loop.force[inside],
+        gaps=loop.gaps[:0],
+    )
+
+
 def _recorded(loop: MeasuredLoop, cutoff: float | None) -> RecordedMotion:
     """Return the motion as recorded, smoothed."""
+    loop = _longest_piece(loop)
     time = loop.time - loop.time[0]
     curve = smoothed(time, loop.displacement, cutoff, loop.path)
     rate = curve.rate(time)

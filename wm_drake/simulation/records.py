@@ -104,7 +104,7 @@ MOST_REASON = 150
 """Largest number of characters of the reason why a file cannot be read."""
 
 
-def save_record(record: Record, path: Path) -> None:
+def save_record(record: Record, path: str | Path) -> None:
     """Write a record to a netCDF file.
 
     It is not compressed: the numbers fill all digits, so that gzip saves 6 % of the size and
@@ -119,15 +119,15 @@ def save_record(record: Record, path: Path) -> None:
         >>> from pathlib import Path
         >>> import wm_drake as wm
         >>> record = wm.simulate(wm.build_machine(wm.load_machine("reference")), "middle")
-        >>> path = Path(tempfile.mkdtemp()) / "middle.nc"
+        >>> path = tempfile.mkdtemp() + "/middle.nc"
         >>> wm.save_record(record, path)
-        >>> path.exists()
+        >>> Path(path).exists()
         True
     """
-    path.write_bytes(netcdf_bytes(record))
+    Path(path).write_bytes(netcdf_bytes(record))
 
 
-def load_record(path: Path) -> Record:
+def load_record(path: str | Path) -> Record:
     """Read a record that `save_record` wrote.
 
     Example:

@@ -13,6 +13,7 @@ from wm_drake.errors import (
     input_error,
     nearest_names,
     problems_at,
+    shortened,
 )
 
 DRIVES = ("prescribed", "motor")
@@ -22,6 +23,7 @@ if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     from wm_drake.model.machine import Machine
     from wm_drake.parameters import MachineParameters, SpinProfile
     from wm_drake.parameters.keys import Tree
+    from wm_drake.parameters.recorded import ChannelNames
     from wm_drake.parameters.units import Unit
     from wm_drake.simulation.cases import Case
 
@@ -334,8 +336,43 @@ LOOP_WORDS = ("time", "displacement", "angle", "force", "moment")
 """Words of a force loop, for `channels_of`."""
 
 
+def channel_names(options: Any, words: tuple[str, ...] = ()) -> "tuple[ChannelNames, str]":
+    """Return what the options `--channels` and `--unit` say of recorded channels.
+
+    Args:
+        options: Options with `channels` and `unit`.
+        words: Allowed words of `--channels`; any word if empty.
+
+    Returns:
+        Names and units by channel, and the unit of all channels that have no other; "" if none.
+
+    Raises:
+        InputError: a part has another form, or a word is not allowed or there twice.
+    """
+    from wm_drake.parameters.recorded import ChannelNames
+    from wm_drake.parameters.units import is_unit
+
+    units, default = dict[str, str](), ""
+    for entry in options.unit:
+        name, equals, unit = (part.strip() for part in entry.rpartition("="))
+        if not unit or (equals and not name) or (default and not equals):
+            raise input_error(f"'{entry}' is not NAME=UNIT", where="--unit")
+        if not is_unit(unit):
+            raise input_error(
+                f"unit '{shortened(unit, 40)}' is not known; write for example 'Acc 1=g'",
+                where="--unit",
+            )
+        if equals:
+            units[name] = unit
+        else:
+            default = unit
+    return ChannelNames(channels_of(options.channels, words), units, words), default
+
+
 def channels_of(text: str | None, words: tuple[str, ...] = ()) -> dict[str, str]:
     """Return the names of the channels of the option `--channels`, by word.
+
+    A comma within a name is part of it.
 
     Args:
         words: Allowed words; any word if empty.
@@ -344,7 +381,7 @@ def channels_of(text: str | None, words: tuple[str, ...] = ()) -> dict[str, str]
         InputError: a part is not WORD=NAME, a word is not allowed or there twice.
     """
     channels: dict[str, str] = {}
-    for part in text.split(",") if text else []:
+    for part in re.split(r",(?=[^,=]+=)", text) if text else []:
         word, separator, name = (piece.strip() for piece in part.partition("="))
         if not (separator and name and word):
             raise input_error(f"'{part.strip()}' is not WORD=NAME", where="--channels")

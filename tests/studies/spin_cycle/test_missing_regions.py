@@ -12,7 +12,7 @@ from wm_drake.parameters.spin import Region
 from wm_drake.parameters.unbalance_cases import UnbalanceCase
 from wm_drake.simulation.vibration import region_rms, region_samples
 from wm_drake.studies.spin_cycle.measured import read_accelerations
-from wm_drake.studies.spin_cycle.page import SpinCycleReport, summary, warnings_of
+from wm_drake.studies.spin_cycle.page import SpinCycleResult, summary, warnings_of
 from wm_drake.studies.spin_cycle.study import SpinCycleRuns, missing_regions
 from wm_drake.studies.spin_cycle.tables import missing_warnings
 
@@ -90,7 +90,7 @@ def result(reference):
 
 def test_errors_say_which_regions_they_leave_out(result):
     assert missing_regions(result.displacement, result.measured) == {"R2": ["2"]}
-    (text,) = SpinCycleReport(result, "compiled").warnings()
+    (text,) = SpinCycleResult(result, "compiled").warnings()
     assert text.startswith("The errors leave regions out")
     assert "R2 in case 2" in text
     assert text in warnings_of(result)
@@ -101,7 +101,7 @@ def test_errors_say_which_regions_they_leave_out(result):
 def test_complete_measurements_have_no_such_warning(result):
     complete = replace(result, measured=1.25 * result.displacement)
     assert missing_warnings(complete.displacement, complete.measured) == []
-    assert SpinCycleReport(complete, "compiled").warnings() == []
+    assert SpinCycleResult(complete, "compiled").warnings() == []
     assert "Compared with the measurement, the average error" in summary(complete, "compiled")
 
 

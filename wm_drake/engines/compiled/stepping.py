@@ -87,7 +87,7 @@ def choose_stepping(
         setup: The machine as it is set up, without load.
         packed, layout: From `pack`.
         profile: Spin profile of the runs.
-        step: Largest step. [s]
+        step: Largest step; shorter where the samples of a fast profile are closer. [s]
         integrator: "multistep", "midpoint" or "runge_kutta" for steps of this size; "auto" for the
             midpoint rule with telescopic dampers if a step of 0.25 ms or half of it suits it, else
             for the multistep integrator if the step, or half of it, suits it, else for the

@@ -1,9 +1,11 @@
-"""Grid search of [B] section 3.1.2.
+"""Grid search of [B] section 3.1.2, which goes on where that of [B] may end beside the optimum.
 
-The first grid covers the region. Each further grid is centred at the best point so far. Its spacing
-is halved only if the last grid gave no better point; otherwise the grid moves on with the same
-spacing. So the search follows a diagonal valley, where the best point of a grid is far from the
-optimum. This is a pattern search; it ends when the spacing is as fine as demanded.
+[B] halves its grid in each round and stops when the distance falls by less than 0.02, so a round
+without a better point ends it. Here the first grid covers the region. Each further grid is centred
+at the best point so far. Its spacing is halved only if the last grid gave no better point;
+otherwise the grid moves on with the same spacing. So the search follows a diagonal valley, where
+the best point of a grid is far from the optimum. This is a pattern search; it ends when the spacing
+is as fine as demanded.
 """
 
 from dataclasses import dataclass

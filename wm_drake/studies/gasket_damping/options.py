@@ -8,8 +8,9 @@ class GasketDampingOptions(Options):
 
     record: tuple[str, ...] = option(
         (),
-        "Measured displacements of a load: CSV with time_s, Xr, Yr, ... in mm, or netCDF record of "
-        "the command spin. Repeatable. Default: the records of a virtual experiment.",
+        "Measured displacements of a load: CSV with time_s, Xr, Yr, ... in mm, another recorded "
+        "file with these channels, or netCDF record of the command spin. Repeatable. Default: the "
+        "records of a virtual experiment.",
         "LOAD=FILE",
     )
     planted_linear: str = option(

@@ -238,7 +238,8 @@ def surface_plot(grids: xr.Dataset, fit: Fit, truth: np.ndarray | None) -> Plot:
         "envelopes, [B] Eq. (2), (3). Left: distance over both dampings, points of the grid "
         "search, darker in each later round, and the path of the best point from the first grid "
         "on. The grid moves to its best point and is halved when it has no better point than its "
-        "centre. Right: distance at these points over the linear damping; colours: torsional "
+        "centre; [B] halves it in each round and stops when the distance falls by less than 0.02. "
+        "Right: distance at these points over the linear damping; colours: torsional "
         "damping ([B] Fig. 7).",
     )
 

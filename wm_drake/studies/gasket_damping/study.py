@@ -19,8 +19,9 @@ from wm_drake.parameters import (
     load_factors,
     with_values,
 )
-from wm_drake.parameters.csv_files import finite_numbers, read_csv, with_distinct_times
+from wm_drake.parameters.csv_files import with_distinct_times
 from wm_drake.parameters.machine import OUTPUT_PERIOD
+from wm_drake.parameters.recorded import ChannelUse, read_recording, resampled
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.report.quantity import Quantity
@@ -106,18 +107,25 @@ def read_records(parameters: MachineParameters, entries: Sequence[str]) -> dict[
                 where="--record",
             )
         path = existing_file(Path(name), "--record")
-        if path.suffix.lower() == ".csv":
-            numbers = finite_numbers(read_csv(path, ["time_s", *sensors]), path)
-            record = xr.DataArray(
-                LENGTH.number("1 mm") * numbers[:, 1:],
-                {"time": numbers[:, 0], "sensor": sensors},
-                ["time", "sensor"],
-            )
+        if path.suffix.lower() != ".nc":
+            record = _recorded(path, sensors)
         else:
             needs = {"time": ("time",), "displacement": ("time", "sensor")}
             record = read_measured(path, needs).displacement
         measured[load] = as_measured(record, sensors, name)
     return measured
+
+
+def _recorded(path: Path, sensors: Sequence[str]) -> xr.DataArray:
+    """Return the displacements at sensors in a recorded file (time, sensor). [m]"""
+    recording = read_recording(path)
+    uses = {name: ChannelUse(recording.chosen(name), LENGTH, LENGTH.shown) for name in sensors}
+    channels = recording.synchronous(uses)
+    return xr.DataArray(
+        np.stack([channels.values[name] for name in sensors], axis=1),
+        {"time": channels.time, "sensor": list(sensors)},
+        ["time", "sensor"],
+    )
 
 
 def planted_damping(parameters: MachineParameters, linear: str, torsional: str) -> FloatArray:
@@ -295,7 +303,7 @@ def run_up_of(parameters: MachineParameters) -> SpinProfile:
 
 
 def as_measured(table: xr.DataArray, sensors: list[str], where: str) -> xr.DataArray:
-    """Return a measured record with the sensors of the machine, interpolated to samples every 5 ms.
+    """Return a measured record with the sensors of the machine, resampled every 5 ms.
 
     Args:
         table: Measured displacements (time, sensor). [m]
@@ -318,11 +326,13 @@ def as_measured(table: xr.DataArray, sensors: list[str], where: str) -> xr.DataA
         raise input_error(f"must cover {WINDOW[0]:g} to {WINDOW[1]:g} s", where=where)
     if not np.all(np.diff(time) > 0.0):
         raise input_error("times must not fall from row to row", where=where)
-    if not np.isfinite(values).all():
-        raise input_error("a displacement is not a finite number", where=where)
     first, last = time[0] / OUTPUT_PERIOD - 1e-6, time[-1] / OUTPUT_PERIOD + 1e-6
     grid = np.arange(np.ceil(first), np.floor(last) + 1) * OUTPUT_PERIOD
-    columns = [np.interp(grid, time, column) for column in values.T]
-    return xr.DataArray(
-        np.stack(columns, axis=1), {"time": grid, "sensor": sensors}, ["time", "sensor"]
-    )
+    columns = resampled(time, values, grid, OUTPUT_PERIOD)
+    lacking = grid[~np.isfinite(columns).all(axis=1)]
+    if len(lacking):
+        raise input_error(
+            f"lacks a displacement at {lacking[0]:.6g} s; needs all of them without a gap",
+            where=where,
+        )
+    return xr.DataArray(columns, {"time": grid, "sensor": sensors}, ["time", "sensor"])

@@ -1,6 +1,7 @@
 """Input of fits to measured loops: loops, laws, bounds and fixed numbers."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from wm_drake.errors import InputError, Problem, check_known, input_error, nearest_names
@@ -12,13 +13,16 @@ from wm_drake.studies.components import Target, existing_files
 from wm_drake.studies.fitting.methods import METHODS
 from wm_drake.studies.identify.models import Given, fields_of_law, unit_of_field, units_of_fields
 from wm_drake.studies.identify.options import IdentifyOptions
-from wm_drake.studies.inputs import LOOP_WORDS, channels_of, pairs_of, quantities_of
+from wm_drake.studies.inputs import LOOP_WORDS, channel_names, pairs_of, quantities_of
 
 
 def loops_of(files: Sequence[Path], options: IdentifyOptions) -> list[MeasuredLoop]:
     """Return the loops of files."""
-    channels = channels_of(options.channels, LOOP_WORDS)
-    return read_loops(existing_files(files), units_of(options.units), channels)
+    names, default = channel_names(options, LOOP_WORDS)
+    if default:
+        raise input_error(f"'{default}' is not NAME=UNIT", where="--unit")
+    units = units_of(options.units)
+    return read_loops(existing_files(files), replace(names, units={**units, **names.units}))
 
 
 def motions_of(
@@ -63,16 +67,16 @@ def motions_of(
     return motions
 
 
-def units_of(text: str | None) -> tuple[str, str, str] | None:
-    """Return the units of time, displacement and force of the option `--units`."""
+def units_of(text: str | None) -> dict[str, str]:
+    """Return the units of time, displacement and force of the option `--units`, by word."""
     if text is None:
-        return None
+        return {}
     parts = [part.strip() for part in text.split(",")]
     if len(parts) != 3:
         raise input_error(
             f"'{text}' is not three units; write for example 's,mm,N'", where="--units"
         )
-    return (parts[0], parts[1], parts[2])
+    return dict(zip(LOOP_WORDS, (parts[0], parts[1], parts[1], parts[2], parts[2]), strict=True))
 
 
 def given_by_law(text: str, axis: str, options: IdentifyOptions) -> dict[str, Given]:

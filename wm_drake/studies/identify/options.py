@@ -16,7 +16,10 @@ class IdentifyOptions(ComponentOptions):
     """Options of a fit to measured loops."""
 
     files: tuple[Path, ...] = option(
-        ..., "CSV files: time, displacement, force.", "FILES...", "argument"
+        ...,
+        "Files with time, displacement, force: CSV, MDF, TDMS, UFF 58, MAT or HDF5.",
+        "FILES...",
+        "argument",
     )
     validation: tuple[Path, ...] = option(
         (),
@@ -37,9 +40,12 @@ class IdentifyOptions(ComponentOptions):
         "Take each motion as recorded, smoothed so that this frequency is halved: '50 Hz'.",
         "FREQUENCY",
     )
+    unit: tuple[str, ...] = option(
+        (), "Of one channel, where a file does not say: 'Load cell=kN'. Repeatable.", "NAME=UNIT"
+    )
     channels: str | None = option(
         None,
-        "Names in the files: 'displacement=Pos 1,force=Load' (also time, angle, moment).",
+        "Names in the files: 'displacement=Pos 1,force=Group/Load' (also time, angle, moment).",
         "WORD=NAME,...",
     )
     knots: int = option(5, "Points of a table on each side of zero.", ge=1, le=12)

@@ -21,6 +21,7 @@ from wm_drake.errors import input_error
 from wm_drake.parameters import MeasuredLoop, load_component, read_loops
 from wm_drake.parameters.components import COMPONENTS_FOLDER
 from wm_drake.parameters.damper_laws import DamperNumbers
+from wm_drake.parameters.recorded import ChannelNames
 from wm_drake.parameters.units import Unit
 from wm_drake.report.figure import Figure, Line, Mark, Points, in_grid
 from wm_drake.report.page import Section, SectionedPage, picture
@@ -35,7 +36,7 @@ from wm_drake.studies.identify.inputs import units_of
 from wm_drake.studies.identify.models import Given, damper_model
 from wm_drake.studies.identify.options import IdentifyTable2Options
 from wm_drake.studies.identify.problem import fit_problem
-from wm_drake.studies.inputs import quantities_of
+from wm_drake.studies.inputs import LOOP_WORDS, quantities_of
 from wm_drake.studies.rig.figures import loop_panel
 from wm_drake.studies.study import Facts, Result, Task
 
@@ -340,8 +341,8 @@ def _damper(friction_force: str | None) -> DamperNumbers:
 
 def _measured_motions(files: Sequence[Path], units: str | None) -> list[HarmonicMotion]:
     """Return the motions of measured files, which have to be sines of displacement."""
-    motions = []
-    for loop in read_loops(existing_files(files), units_of(units)):
+    motions, names = [], ChannelNames(units=units_of(units), words=LOOP_WORDS)
+    for loop in read_loops(existing_files(files), names):
         motion = measured_motion(loop)
         if not isinstance(motion, HarmonicMotion) or loop.rotates:
             raise input_error(

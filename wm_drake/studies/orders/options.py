@@ -10,15 +10,22 @@ class OrdersOptions(OptionModel):
 
     file: Path = option(
         ...,
-        "netCDF record of the command spin; or CSV, MDF4, TDMS, UFF 58 or MAT with time_s, "
-        "speed_rpm and a column for each signal, such as accelerations.",
+        "Record of the command spin (netCDF); or CSV, MDF, TDMS, UFF 58, MAT or HDF5 with a time, "
+        "a channel speed and one for each signal, such as accelerations.",
         "FILE",
         "argument",
     )
     highest: float = option(6.0, "Highest order of the map.", ge=1.0, le=40.0)
-    unit: str = option("m/s^2", "Unit of the signals of a CSV, for tables and axes.")
+    unit: tuple[str, ...] = option(
+        (),
+        "Unit of a channel whose file has none: 'Acc 1=g'; of all signals: 'g'. Default: m/s^2; "
+        "rpm for the speed, s for the time. Repeatable.",
+        "NAME=UNIT",
+    )
     channels: str | None = option(
-        None, "Names in the files: 'S1_x=Acc 1,S1_y=Acc 2' (also time and speed).", "WORD=NAME,..."
+        None,
+        "Names in the files: 'S1_x=Acc 1,S1_y=Group/Acc 2' (also time and speed).",
+        "WORD=NAME,...",
     )
 
 

@@ -118,20 +118,30 @@ def _table(result: Orders) -> Table:
     groups, speed = [], RPM_PER_RAD_S * result.orders.speed.values
     for order in result.shown_orders():
         values = result.at_order(order)
-        at = (number(float(rpm), 0) for rpm in speed[np.nanargmax(values, axis=0)])
-        rows = (Row(("largest", *np.nanmax(values, axis=0))), Row(("at, rpm", *at)))
+        resolved = np.isfinite(values).any(axis=0)
+        filled = np.where(np.isfinite(values), values, -1.0)
+        largest = np.where(resolved, filled.max(axis=0), np.nan)
+        rpm = np.where(resolved, speed[filled.argmax(axis=0)], np.nan)
+        at = (number(float(one), 0) for one in rpm)
+        rows = (Row(("largest", *largest)), Row(("at, rpm", *at)))
         groups.append(Group(f"order {order:g}", rows))
     signals = result.signals
     columns = (Column(name, signals.unit, 2) for name in signals.names)
-    caption = "Largest amplitude of some orders."
+    caption = "Largest amplitude of some orders; empty where the samples do not resolve the order."
     return Table(caption, ("order", "", *columns), tuple(groups), text_columns=2)
 
 
 def signal_figure(result: Orders, index: int) -> fig.Figure:
-    """Return waterfall and order map of a signal."""
-    return fig.Figure(
-        panels=fig.in_grid([_waterfall(result, index), _order_map(result, index)], 2), height=350.0
-    )
+    """Return waterfall and order map of a signal; a record of a few seconds has no waterfall."""
+    drawn = [_order_map(result, index)]
+    if result.frequencies.sizes["time"]:
+        drawn.insert(0, _waterfall(result, index))
+    return fig.Figure(panels=fig.in_grid(drawn, 2), height=350.0)
+
+
+def _largest(values: FloatArray) -> float:
+    """Return the largest finite value; 0 if there is none."""
+    return float(np.max(values, where=np.isfinite(values), initial=0.0))
 
 
 def _order_map(result: Orders, index: int) -> fig.Panel:
@@ -141,7 +151,7 @@ def _order_map(result: Orders, index: int) -> fig.Panel:
     even = np.linspace(rpm[at[0]], rpm[at[-1]], min(len(rpm), MAP_COLUMNS))
     nearest = at[np.clip(np.searchsorted(rpm[at], even), 0, len(at) - 1)]
     values = result.orders.values[nearest, :, index].T
-    scale = fig.Scale(low=0.0, high=float(np.nanmax(values)) or 1.0, shades="Blues")
+    scale = fig.Scale(low=0.0, high=_largest(values) or 1.0, shades="Blues")
     scale = replace(scale, label=f"amplitude, {result.signals.unit}")
     cells = fig.Cells(values, even, result.orders.order.values, scale=scale)
     return fig.Panel(
@@ -165,7 +175,7 @@ def _waterfall(result: Orders, index: int) -> fig.Panel:
     levels = np.linspace(rpm.min(), rpm.max(), min(WATERFALL_LINES, len(rpm)))
     rows = np.unique([int(np.argmin(np.abs(rpm - level))) for level in levels])
     height = 5.0 * max(float(np.ptp(rpm)), 1.0) / max(len(rows), 1)
-    scale = height / max(float(np.nanmax(values[rows])), 1e-300)
+    scale = height / max(_largest(values[rows]), 1e-300)
     marks: list[fig.Mark] = []
     for row in sorted(rows, key=lambda row: -rpm[row]):
         line, level = rpm[row] + scale * values[row], np.full(len(frequency), rpm[row])

@@ -9,24 +9,24 @@ import xarray as xr
 from scipy.integrate import cumulative_trapezoid
 
 from wm_drake.errors import input_error
-from wm_drake.parameters.csv_files import finite_numbers, read_csv, read_header
-from wm_drake.parameters.lab_files import is_lab_file
-from wm_drake.parameters.lab_signals import SPEED as DRUM_SPEED
-from wm_drake.parameters.lab_signals import TIME_NAMES, available_channels, clock_of, on_clock
+from wm_drake.parameters.recorded import (
+    ACCELERATION,
+    ChannelNames,
+    ChannelUse,
+    Recording,
+    Signal,
+    Synchronous,
+    evenly,
+    read_recording,
+)
+from wm_drake.parameters.recorded import SPEED as DRUM_SPEED
 from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import Unit, factor_of, plain_unit
 from wm_drake.simulation.orders import REVOLUTIONS, frequency_map, order_map
 from wm_drake.simulation.records import read_measured
 
-RAD_S_PER_RPM = np.pi / 30.0
-
 SHOWN_ORDERS = (0.5, 1.0, 2.0, 3.0)
 """Orders of the table and of the CSV file."""
-
-TIME, SPEED = "time_s", "speed_rpm"
-"""Columns of a file of measurements, beside those of the signals."""
-
-SPACING = 1e-3
-"""Largest relative difference of two steps of time in a record that is equally sampled."""
 
 
 @dataclass(frozen=True)
@@ -67,93 +67,130 @@ class Orders:
         return np.asarray(self.orders.sel(order=order, method="nearest").values)
 
 
-def read_signals(path: Path, unit: str, channels: Mapping[str, str] | None = None) -> Signals:
-    """Read signals from a record (netCDF), a CSV or a file of a laboratory.
+def read_signals(path: Path, names: ChannelNames | None = None, unit: str = "") -> Signals:
+    """Read signals from a record (netCDF) or from a recorded file of any format.
 
     Args:
-        path: Record of the command spin, with the displacements at the sensors; or CSV with the
-            columns time_s, speed_rpm and a column for each signal; or MDF4, TDMS, UFF 58 or MAT
-            with a channel speed_rpm or speed and one for each signal, in units of its own.
-        unit: Unit of signals whose file has none, for reading.
-        channels: Name in the file of ``time``, ``speed`` or a signal, whose word is free; without a
-            named signal all others are signals. Not of a netCDF record.
+        path: Record of the command spin, with the displacements at the sensors; or recorded file
+            with time, a channel speed or speed_rpm, and one for each signal.
+        names: Name in the file of ``time``, ``speed`` or a signal, whose word is free; without a
+            named signal all others are signals. Units of channels whose file has none.
+        unit: Unit of signals whose file has none; "" for m/s^2.
     """
-    if is_lab_file(path) or (channels and path.suffix.lower() == ".csv"):
-        return _read_lab(path, unit, channels or {})
-    if path.suffix.lower() == ".csv":
-        return _read_csv(path, unit)
-    if channels:
-        raise input_error("a netCDF record has no channels to choose", where="--channels")
+    names = names or ChannelNames()
+    if path.suffix.lower() == ".nc" and not names.channels:
+        return _of_record(path)
+    recording = read_recording(path, names)
+    speed, used = _speed_and_signals(recording)
+    shown, factor, measured = _common_unit(recording, used, unit or ACCELERATION.si)
+    uses = {
+        word: ChannelUse(each, measured, unit or ACCELERATION.si) for word, each in used.items()
+    }
+    channels = evenly(
+        recording.synchronous(
+            {**uses, "speed": ChannelUse(speed, DRUM_SPEED, "rpm", is_main=False)}
+        )
+    )
+    values = np.stack([channels.values[word] / factor for word in used], axis=1)
+    angle, turning = _angle(channels.values["speed"], channels.time, path)
+    values[~turning] = np.nan
+    return Signals(path.name, list(used), shown, channels.time, angle, values)
+
+
+def _of_record(path: Path) -> Signals:
+    """Return the displacements at the sensors of a record."""
     dimensions = {"time": ("time",), "displacement": ("time", "sensor"), "drum_angle": ("time",)}
     record = read_measured(path, dimensions)
-    time, angle = record.time.values, record.drum_angle.values
-    values = 1e3 * record.displacement.values
     names = [str(name) for name in record.sensor.values]
-    return _checked(Signals(path.name, names, "mm", time, angle, values), path)
-
-
-def _read_csv(path: Path, unit: str) -> Signals:
-    header = read_header(path)
-    names = [name for name in header if name not in (TIME, SPEED)]
-    if TIME not in header or SPEED not in header or not names:
-        raise input_error(
-            f"needs the columns {TIME}, {SPEED} and one for each signal", where=str(path)
-        )
-    numbers = finite_numbers(read_csv(path, [TIME, SPEED, *names]), path)
-    time = numbers[:, 0]
-    angle = cumulative_trapezoid(RAD_S_PER_RPM * numbers[:, 1], time, initial=0.0)
-    return _checked(Signals(path.name, names, unit, time, angle, numbers[:, 2:]), path)
-
-
-def _read_lab(path: Path, unit: str, channels: Mapping[str, str]) -> Signals:
-    """Return the signals of a file with named channels: that of the speed, and all others."""
-    available = available_channels(path, channels)
-    words = (SPEED, "speed") if "speed" not in channels else ("speed",)
-    speeds = [channel for channel in available if channel.name in words]
-    chosen = set(channels) - {"time", "speed"}
-    used = [
-        channel
-        for channel in available
-        if channel not in speeds
-        and channel.name.lower() not in TIME_NAMES
-        and (not chosen or channel.name in chosen)
-    ]
-    if len(speeds) != 1 or not used:
-        raise input_error(
-            f"needs one channel {SPEED} or speed and one for each signal", where=str(path)
-        )
-    time = clock_of(available, used, path)
-    speed = on_clock(speeds[0], time, DRUM_SPEED, "rpm", path)
-    units = {channel.unit for channel in used}
-    if len(units) > 1:
-        named = ", ".join(f"{channel.name} [{channel.unit}]" for channel in used[:4])
-        raise input_error(f"its signals have different units: {named}", where=str(path))
-    shown = units.pop() or unit
-    values = [np.interp(time, c.time, c.values) if c.time is not None else c.values for c in used]
-    if len({len(one) for one in (time, *values)}) > 1:
-        raise input_error("its channels have different numbers of samples", where=str(path))
-    angle = cumulative_trapezoid(speed, time, initial=0.0)
-    names = [channel.name for channel in used]
-    return _checked(Signals(path.name, names, shown, time, angle, np.stack(values, axis=1)), path)
-
-
-def _checked(signals: Signals, path: Path) -> Signals:
-    steps = np.diff(signals.time)
-    if len(steps) < 2 or not np.all(np.isfinite(signals.time)) or np.any(steps <= 0.0):
+    columns = dict(zip(names, 1e3 * record.displacement.values.T, strict=True))
+    channels = Synchronous(path, record.time.values, {**columns, "": record.drum_angle.values})
+    if not np.all(np.diff(channels.time) > 0.0):
         raise input_error("needs at least three samples in rising time", where=str(path))
-    if np.ptp(steps) > SPACING * np.mean(steps):
+    even = evenly(channels)
+    if len(even.time) != len(channels.time):
+        raise input_error("its time has gaps", where=str(path))
+    values = np.stack([even.values[name] for name in names], axis=1)
+    return Signals(path.name, names, "mm", even.time, even.values[""], values)
+
+
+def _speed_and_signals(recording: Recording) -> tuple[Signal, dict[str, Signal]]:
+    """Return the channel of the speed, and the signals by name.
+
+    Raises:
+        InputError: there is not one speed, or no signal.
+    """
+    named = set(recording.names.channels) - {"time", "speed"}
+    speed, others = recording.word("speed"), recording.others()
+    if speed is None:
+        speeds = recording.worded(("speed",))
+        if len(speeds) != 1:
+            raise input_error(
+                f"needs one channel of the drum speed, named speed or speed_rpm, and has "
+                f"{len(speeds)}; its channels are {recording.listed()}; choose one: --channels "
+                "speed=NAME",
+                where=str(recording.path),
+            )
+        address, speed = speeds.popitem()
+        del others[address]
+    used = {word: recording.chosen(recording.names.channels[word]) for word in named} or others
+    if not used:
         raise input_error(
-            f"the steps of time differ by more than {100 * SPACING:g} %; resample it",
-            where=str(path),
+            "needs a channel for each signal beside those of time and speed",
+            where=str(recording.path),
         )
-    return signals
+    return speed, dict(sorted(used.items())) if named else used
+
+
+_QUANTITIES = (
+    ACCELERATION,
+    *(Unit(si, si) for si in ("m", "m/s", "N", "N*m", "V", "Pa", "A", "rad", "rad/s")),
+)
+"""Quantities of which signals in different units are converted to that of the first."""
+
+
+def _common_unit(
+    recording: Recording, used: Mapping[str, Signal], default: str
+) -> tuple[str, float, Unit | None]:
+    """Return the unit of all signals, its factor, and the unit to which they are converted first.
+
+    Raises:
+        InputError: the signals are of different quantities.
+    """
+    units = {word: recording.unit_of(word, each) or default for word, each in used.items()}
+    shown = next(iter(units.values()))
+    if len({plain_unit(text) for text in units.values()}) == 1:
+        return shown.strip("[] "), 1.0, None
+    for quantity in _QUANTITIES:
+        try:
+            factors = [factor_of(text, quantity) for text in units.values()]
+        except ValueError:
+            continue
+        return shown.strip("[] "), factors[0], quantity
+    named = ", ".join(f"{word} [{text}]" for word, text in list(units.items())[:4])
+    raise input_error(
+        f"its signals have different units: {named}; choose some: --channels WORD=NAME",
+        where=str(recording.path),
+    )
+
+
+def _angle(speed: FloatArray, time: FloatArray, path: Path) -> tuple[FloatArray, np.ndarray]:
+    """Return the angle of the drum [rad], and at which samples its speed is known.
+
+    The angle runs on where the speed is not known; no window of the maps includes such samples.
+    """
+    known = np.isfinite(speed)
+    if not known.any():
+        raise input_error("has no sample of the drum speed", where=str(path))
+    filled = np.interp(time, time[known], speed[known])
+    return cumulative_trapezoid(filled, time, initial=0.0), known
 
 
 def orders_of(signals: Signals, highest: float) -> Orders:
     """Return order map and frequency map of signals.
 
     Raises:
-        InputError: the record has fewer revolutions than a window.
+        InputError: the record has fewer revolutions than a window, or no window without a gap, or
+            its samples resolve no order.
     """
     orders = order_map(signals.values, signals.angle, signals.time, highest=highest)
     if not orders.sizes["time"]:
@@ -161,4 +198,18 @@ def orders_of(signals: Signals, highest: float) -> Orders:
         raise input_error(
             f"has {turns:.1f} drum revolutions; a window needs {REVOLUTIONS}", where=signals.source
         )
+    if not np.isfinite(orders.values).any():
+        raise input_error(_why_empty(signals), where=signals.source)
     return Orders(signals, orders, frequency_map(signals.values, signals.time))
+
+
+def _why_empty(signals: Signals) -> str:
+    """Return why no window of an order map has a value."""
+    step = float(signals.time[1] - signals.time[0])
+    turn = float(np.median(np.abs(np.diff(signals.angle)))) / (2.0 * np.pi)
+    if turn > 0.25:
+        return (
+            f"its samples resolve no order: the drum turns {turn:.3g} revolutions in a step of "
+            f"{step:.4g} s; if the time has another unit, name it: --unit time=ms"
+        )
+    return f"has no {REVOLUTIONS} drum revolutions without a gap"

@@ -1,7 +1,7 @@
 """The task of the study of orders: the file read and its maps computed."""
 
 from wm_drake.studies.executor import Executor
-from wm_drake.studies.inputs import channels_of, existing_file
+from wm_drake.studies.inputs import channel_names, existing_file
 from wm_drake.studies.orders.options import OrdersOptions
 from wm_drake.studies.orders.page import OrdersResult
 from wm_drake.studies.orders.study import orders_of, read_signals
@@ -14,7 +14,8 @@ class OrdersTask(Task):
     def __init__(self, options: OrdersOptions) -> None:
         """Read the file."""
         file = existing_file(options.file, "FILE")
-        self.signals = read_signals(file, options.unit, channels_of(options.channels))
+        names, unit = channel_names(options)
+        self.signals = read_signals(file, names, unit)
         self.highest = options.highest
 
     def run(self, executor: Executor) -> OrdersResult:  # noqa: ARG002

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from wm_drake.model.scene import Scene
-from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.types import BoolArray, FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, listed, number, percent, plain
 from wm_drake.report.page import Picture, Section, SectionedPage, picture
@@ -22,7 +22,7 @@ from wm_drake.studies.response.figures import (
     response_figure,
     sweep_figure,
 )
-from wm_drake.studies.response.study import BoolArray, ResponseCase, ResponseStudy
+from wm_drake.studies.response.study import ResponseCase, ResponseStudy
 from wm_drake.studies.study import Facts, Result
 
 DEG_PER_RAD = Unit("rad/s", "deg/s").from_si(1.0)

@@ -5,7 +5,6 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
 import xarray as xr
@@ -17,7 +16,7 @@ from wm_drake.errors import problems_at
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import Load, MachineParameters, SpinProfile
 from wm_drake.parameters.spin import Region
-from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.types import BoolArray, FloatArray
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.displacements import envelopes
 from wm_drake.simulation.records import Record
@@ -34,8 +33,6 @@ RESPONSE_SHARE, RUN_SHARE = 1.0, 3.0
 """Parts of the progress: one for each response, one for all runs of the engine."""
 
 RAD_S_PER_RPM = np.pi / 30.0
-
-BoolArray: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,10 @@ import xarray as xr
 
 from wm_drake.errors import check_known, input_error
 from wm_drake.parameters import SpinProfile
-from wm_drake.parameters.csv_files import read_csv, with_distinct_times
-from wm_drake.parameters.lab_files import SUFFIXES, is_lab_file
-from wm_drake.parameters.lab_signals import ACCELERATION, lab_signals
+from wm_drake.parameters.csv_files import read_csv
+from wm_drake.parameters.recorded import ACCELERATION, ChannelNames, ChannelUse, read_recording
+from wm_drake.parameters.recorded.clock import UNEVEN
+from wm_drake.parameters.recorded.formats import SUFFIXES
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.band import HIGH_PASS_HZ
 from wm_drake.simulation.vibration import high_passed, integrated_twice, region_rms
@@ -24,8 +25,8 @@ RMS_COLUMNS = ["case", "region", "sensor", "axis", "rms_mm"]
 LEAST_ROWS = 32
 """Smallest number of samples that the high-pass filter and the removal of the mean need."""
 
-UNEVEN = 1e-3
-"""Largest relative deviation of a sampling interval from the mean one."""
+COARSEST = 0.05 / HIGH_PASS_HZ
+"""Largest sampling interval: ten samples of the slowest motion that the filter passes. [s]"""
 
 
 def rms_table(displacement: xr.DataArray) -> pd.DataFrame:
@@ -47,7 +48,7 @@ def read_rms(path: Path, labels: Mapping[str, Sequence[str]]) -> xr.DataArray:
     table = read_csv(path, RMS_COLUMNS)
     if table.empty:
         raise input_error("has no row; at least one is needed", where=str(path))
-    names = table[RMS_COLUMNS[:4]].astype(object).fillna("").astype(str)
+    names = table[RMS_COLUMNS[:4]]
     for column, dim in zip(RMS_COLUMNS, DIMS, strict=False):
         for name in names[column]:
             check_known(name, labels[dim], f"no {column} '{name}' in this study", where=str(path))
@@ -70,28 +71,30 @@ def read_accelerations(
     folder: Path,
     labels: Mapping[str, Sequence[str]],
     profile: SpinProfile,
-    channels: Mapping[str, str] | None = None,
+    names: ChannelNames | None = None,
+    unit: str = "",
 ) -> xr.DataArray:
     """Compute RMS displacements from records of acceleration, integrated twice.
 
-    The folder has one file CASE.csv for each measured case; cases without a file are NaN. The
-    columns are time_s, which starts with the profile, and SENSOR_AXIS (S1_x, ...) in m/s^2. A file
-    may be MDF4, TDMS, UFF 58 or MAT instead, with channels of these names and units of its own. The
-    bias of each sensor is estimated by a mean with a Hann window and subtracted.
+    The folder has one file for each measured case, CASE.csv or one of another recorded format;
+    cases without a file are NaN. Its time starts with the profile; its channels are SENSOR_AXIS
+    (S1_x, ...). The bias of each sensor is estimated by a mean with a Hann window and subtracted.
 
     Args:
-        channels: Name in the files of ``time`` or of an accelerometer's axis, such as ``S1_x``. A
-            CSV may have the unit in its header then: ``Acc 1 [g]``.
+        names: Name in the files of ``time`` or of an accelerometer's axis, such as ``S1_x``; units
+            of channels whose file has none.
+        unit: Unit of accelerations without one; "" for m/s^2.
 
     Returns:
         (case, region, accelerometer, axis). [m]
 
     Raises:
-        InputError: the folder has no file of a case, a file has other columns or values that are
-            not finite numbers, or the samples are not evenly spaced.
+        InputError: the folder has no file of a case, a file lacks a channel or a sample, or the
+            samples are not evenly spaced.
     """
+    names = names or ChannelNames()
     known = {"time", *_words(labels)}
-    for word in channels or {}:
+    for word in names.channels:
         check_known(word, known, f"no word '{word}'", where="--channels")
     paths = {name: _file_of(folder, name) for name in labels["case"]}
     if not any(paths.values()):
@@ -100,10 +103,15 @@ def read_accelerations(
             where=str(folder),
         )
     empty = np.full([len(labels[dim]) for dim in DIMS[1:]], np.nan)
-    rows = [
-        empty if path is None else _from_acceleration(path, labels, profile, channels or {})
-        for path in paths.values()
-    ]
+    rows = []
+    for path in paths.values():
+        if path is None:
+            rows.append(empty)
+            continue
+        time, acceleration = _samples(path, _words(labels), names, unit or ACCELERATION.si)
+        period = float((time[-1] - time[0]) / (len(time) - 1))
+        rms = region_rms(_displacement(acceleration, period), period, profile)
+        rows.append(rms.reshape(empty.shape))
     return xr.DataArray(np.array(rows), labels, DIMS)
 
 
@@ -113,9 +121,7 @@ def _file_of(folder: Path, case: str) -> Path | None:
     Raises:
         InputError: there are several.
     """
-    files = [
-        path for suffix in (".csv", *SUFFIXES) if (path := folder / f"{case}{suffix}").is_file()
-    ]
+    files = [path for suffix in SUFFIXES if (path := folder / f"{case}{suffix}").is_file()]
     if len(files) > 1:
         names = " and ".join(path.name for path in files)
         raise input_error(f"has {names}; give one file for each case", where=str(folder))
@@ -127,45 +133,57 @@ def _words(labels: Mapping[str, Sequence[str]]) -> list[str]:
     return [f"{sensor}_{axis}" for sensor in labels["accelerometer"] for axis in labels["axis"]]
 
 
-def _samples(path: Path, words: list[str], channels: Mapping[str, str]) -> FloatArray:
-    """Return time [s] and accelerations [m/s^2] of a file, one row a sample."""
-    if is_lab_file(path) or channels:
-        units = dict.fromkeys(words, ACCELERATION)
-        time, signals = lab_signals(path, units, "m/s^2", channels)
-        return np.column_stack([time, *signals.values()])
-    return (
-        read_csv(path, ["time_s", *words])
-        .apply(pd.to_numeric, errors="coerce")
-        .to_numpy(dtype=float)
-    )
+def _samples(
+    path: Path, words: list[str], names: ChannelNames, unit: str
+) -> tuple[FloatArray, FloatArray]:
+    """Return time (n,) [s] and accelerations (n, k) [m/s^2] of a file, evenly spaced from 0.
 
-
-def _from_acceleration(
-    path: Path,
-    labels: Mapping[str, Sequence[str]],
-    profile: SpinProfile,
-    channels: Mapping[str, str],
-) -> FloatArray:
-    numbers = _samples(path, _words(labels), channels)
-    if not np.isfinite(numbers).all() or len(numbers) < LEAST_ROWS:
+    Raises:
+        InputError: a channel is missing, has a gap or is too short, or the time does not fit.
+    """
+    recording = read_recording(path, names)
+    uses = {
+        word: ChannelUse(recording.word(word) or recording.chosen(word), ACCELERATION, unit)
+        for word in words
+    }
+    channels = recording.synchronous(uses)
+    time = channels.time
+    if len(time) < LEAST_ROWS:
         raise input_error(
-            f"has a value that is not a finite number, or fewer than {LEAST_ROWS} rows; at least "
-            f"{LEAST_ROWS} rows of finite numbers are needed",
-            where=str(path),
+            f"has {len(time)} samples; at least {LEAST_ROWS} are needed", where=str(path)
         )
-    numbers = with_distinct_times(numbers, str(path))
-    time, acceleration = numbers[:, 0], numbers[:, 1:]
+    for word, values in channels.values.items():
+        missing = np.flatnonzero(~np.isfinite(values))
+        if len(missing):
+            raise input_error(
+                f"lacks {len(missing)} of {len(values)} samples, the first at "
+                f"{time[missing[0]]:.6g} s; it is integrated twice, which needs all of them",
+                where=str(path),
+                key=word,
+            )
     period = float((time[-1] - time[0]) / (len(time) - 1))
-    if (
-        period <= 0.0
-        or np.max(np.abs(np.diff(time) / period - 1.0)) > UNEVEN
-        or abs(time[0]) > period
-    ):
+    if np.max(np.abs(np.diff(time) / period - 1.0)) > UNEVEN or abs(time[0]) > period:
         raise input_error(
-            "samples must be evenly spaced in time and begin at time 0 of the profile",
+            "samples must be evenly spaced in time and begin at time 0 of the profile; they begin "
+            f"at {time[0]:.6g} s, with steps of {np.diff(time).min():.4g} to "
+            f"{np.diff(time).max():.4g} s",
             where=str(path),
         )
+    if period > COARSEST:
+        raise input_error(
+            f"has a sample every {period:.4g} s; at least one every {COARSEST:.3g} s is needed; if "
+            "the time has another unit, name it: --unit time=ms",
+            where=str(path),
+        )
+    return time, np.stack(list(channels.values.values()), axis=1)
+
+
+def _displacement(acceleration: FloatArray, period: float) -> FloatArray:
+    """Return the high-passed displacements [m] of accelerations [m/s^2] (n, k).
+
+    Args:
+        period: Sampling interval. [s]
+    """
     # a plain mean would include the velocity at the end of the record divided by its duration
     bias = np.average(acceleration, axis=0, weights=np.hanning(len(acceleration)))
-    displacement = high_passed(integrated_twice(acceleration - bias, period), period, HIGH_PASS_HZ)
-    return region_rms(displacement, period, profile).reshape([len(labels[dim]) for dim in DIMS[1:]])
+    return high_passed(integrated_twice(acceleration - bias, period), period, HIGH_PASS_HZ)

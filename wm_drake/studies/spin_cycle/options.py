@@ -29,13 +29,18 @@ class SpinCycleDataOptions(Options):
     )
     accelerations: Path | None = option(
         None,
-        "Folder of measured accelerations, one file CASE.csv per case: time_s, S1_x, S1_y, ... in "
-        "m/s^2.",
+        "Folder of measured accelerations, one file CASE.csv per case: time_s, S1_x, S1_y, ...; or "
+        "MDF, TDMS, UFF 58, MAT or HDF5 with channels of these names.",
         "DIR",
+    )
+    unit: tuple[str, ...] = option(
+        (),
+        "Unit of a channel whose file has none: 'S1_x=g'; of all: 'g'. Default: m/s^2. Repeatable.",
+        "NAME=UNIT",
     )
     channels: str | None = option(
         None,
-        "Names in the files: 'S1_x=Acc 1,S1_y=Acc 2' (also time, and speed in a record).",
+        "Names in the files: 'S1_x=Acc 1,S1_y=Group/Acc 2' (also time).",
         "WORD=NAME,...",
     )
 

@@ -23,7 +23,7 @@ from wm_drake.simulation.measures import measure
 from wm_drake.simulation.mounts import mount_names
 from wm_drake.simulation.vibration import relative_error
 from wm_drake.studies.executor import RunCases
-from wm_drake.studies.inputs import channels_of, existing_file
+from wm_drake.studies.inputs import channel_names, existing_file
 from wm_drake.studies.spin.study import run_spin
 from wm_drake.studies.spin_cycle.measured import DIMS, read_accelerations, read_rms
 from wm_drake.studies.spin_cycle.options import SpinCycleDataOptions
@@ -265,11 +265,12 @@ def measured_displacements(
     Raises:
         InputError: there are files of both kinds, one is wrong, or a case cannot be run.
     """
-    channels = channels_of(options.channels)
+    names, unit = channel_names(options)
     if options.measured and options.accelerations:
         raise input_error("not allowed together with --measured", where="--accelerations")
-    if channels and not options.accelerations:
-        raise input_error("is about the files of --accelerations", where="--channels")
+    for option, given in (("--channels", names.channels), ("--unit", options.unit)):
+        if given and not options.accelerations:
+            raise input_error("is about the files of --accelerations", where=option)
     try:
         runs_of(parameters, cases, profile)  # raises an error for cases that cannot be run
     except InputError as error:
@@ -281,7 +282,7 @@ def measured_displacements(
     if options.measured:
         return read_rms(existing_file(options.measured, "--measured"), labels)
     if options.accelerations:
-        return read_accelerations(options.accelerations, labels, profile, channels)
+        return read_accelerations(options.accelerations, labels, profile, names, unit)
     return None
 
 

@@ -1,0 +1,78 @@
+"""Command `wm-drake record`: channels of a file, and orders of strangers' measurements."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from lab_writers import CLOCKS
+
+TIME = 0.01 * np.arange(2000)
+
+
+def written(name, rpm=300.0, missing=slice(0, 0), unit="g"):
+    """Write order 1 of 0.3 in a unit, with samples missing."""
+    values = 0.3 * np.cos(2.0 * np.pi * rpm / 60.0 * TIME)
+    values[missing] = np.nan
+    speed = np.full(len(TIME), rpm)
+    channels = {"speed": (TIME, speed, "rpm"), "Acc 1": (TIME, values, unit)}
+    CLOCKS[Path(name).suffix](Path(name), channels)
+
+
+def orders_of(ended):
+    assert ended.code == 0, ended.err
+    return {name: np.array(v, float) for name, v in json.loads(ended.out)["orders"].items()}
+
+
+@pytest.mark.parametrize("suffix", CLOCKS)
+def test_channels_of_every_format_are_listed(wm_drake, suffix):
+    written(f"x{suffix}", unit="m/s²" if suffix != ".uff" else "m/s2")
+    ended = wm_drake("record", "channels", f"x{suffix}", "--json")
+    assert ended.code == 0, ended.err
+    channels = {each["name"]: each for each in json.loads(ended.out)["channels"]}
+    acc = channels["Acc 1"]
+    assert acc["unit"] in ("m/s²", "m/s2")
+    assert acc["samples"] == 2000
+    assert [acc["rate_hz"], acc["begin_s"], acc["end_s"]] == pytest.approx([100.0, 0.0, 19.99])
+    assert "Acc 1" in wm_drake("record", "channels", f"x{suffix}").out
+
+
+def test_a_slow_recorder_has_empty_orders_above_half_its_rate(wm_drake):
+    """100 Hz at 1400 rpm resolves orders up to 2.14."""
+    written("phone.csv", rpm=1400.0)
+    orders = orders_of(wm_drake("record", "orders", "phone.csv", "--json", "--out", "o"))
+    np.testing.assert_allclose(orders["order 1 Acc 1, g"], 0.3, rtol=0.01)
+    assert np.isnan(orders["order 3 Acc 1, g"]).all()
+    assert pd.read_csv("o/orders.csv")["order 3 Acc 1, g"].isna().all()
+    assert Path("o/report.html").is_file()
+
+
+def test_a_record_of_three_seconds_has_orders(wm_drake):
+    written("x.csv", rpm=600.0)
+    Path("short.csv").write_text("\n".join(Path("x.csv").read_text().splitlines()[:300]))
+    orders = orders_of(wm_drake("record", "orders", "short.csv", "--json", "--out", "o"))
+    np.testing.assert_allclose(orders["order 1 Acc 1, g"], 0.3, rtol=0.01)
+
+
+def test_windows_with_missing_samples_are_empty(wm_drake):
+    written("x.csv", missing=slice(1000, 1010))
+    ended = wm_drake("record", "orders", "x.csv", "--json", "--out", "o")
+    assert "Acc 1: 10 of 2000 samples are missing or invalid" in ended.err
+    orders = orders_of(ended)
+    empty = np.isnan(orders["order 1 Acc 1, g"])
+    half = 0.5 * 8 * 60.0 / 300.0  # of a window of eight revolutions
+    inside = (orders["time_s"] > 10.0 - half) & (orders["time_s"] < 10.09 + half)
+    np.testing.assert_array_equal(empty, inside)
+    np.testing.assert_allclose(orders["order 1 Acc 1, g"][~empty], 0.3, rtol=0.01)
+
+
+def test_units_are_named_where_a_file_has_none(wm_drake):
+    written("x.mat", unit="-")
+    ended = wm_drake("record", "orders", "x.mat", "--json", "--out", "o")
+    assert "Acc 1: the file has no unit; m/s^2 is assumed" in ended.err
+    for option in ("g", "Acc 1=g"):
+        ended = wm_drake(
+            "record", "orders", "x.mat", "--unit", option, "--json", "--out", "o", "--overwrite"
+        )
+        assert orders_of(ended)["order 1 Acc 1, g"] == pytest.approx(0.3, rel=0.01)
