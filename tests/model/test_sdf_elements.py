@@ -13,14 +13,14 @@ from wm_drake.errors import InputError
 from wm_drake.model.bodies import SDF_FOLDER
 from wm_drake.model.sdf_elements import (
     SHAPES,
-    Choice,
     Empty,
-    Kind,
-    Limit,
-    Name,
-    Numbers,
-    Pose,
     Refused,
+    SdfChoice,
+    SdfElement,
+    SdfLimit,
+    SdfName,
+    SdfNumbers,
+    SdfPose,
     element_problems,
     kinds,
 )
@@ -28,22 +28,22 @@ from wm_drake.model.sdf_files import check_elements, sdf_roots
 from wm_drake.model.sdf_text import read_sdf
 
 KINDS = dict(kinds())
-HONOURED = {path: kind for path, kind in KINDS.items() if isinstance(kind, Kind)}
+HONOURED = {path: kind for path, kind in KINDS.items() if isinstance(kind, SdfElement)}
 REFUSED = [path for path, kind in KINDS.items() if isinstance(kind, Refused)]
 WITH_VALUE = [path for path, kind in HONOURED.items() if not isinstance(kind.value, Empty)]
-NUMBERS = [p for p in WITH_VALUE if isinstance(HONOURED[p].value, Numbers | Pose | Limit)]
+NUMBERS = [p for p in WITH_VALUE if isinstance(HONOURED[p].value, SdfNumbers | SdfPose | SdfLimit)]
 
 
 def value_of(path):
     """Return a text that an element may have."""
     kind = HONOURED[path].value
-    if isinstance(kind, Numbers):
+    if isinstance(kind, SdfNumbers):
         return " ".join(["0.5"] * kind.count)
-    if isinstance(kind, Pose):
+    if isinstance(kind, SdfPose):
         return "0 0 0 0 0 0"
-    if isinstance(kind, Limit):
+    if isinstance(kind, SdfLimit):
         return "inf"
-    if isinstance(kind, Choice):
+    if isinstance(kind, SdfChoice):
         return kind.words[0]
     return "" if isinstance(kind, Empty) else "text"
 
@@ -100,8 +100,8 @@ def test_number_that_is_none_is_refused_with_line_and_element(path):
     tag, good = path[-1], value_of(path)
     rest = good.split()[1:]
     texts = [" ".join([bad, *rest]) for bad in BAD_NUMBERS] + [f"{good} 1 1", f"{good} m", "- -"]
-    texts += ["", " ".join(rest)] if not isinstance(HONOURED[path].value, Pose) else ["0 0 0"]
-    texts += [] if isinstance(HONOURED[path].value, Limit) else [f"inf {' '.join(rest)}"]
+    texts += ["", " ".join(rest)] if not isinstance(HONOURED[path].value, SdfPose) else ["0 0 0"]
+    texts += [] if isinstance(HONOURED[path].value, SdfLimit) else [f"inf {' '.join(rest)}"]
     for text in texts:
         (message,) = messages(document(path, f"<{tag}>{text}</{tag}>"))
         assert re.match(r"SDF 'a.sdf', line \d+: ", message), text
@@ -232,7 +232,9 @@ SOLIDS = {
 
 
 def test_honoured_shapes_and_looks_are_accepted_by_drake(with_part):
-    assert set(SOLIDS) | {"mesh"} == {t for t, kind in SHAPES.items() if isinstance(kind, Kind)}
+    assert set(SOLIDS) | {"mesh"} == {
+        t for t, kind in SHAPES.items() if isinstance(kind, SdfElement)
+    }
     colours = "".join(
         f"<{tag}>1 0 0 1</{tag}>" for tag in ("ambient", "diffuse", "specular", "emissive")
     )
@@ -269,4 +271,4 @@ def test_impossible_inertia_is_refused_with_its_line(with_part, inertia, reason)
 
 
 def test_names_are_texts_of_all_elements_that_have_one():
-    assert all(isinstance(HONOURED[path].value, Name) for path in HONOURED if path[-1] == "uri")
+    assert all(isinstance(HONOURED[path].value, SdfName) for path in HONOURED if path[-1] == "uri")

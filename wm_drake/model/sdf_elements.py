@@ -27,7 +27,7 @@ _INFINITE = re.compile(r"[+-]?inf(inity)?", re.IGNORECASE)
 _COUNTS = {1: "a number", 3: "three numbers", 4: "four numbers", 6: "six numbers", 7: "7 numbers"}
 
 
-class Value(Protocol):
+class SdfValue(Protocol):
     """Text of an element."""
 
     @property
@@ -50,7 +50,7 @@ class Empty:
 
 
 @dataclass(frozen=True)
-class Name:
+class SdfName:
     """A name, such as that of a link or of a file."""
 
     allowed = "a name"
@@ -61,7 +61,7 @@ class Name:
 
 
 @dataclass(frozen=True)
-class Choice:
+class SdfChoice:
     """One of a few words, because another would change what the machine does not represent."""
 
     words: tuple[str, ...]
@@ -80,7 +80,7 @@ class Choice:
 
 
 @dataclass(frozen=True)
-class Numbers:
+class SdfNumbers:
     """Numbers in SI units.
 
     Attributes:
@@ -121,7 +121,7 @@ class Numbers:
 
 
 @dataclass(frozen=True)
-class Limit:
+class SdfLimit:
     """A number, or none of an unbounded joint."""
 
     allowed = "a number, or inf for no limit"
@@ -140,7 +140,7 @@ class Limit:
 
 
 @dataclass(frozen=True)
-class Pose:
+class SdfPose:
     """A position and an orientation, in the notation that the attributes of the element say."""
 
     allowed = "six numbers: x, y, z up to 3 (m), roll, pitch, yaw (rad)"
@@ -209,7 +209,7 @@ class Refused:
 
 
 @dataclass(frozen=True)
-class Kind:
+class SdfElement:
     """An element that is honoured.
 
     Attributes:
@@ -222,8 +222,8 @@ class Kind:
     """
 
     meaning: str
-    value: Value = Empty()
-    children: Mapping[str, "Kind | Refused"] = field(default_factory=dict)
+    value: SdfValue = Empty()
+    children: Mapping[str, "SdfElement | Refused"] = field(default_factory=dict)
     attributes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     needed: tuple[str, ...] = ()
     many: bool = False
@@ -231,7 +231,7 @@ class Kind:
     @property
     def honoured(self) -> list[str]:
         """Return the names of the elements that it may have."""
-        return [tag for tag, kind in self.children.items() if isinstance(kind, Kind)]
+        return [tag for tag, kind in self.children.items() if isinstance(kind, SdfElement)]
 
 
 VERSIONS = ("1.5", "1.6", "1.7", "1.8", "1.9", "1.10", "1.11", "1.12")
@@ -245,31 +245,31 @@ _SIMULATOR = Refused("it belongs to another simulator; leave it out")
 _OF_ELEMENT = Refused("forces are elements of the machine file; leave it out")
 _TEXTURE = Refused("pictures have plain colours: ambient, diffuse, specular, emissive")
 
-_POSE = Kind(
+_POSE = SdfElement(
     "honoured",
-    Pose(),
+    SdfPose(),
     attributes={
         "relative_to": (),
         "rotation_format": ("euler_rpy", "quat_xyzw"),
         "degrees": _BOOLEANS,
     },
 )
-_MOMENT = Kind("honoured, about the centre of mass", Numbers(unit="kg m^2", above=True))
-_PRODUCT = Kind(
-    "honoured: element of the matrix, -sum(m x y); 0 if left out", Numbers(unit="kg m^2")
+_MOMENT = SdfElement("honoured, about the centre of mass", SdfNumbers(unit="kg m^2", above=True))
+_PRODUCT = SdfElement(
+    "honoured: element of the matrix, -sum(m x y); 0 if left out", SdfNumbers(unit="kg m^2")
 )
-_INERTIA = Kind(
+_INERTIA = SdfElement(
     "honoured",
     children={
         **dict.fromkeys(("ixx", "iyy", "izz"), _MOMENT),
         **dict.fromkeys(("ixy", "ixz", "iyz"), _PRODUCT),
     },
 )
-_INERTIAL = Kind(
+_INERTIAL = SdfElement(
     "honoured; a link that moves needs mass, ixx, iyy and izz",
     children={
         "pose": _POSE,
-        "mass": Kind("honoured", Numbers(unit="kg", above=True, high=LARGEST_MASS)),
+        "mass": SdfElement("honoured", SdfNumbers(unit="kg", above=True, high=LARGEST_MASS)),
         "inertia": _INERTIA,
         "fluid_added_mass": Refused("a machine turns in air; leave it out"),
         "density": Refused("state mass and inertia"),
@@ -278,35 +278,35 @@ _INERTIAL = Kind(
 )
 
 
-def _lengths(count: int = 1) -> Kind:
-    return Kind("honoured", Numbers(count, "m", above=True, high=LONGEST_LENGTH))
+def _lengths(count: int = 1) -> SdfElement:
+    return SdfElement("honoured", SdfNumbers(count, "m", above=True, high=LONGEST_LENGTH))
 
 
-_MESH = Kind(
+_MESH = SdfElement(
     "honoured; of a collision its convex hull is measured, so one that is not convex is refused",
     children={
-        "uri": Kind("honoured: a file .obj, for pictures also .gltf or .vtk", Name()),
-        "scale": Kind("honoured", Numbers(3, above=True, high=1000.0)),
-        "drake:declare_convex": Kind("honoured: the convex hull is what is meant"),
+        "uri": SdfElement("honoured: a file .obj, for pictures also .gltf or .vtk", SdfName()),
+        "scale": SdfElement("honoured", SdfNumbers(3, above=True, high=1000.0)),
+        "drake:declare_convex": SdfElement("honoured: the convex hull is what is meant"),
         "submesh": Refused("write the part into a file of its own"),
     },
     needed=("uri",),
 )
 _NO_BOUNDS = "it has no bounds; allowed are bounded shapes such as a box"
-SHAPES: Mapping[str, Kind | Refused] = {
-    "box": Kind("honoured", children={"size": _lengths(3)}, needed=("size",)),
-    "cylinder": Kind(
+SHAPES: Mapping[str, SdfElement | Refused] = {
+    "box": SdfElement("honoured", children={"size": _lengths(3)}, needed=("size",)),
+    "cylinder": SdfElement(
         "honoured; its axis is z",
         children={"radius": _lengths(), "length": _lengths()},
         needed=("radius", "length"),
     ),
-    "capsule": Kind(
+    "capsule": SdfElement(
         "honoured; its axis is z",
         children={"radius": _lengths(), "length": _lengths()},
         needed=("radius", "length"),
     ),
-    "ellipsoid": Kind("honoured", children={"radii": _lengths(3)}, needed=("radii",)),
-    "sphere": Kind("honoured", children={"radius": _lengths()}, needed=("radius",)),
+    "ellipsoid": SdfElement("honoured", children={"radii": _lengths(3)}, needed=("radii",)),
+    "sphere": SdfElement("honoured", children={"radius": _lengths()}, needed=("radius",)),
     "mesh": _MESH,
     "plane": Refused(_NO_BOUNDS),
     "heightmap": Refused(_NO_BOUNDS),
@@ -317,9 +317,9 @@ SHAPES: Mapping[str, Kind | Refused] = {
     "drake:capsule": Refused("write <capsule>"),
     "drake:ellipsoid": Refused("write <ellipsoid>"),
 }
-_GEOMETRY = Kind("honoured; one shape", children=SHAPES)
-_COLOUR = Kind("in pictures", Numbers(3, low=0.0, high=1.0, more=1))
-_MATERIAL = Kind(
+_GEOMETRY = SdfElement("honoured; one shape", children=SHAPES)
+_COLOUR = SdfElement("in pictures", SdfNumbers(3, low=0.0, high=1.0, more=1))
+_MATERIAL = SdfElement(
     "in pictures",
     children={
         **dict.fromkeys(("ambient", "diffuse", "specular", "emissive"), _COLOUR),
@@ -330,7 +330,7 @@ _MATERIAL = Kind(
         ),
     },
 )  # fmt: skip
-_COLLISION = Kind(
+_COLLISION = SdfElement(
     "honoured: distances are measured from it",
     children={
         "pose": _POSE,
@@ -345,7 +345,7 @@ _COLLISION = Kind(
     needed=("name", "geometry"),
     many=True,
 )
-_VISUAL = Kind(
+_VISUAL = SdfElement(
     "in pictures",
     children={
         "pose": _POSE,
@@ -363,17 +363,19 @@ _VISUAL = Kind(
     needed=("name", "geometry"),
     many=True,
 )  # fmt: skip
-_LINK = Kind(
+_LINK = SdfElement(
     "honoured: housing, tub, drum, and parts that are fixed to them; it may have any pose",
     children={
         "pose": _POSE,
         "inertial": _INERTIAL,
         "collision": _COLLISION,
         "visual": _VISUAL,
-        "gravity": Kind(
-            "honoured", Choice(("true", "1"), "all parts have weight; see gravity in the file")
+        "gravity": SdfElement(
+            "honoured", SdfChoice(("true", "1"), "all parts have weight; see gravity in the file")
         ),
-        "kinematic": Kind("honoured", Choice(("false", "0"), "all parts follow from forces")),
+        "kinematic": SdfElement(
+            "honoured", SdfChoice(("false", "0"), "all parts follow from forces")
+        ),
         "velocity_decay": _OF_ELEMENT,
         **dict.fromkeys(
             ("self_collide", "enable_wind", "must_be_base_link", "sensor", "light", "battery",
@@ -387,34 +389,36 @@ _LINK = Kind(
     many=True,
 )  # fmt: skip
 
-_NO_FRICTION = Choice(
+_NO_FRICTION = SdfChoice(
     ("0", "0.0"),
     "friction of the drum is drive.bearing_friction of the machine file, other friction a damper",
 )
-_NO_SPRING = Choice(("0", "0.0"), "springs are elements of the machine file")
+_NO_SPRING = SdfChoice(("0", "0.0"), "springs are elements of the machine file")
 _NO_STOP = "a run does not know limits of joints; stops are elements of the machine file"
-_AXIS = Kind(
+_AXIS = SdfElement(
     "honoured",
     children={
-        "xyz": Kind("honoured", Numbers(3), attributes={"expressed_in": ()}),
-        "dynamics": Kind(
+        "xyz": SdfElement("honoured", SdfNumbers(3), attributes={"expressed_in": ()}),
+        "dynamics": SdfElement(
             "honoured",
             children={
-                "damping": Kind("honoured", Numbers(low=0.0, unit="N m s/rad or N s/m")),
-                "friction": Kind("must be 0", _NO_FRICTION),
-                "spring_reference": Kind("must be 0", _NO_SPRING),
-                "spring_stiffness": Kind("must be 0", _NO_SPRING),
+                "damping": SdfElement("honoured", SdfNumbers(low=0.0, unit="N m s/rad or N s/m")),
+                "friction": SdfElement("must be 0", _NO_FRICTION),
+                "spring_reference": SdfElement("must be 0", _NO_SPRING),
+                "spring_stiffness": SdfElement("must be 0", _NO_SPRING),
             },
         ),
-        "limit": Kind(
+        "limit": SdfElement(
             "honoured",
             children={
-                "lower": Kind("must be none", Limit(_NO_STOP)),
-                "upper": Kind("must be none", Limit(_NO_STOP)),
-                "velocity": Kind(
-                    "must be none", Limit("the speed is that of the profile and the motor")
+                "lower": SdfElement("must be none", SdfLimit(_NO_STOP)),
+                "upper": SdfElement("must be none", SdfLimit(_NO_STOP)),
+                "velocity": SdfElement(
+                    "must be none", SdfLimit("the speed is that of the profile and the motor")
                 ),
-                "effort": Kind("0 for a joint without a motor; none for that of the drum", Limit()),
+                "effort": SdfElement(
+                    "0 for a joint without a motor; none for that of the drum", SdfLimit()
+                ),
                 "stiffness": _OF_ELEMENT,
                 "dissipation": _OF_ELEMENT,
                 "drake:acceleration": _OF_ELEMENT,
@@ -428,11 +432,11 @@ _AXIS = Kind(
 )
 _NO_GEAR = Refused("the transmission is in drive of the machine file (belt_ratio, rotor_inertia)")
 _NO_AXIS2 = Refused("joints have one axis: fixed, revolute, continuous, prismatic")
-_JOINT = Kind(
+_JOINT = SdfElement(
     "honoured: fixed; revolute or continuous for the drum; prismatic for telescopic dampers",
     children={
-        "parent": Kind("honoured", Name()),
-        "child": Kind("honoured", Name()),
+        "parent": SdfElement("honoured", SdfName()),
+        "child": SdfElement("honoured", SdfName()),
         "pose": _POSE,
         "axis": _AXIS,
         **dict.fromkeys(
@@ -447,21 +451,23 @@ _JOINT = Kind(
     needed=("name", "type", "parent", "child"),
     many=True,
 )  # fmt: skip
-_FRAME = Kind(
+_FRAME = SdfElement(
     "honoured: where elements and sensors are attached",
     children={"pose": _POSE},
     attributes={**_NAMED, "attached_to": ()},
     needed=("name",),
     many=True,
 )
-_STATIC = Kind("honoured", Choice(("false", "0"), "only the housing is fixed, by a joint to world"))
-_INCLUDE = Kind(
+_STATIC = SdfElement(
+    "honoured", SdfChoice(("false", "0"), "only the housing is fixed, by a joint to world")
+)
+_INCLUDE = SdfElement(
     "honoured: the links of another file become links of this model",
     children={
-        "uri": Kind("honoured: a file below the folder of this one", Name()),
-        "name": Kind("honoured", Name()),
+        "uri": SdfElement("honoured: a file below the folder of this one", SdfName()),
+        "name": SdfElement("honoured", SdfName()),
         "pose": _POSE,
-        "placement_frame": Kind("honoured", Name()),
+        "placement_frame": SdfElement("honoured", SdfName()),
         "static": _STATIC,
         "plugin": _SIMULATOR,
     },
@@ -469,7 +475,7 @@ _INCLUDE = Kind(
     needed=("uri", "merge"),
     many=True,
 )
-_MODEL = Kind(
+_MODEL = SdfElement(
     "honoured; one a file",
     children={
         "pose": _POSE,
@@ -495,7 +501,7 @@ _MODEL = Kind(
     attributes={**_NAMED, "canonical_link": (), "placement_frame": ()},
     needed=("name",),
 )  # fmt: skip
-ROOT = Kind(
+ROOT = SdfElement(
     f"honoured; versions {VERSIONS[0]} to {VERSIONS[-1]}",
     children={
         "model": _MODEL,
@@ -506,13 +512,13 @@ ROOT = Kind(
 )
 
 
-def kinds() -> Iterator[tuple[tuple[str, ...], Kind | Refused]]:
+def kinds() -> Iterator[tuple[tuple[str, ...], SdfElement | Refused]]:
     """Yield the path of names from `sdf` down to each element of the declaration, and its kind."""
-    waiting: list[tuple[tuple[str, ...], Kind | Refused]] = [(("sdf",), ROOT)]
+    waiting: list[tuple[tuple[str, ...], SdfElement | Refused]] = [(("sdf",), ROOT)]
     while waiting:
         path, kind = waiting.pop()
         yield path, kind
-        if isinstance(kind, Kind):
+        if isinstance(kind, SdfElement):
             waiting.extend(((*path, tag), of) for tag, of in reversed([*kind.children.items()]))
 
 
@@ -546,7 +552,7 @@ _Fault = tuple[Node, object, str]
 """An element, what faults of the same sort have in common, and the message."""
 
 
-def _faults(root: Node, kind: Kind) -> Iterator[_Fault]:
+def _faults(root: Node, kind: SdfElement) -> Iterator[_Fault]:
     waiting = [(root, kind)]
     while waiting:
         node, kind = waiting.pop()
@@ -564,7 +570,7 @@ def _faults(root: Node, kind: Kind) -> Iterator[_Fault]:
         waiting.extend(reversed(inside))
 
 
-def _faults_of(node: Node, kind: Kind) -> Iterator[_Fault]:
+def _faults_of(node: Node, kind: SdfElement) -> Iterator[_Fault]:
     if node.has_comment and not isinstance(kind.value, Empty):
         yield node, node, "has a comment inside; move it out, so that the value is read as a whole"
     elif fault := kind.value.fault(node):
@@ -573,7 +579,7 @@ def _faults_of(node: Node, kind: Kind) -> Iterator[_Fault]:
         yield node, node, message
 
 
-def _wrong_attributes(node: Node, kind: Kind) -> Iterator[str]:
+def _wrong_attributes(node: Node, kind: SdfElement) -> Iterator[str]:
     for name, text in node.attributes.items():
         if name.startswith("xmlns:"):
             continue
@@ -588,12 +594,12 @@ def _wrong_attributes(node: Node, kind: Kind) -> Iterator[str]:
             yield f"has no attribute '{name}'"
 
 
-def _wrong_counts(node: Node, kind: Kind) -> Iterator[str]:
+def _wrong_counts(node: Node, kind: SdfElement) -> Iterator[str]:
     tags = Counter(child.tag for child in node.children)
     for tag, of in kind.children.items():
         if not tags[tag] and tag in kind.needed:
             yield f"has no <{tag}>"
-        if tags[tag] > 1 and isinstance(of, Kind) and not of.many:
+        if tags[tag] > 1 and isinstance(of, SdfElement) and not of.many:
             yield f"has {tags[tag]} elements <{tag}>; allowed is one"
     if kind is _GEOMETRY and len(node.children) != 1:
         yield f"has {len(node.children)} shapes; allowed is one"

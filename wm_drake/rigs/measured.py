@@ -217,8 +217,8 @@ def _longest_piece(loop: MeasuredLoop) -> MeasuredLoop:
     begin, end = max(zip(ends[::2], ends[1::2], strict=True), key=lambda one: one[1] - one[0])
     inside = (loop.time >= begin) & (loop.time <= end)
     message = (
-        f"its motion is no sine and has {len(loop.gaps)} gap{'s' * (len(loop.gaps) > 1)}; used is "
-        f"the longest part without one, {begin:.6g} to {end:.6g} s"
+        f"its motion is no sine and has {len(loop.gaps)} gap{'s' if len(loop.gaps) > 1 else ''}; "
+        f"used is the longest part without one, {begin:.6g} to {end:.6g} s"
     )
     warnings.warn(str(Problem(loop.path, "", message)), InputNotice, stacklevel=2)
     if np.sum(inside) < FEWEST:

@@ -244,8 +244,8 @@ def _say_gaps(channels: Synchronous) -> None:
             notice(
                 channels.path,
                 f"{missing.sum()} of {len(column)} samples are missing or invalid "
-                f"({missing.sum() * step:.3g} s in {spans} gap{'s' * (spans > 1)}); they are left "
-                "out",
+                f"({missing.sum() * step:.3g} s in {spans} gap{'s' if spans > 1 else ''}); they are "
+                "left out",
                 word,
             )
 
@@ -348,7 +348,7 @@ def _with_places(channels: Synchronous, counts: FloatArray) -> Synchronous:
     notice(
         channels.path,
         f"{len(grid) - len(places)} samples of {len(grid)} were not recorded ({gaps} "
-        f"gap{'s' * (gaps > 1)} in time); they are left out",
+        f"gap{'s' if gaps > 1 else ''} in time); they are left out",
     )
     values = {word: np.full(len(grid), np.nan) for word in channels.values}
     for word, column in channels.values.items():

@@ -28,7 +28,7 @@ NOMINAL = 0.2
 """Part of the curve whose linear fit gives the nominal stiffness, as in [B] section 4."""
 
 
-Signal: TypeAlias = tuple[FloatArray, FloatArray, FloatArray]
+StaticSignal: TypeAlias = tuple[FloatArray, FloatArray, FloatArray]
 """Smoothed displacement, force and rate of a test."""
 
 
@@ -170,7 +170,7 @@ def static_curve(axis: str, loops: Sequence[MeasuredLoop]) -> StaticCurve:
     )
 
 
-def _range(signals: Sequence[Signal], path: str) -> tuple[float, float, float]:
+def _range(signals: Sequence[StaticSignal], path: str) -> tuple[float, float, float]:
     """Return both ends of the displacements, zero for one near it, and the size of their range."""
     low = min(float(np.min(position)) for position, _, _ in signals)
     high = max(float(np.max(position)) for position, _, _ in signals)
@@ -202,7 +202,7 @@ def _elastic(places: FloatArray, loading: FloatArray, unloading: FloatArray) -> 
     return np.interp(places, places[there], elastic[there])
 
 
-def _signal(loop: MeasuredLoop) -> Signal:
+def _signal(loop: MeasuredLoop) -> StaticSignal:
     """Return smoothed displacement, force and rate of a test."""
     time = loop.time - loop.time[0]
     curve = smoothed(time, loop.displacement, None, loop.path)
