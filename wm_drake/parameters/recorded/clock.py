@@ -244,8 +244,8 @@ def _say_gaps(channels: Synchronous) -> None:
             notice(
                 channels.path,
                 f"{missing.sum()} of {len(column)} samples are missing or invalid "
-                f"({missing.sum() * step:.3g} s in {spans} gap{'s' if spans > 1 else ''}); they are "
-                "left out",
+                f"({missing.sum() * step:.3g} s in {spans} gap{'s' if spans > 1 else ''}); they "
+                "are left out",
                 word,
             )
 
