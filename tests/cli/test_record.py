@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+import xarray as xr
 from lab_writers import CLOCKS
 
 TIME = 0.01 * np.arange(2000)
@@ -20,9 +21,12 @@ def written(name, rpm=300.0, missing=slice(0, 0), unit="g"):
     CLOCKS[Path(name).suffix](Path(name), channels)
 
 
-def orders_of(ended):
+def amplitudes_of(ended, order=1.0):
+    """Return the amplitudes of an order over time; NaN where the table is empty."""
     assert ended.code == 0, ended.err
-    return {name: np.array(v, float) for name, v in json.loads(ended.out)["orders"].items()}
+    rows = pd.DataFrame(json.loads(ended.out)["orders"])
+    assert set(rows["signal"]) == {"Acc 1"}
+    return rows[rows["order"] == order].set_index("time_s")["amplitude_g"].astype(float)
 
 
 @pytest.mark.parametrize("suffix", CLOCKS)
@@ -41,30 +45,37 @@ def test_channels_of_every_format_are_listed(wm_drake, suffix):
 def test_a_slow_recorder_has_empty_orders_above_half_its_rate(wm_drake):
     """100 Hz at 1400 rpm resolves orders up to 2.14."""
     written("phone.csv", rpm=1400.0)
-    orders = orders_of(wm_drake("record", "orders", "phone.csv", "--json", "--out", "o"))
-    np.testing.assert_allclose(orders["order 1 Acc 1, g"], 0.3, rtol=0.01)
-    assert np.isnan(orders["order 3 Acc 1, g"]).all()
-    assert pd.read_csv("o/orders.csv")["order 3 Acc 1, g"].isna().all()
+    ended = wm_drake("record", "orders", "phone.csv", "--json", "--out", "o")
+    np.testing.assert_allclose(amplitudes_of(ended), 0.3, rtol=0.01)
+    third = amplitudes_of(ended, 3.0)
+    assert len(third) == len(amplitudes_of(ended))
+    assert third.isna().all()
+    for name in ("orders", "largest"):
+        is_empty = pd.read_csv(f"o/{name}.csv").groupby("order")["amplitude_g"].count() == 0
+        assert is_empty.to_dict() == {0.5: False, 1.0: False, 2.0: False, 3.0: True}
+    with xr.open_dataset("o/orders.nc") as maps:
+        assert maps.amplitude.sizes == {"time": len(third), "order": 96, "signal": 1}
+        assert (maps.amplitude.units, maps.speed.units) == ("g", "rad/s")
     assert Path("o/report.html").is_file()
 
 
 def test_a_record_of_three_seconds_has_orders(wm_drake):
     written("x.csv", rpm=600.0)
     Path("short.csv").write_text("\n".join(Path("x.csv").read_text().splitlines()[:300]))
-    orders = orders_of(wm_drake("record", "orders", "short.csv", "--json", "--out", "o"))
-    np.testing.assert_allclose(orders["order 1 Acc 1, g"], 0.3, rtol=0.01)
+    ended = wm_drake("record", "orders", "short.csv", "--json", "--out", "o")
+    np.testing.assert_allclose(amplitudes_of(ended), 0.3, rtol=0.01)
 
 
 def test_windows_with_missing_samples_are_empty(wm_drake):
     written("x.csv", missing=slice(1000, 1010))
     ended = wm_drake("record", "orders", "x.csv", "--json", "--out", "o")
     assert "Acc 1: 10 of 2000 samples are missing or invalid" in ended.err
-    orders = orders_of(ended)
-    empty = np.isnan(orders["order 1 Acc 1, g"])
+    first = amplitudes_of(ended)
+    time, empty = first.index, first.isna()
     half = 0.5 * 8 * 60.0 / 300.0  # of a window of eight revolutions
-    inside = (orders["time_s"] > 10.0 - half) & (orders["time_s"] < 10.09 + half)
+    inside = (time > 10.0 - half) & (time < 10.09 + half)
     np.testing.assert_array_equal(empty, inside)
-    np.testing.assert_allclose(orders["order 1 Acc 1, g"][~empty], 0.3, rtol=0.01)
+    np.testing.assert_allclose(first[~empty], 0.3, rtol=0.01)
 
 
 def test_units_are_named_where_a_file_has_none(wm_drake):
@@ -75,4 +86,4 @@ def test_units_are_named_where_a_file_has_none(wm_drake):
         ended = wm_drake(
             "record", "orders", "x.mat", "--unit", option, "--json", "--out", "o", "--overwrite"
         )
-        assert orders_of(ended)["order 1 Acc 1, g"] == pytest.approx(0.3, rel=0.01)
+        assert amplitudes_of(ended).to_numpy() == pytest.approx(0.3, rel=0.01)

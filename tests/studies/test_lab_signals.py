@@ -72,9 +72,9 @@ def test_a_record_of_a_laboratory_is_that_of_a_csv(tmp_path, suffix):
         tmp_path / "run.csv", {"time_s": TIME, "speed_rpm": SPEED, "Xr": 1e3 * ACCELERATIONS[0]}
     )
     found, expected = read_signals(path, unit="mm"), read_signals(tmp_path / "run.csv", unit="mm")
-    assert (found.names, found.unit) == (["Xr"], "mm")
-    np.testing.assert_allclose(found.angle, expected.angle, rtol=1e-6, atol=1e-6)
-    np.testing.assert_allclose(found.values, expected.values, rtol=1e-6, atol=1e-4)
+    assert (found.signal.values.tolist(), found.value.units) == (["Xr"], "mm")
+    np.testing.assert_allclose(found.drum_angle, expected.drum_angle, rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(found.value, expected.value, rtol=1e-6, atol=1e-4)
 
 
 def test_wrong_files_are_refused(tmp_path):
@@ -117,12 +117,12 @@ def test_channels_are_chosen_by_name(tmp_path, suffix):
     np.testing.assert_allclose(found, wanted, rtol=1e-9)
     chosen = {"speed": "Drum", "side": names["S1_y"], **clock}
     signals = read_signals(tmp_path / f"front{suffix}", ChannelNames(chosen))
-    assert signals.names == ["side"]
-    assert signals.unit == ("m/s^2" if suffix == ".mat" else "g")
-    size = np.max(np.abs(signals.values)) * (1.0 if suffix == ".mat" else G)
+    assert signals.signal.values.tolist() == ["side"]
+    assert signals.value.units == ("m/s^2" if suffix == ".mat" else "g")
+    size = np.max(np.abs(signals.value.values)) * (1.0 if suffix == ".mat" else G)
     assert size == pytest.approx(3.0, rel=1e-3)
     turns = np.trapezoid(SPEED, TIME) / 60.0
-    assert signals.angle[-1] / (2.0 * np.pi) == pytest.approx(turns, rel=1e-6)
+    assert signals.drum_angle.values[-1] / (2.0 * np.pi) == pytest.approx(turns, rel=1e-6)
 
 
 def test_wrong_names_of_channels_are_refused(tmp_path):

@@ -1,5 +1,5 @@
 """Orders of a record or of a measurement: waterfall and order map of each signal.
 
-Enters: a file with signals and the speed of the drum. Leaves: an `Orders`, its table and page.
+Enters: a file with signals and the speed of the drum. Leaves: maps, an `Answer`.
 May import: `simulation`, `report` and the rooms before them.
 """

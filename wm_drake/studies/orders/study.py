@@ -1,7 +1,6 @@
 """Orders of a record or of a measurement: signals with the angle of the drum."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -22,52 +21,19 @@ from wm_drake.parameters.recorded import (
 from wm_drake.parameters.recorded import SPEED as DRUM_SPEED
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit, factor_of, plain_unit
+from wm_drake.report.quantity import SPEED, TIME, Quantity, quantity_of
 from wm_drake.simulation.orders import REVOLUTIONS, frequency_map, order_map
 from wm_drake.simulation.records import read_measured
 
 SHOWN_ORDERS = (0.5, 1.0, 2.0, 3.0)
-"""Orders of the table and of the CSV file."""
+"""Orders of the tables and of the CSV files."""
 
 
-@dataclass(frozen=True)
-class Signals:
-    """Signals with the angle of the drum.
-
-    Attributes:
-        source: Name of the file.
-        unit: Their unit, for reading.
-        time: (n,) [s]
-        angle: (n,) Angle of the drum. [rad]
-        values: (n, k) in `unit`.
-    """
-
-    source: str
-    names: list[str]
-    unit: str
-    time: FloatArray
-    angle: FloatArray
-    values: FloatArray
+ORDER = Quantity("order", form="{:g}".format)
+FREQUENCY = Quantity("frequency", Unit("Hz", "Hz"))
 
 
-@dataclass(frozen=True)
-class Orders:
-    """Order map and frequency map of signals, as `wm_drake.simulation.orders` returns them."""
-
-    signals: Signals
-    orders: xr.DataArray
-    frequencies: xr.DataArray
-
-    def shown_orders(self) -> list[float]:
-        """Return the orders of the table and of the CSV file that the map has."""
-        highest = float(self.orders.order.values[-1])
-        return [order for order in SHOWN_ORDERS if order <= highest]
-
-    def at_order(self, order: float) -> FloatArray:
-        """Return the amplitude of the nearest order of the map. (times, signals)"""
-        return np.asarray(self.orders.sel(order=order, method="nearest").values)
-
-
-def read_signals(path: Path, names: ChannelNames | None = None, unit: str = "") -> Signals:
+def read_signals(path: Path, names: ChannelNames | None = None, unit: str = "") -> xr.Dataset:
     """Read signals from a record (netCDF) or from a recorded file of any format.
 
     Args:
@@ -76,6 +42,10 @@ def read_signals(path: Path, names: ChannelNames | None = None, unit: str = "") 
         names: Name in the file of ``time``, ``speed`` or a signal, whose word is free; without a
             named signal all others are signals. Units of channels whose file has none.
         unit: Unit of signals whose file has none; "" for m/s^2.
+
+    Returns:
+        Over `time` [s] and `signal`: `value`, in the unit of the first signal of a recorded file,
+        which may be any text; and `drum_angle` [rad]. Attribute `source`: name of the file.
     """
     names = names or ChannelNames()
     if path.suffix.lower() == ".nc" and not names.channels:
@@ -91,26 +61,41 @@ def read_signals(path: Path, names: ChannelNames | None = None, unit: str = "") 
             {**uses, "speed": ChannelUse(speed, DRUM_SPEED, "rpm", is_main=False)}
         )
     )
-    values = np.stack([channels.values[word] / factor for word in used], axis=1)
     angle, turning = _angle(channels.values["speed"], channels.time, path)
-    values[~turning] = np.nan
-    return Signals(path.name, list(used), shown, channels.time, angle, values)
+    values = {word: np.where(turning, channels.values[word] / factor, np.nan) for word in used}
+    unit_read = Unit(shown.replace(" ", "*"), shown.replace(" ", "*"))
+    return _signals(path, unit_read, channels.time, angle, values)
 
 
-def _of_record(path: Path) -> Signals:
+def _signals(
+    path: Path, unit: Unit, time: FloatArray, angle: FloatArray, values: Mapping[str, FloatArray]
+) -> xr.Dataset:
+    """Return the dataset of `read_signals`; `values` has the signals by name."""
+    columns = np.stack(list(values.values()), axis=1)
+    return xr.Dataset(
+        {
+            "value": Quantity("amplitude", unit, 2).variable(("time", "signal"), columns),
+            "drum_angle": Quantity("angle of the drum", Unit("rad", "deg")).variable("time", angle),
+        },
+        {"time": TIME.variable("time", time), "signal": list(values)},
+        {"source": path.name},
+    )
+
+
+def _of_record(path: Path) -> xr.Dataset:
     """Return the displacements at the sensors of a record."""
     dimensions = {"time": ("time",), "displacement": ("time", "sensor"), "drum_angle": ("time",)}
     record = read_measured(path, dimensions)
     names = [str(name) for name in record.sensor.values]
-    columns = dict(zip(names, 1e3 * record.displacement.values.T, strict=True))
+    columns = dict(zip(names, record.displacement.values.T, strict=True))
     channels = Synchronous(path, record.time.values, {**columns, "": record.drum_angle.values})
     if not np.all(np.diff(channels.time) > 0.0):
         raise input_error("needs at least three samples in rising time", where=str(path))
     even = evenly(channels)
     if len(even.time) != len(channels.time):
         raise input_error("its time has gaps", where=str(path))
-    values = np.stack([even.values[name] for name in names], axis=1)
-    return Signals(path.name, names, "mm", even.time, even.values[""], values)
+    values = {name: even.values[name] for name in names}
+    return _signals(path, Unit("m", "mm"), even.time, even.values[""], values)
 
 
 def _speed_and_signals(recording: Recording) -> tuple[Signal, dict[str, Signal]]:
@@ -185,28 +170,86 @@ def _angle(speed: FloatArray, time: FloatArray, path: Path) -> tuple[FloatArray,
     return cumulative_trapezoid(filled, time, initial=0.0), known
 
 
-def orders_of(signals: Signals, highest: float) -> Orders:
+def orders_of(signals: xr.Dataset, highest: float) -> xr.Dataset:
     """Return order map and frequency map of signals.
+
+    Args:
+        signals: As of `read_signals`.
+
+    Returns:
+        Over `time` [s], `order` and `signal`: `amplitude`, with the drum speed of each time as the
+        coordinate `speed` [rad/s]. Over `spectrum_time` [s], `frequency` [Hz] and `signal`:
+        `spectrum`, with `spectrum_speed` [rad/s]. Amplitudes are in the unit of the signals.
 
     Raises:
         InputError: the record has fewer revolutions than a window, or no window without a gap, or
             its samples resolve no order.
     """
-    orders = order_map(signals.values, signals.angle, signals.time, highest=highest)
+    time, angle = signals.time.values, signals.drum_angle.values
+    source, amplitude = signals.attrs["source"], quantity_of(signals.value)
+    orders = order_map(signals.value.values, angle, time, highest=highest)
     if not orders.sizes["time"]:
-        turns = abs(signals.angle[-1] - signals.angle[0]) / (2.0 * np.pi)
+        turns = abs(angle[-1] - angle[0]) / (2.0 * np.pi)
         raise input_error(
-            f"has {turns:.1f} drum revolutions; a window needs {REVOLUTIONS}", where=signals.source
+            f"has {turns:.1f} drum revolutions; a window needs {REVOLUTIONS}", where=source
         )
     if not np.isfinite(orders.values).any():
-        raise input_error(_why_empty(signals), where=signals.source)
-    return Orders(signals, orders, frequency_map(signals.values, signals.time))
+        raise input_error(_why_empty(signals), where=source)
+    spectra = frequency_map(signals.value.values, time)
+    speed = np.interp(spectra.time.values, time, np.gradient(angle, time))
+    over = ("spectrum_time", "frequency", "signal")
+    return xr.Dataset(
+        {
+            "amplitude": amplitude.variable(("time", "order", "signal"), orders.values),
+            "spectrum": amplitude.variable(over, spectra.values),
+        },
+        {
+            "time": TIME.variable("time", orders.time.values),
+            "order": ORDER.variable("order", orders.order.values),
+            "signal": signals.signal.values,
+            "speed": SPEED.variable("time", orders.speed.values),
+            "spectrum_time": TIME.variable("spectrum_time", spectra.time.values),
+            "frequency": FREQUENCY.variable("frequency", spectra.frequency.values),
+            "spectrum_speed": SPEED.variable("spectrum_time", speed),
+        },
+        {"source": source},
+    )
 
 
-def _why_empty(signals: Signals) -> str:
+def at_orders_shown(maps: xr.Dataset) -> xr.Dataset:
+    """Return amplitudes of some orders that the map has, over time, order and signal."""
+    highest = maps.order.values[-1]
+    at = [order for order in SHOWN_ORDERS if order <= highest]
+    amplitude = maps[["amplitude"]].sel(order=at, method="nearest")
+    return amplitude.assign_coords(order=ORDER.variable("order", at))
+
+
+def largest_of_orders(maps: xr.Dataset) -> xr.Dataset:
+    """Return the largest amplitude of some orders, and the drum speed there.
+
+    Each place has an order and a signal; amplitude and speed are NaN where the samples do not
+    resolve the order.
+    """
+    data = at_orders_shown(maps)
+    amplitude = data.amplitude.stack(place=("order", "signal")).transpose("time", "place")
+    filled = amplitude.fillna(-1.0)
+    speed = data.speed.values[filled.argmax("time").values]
+    is_resolved = amplitude.notnull().any("time").values
+    quantity = quantity_of(maps.amplitude).named("largest amplitude")
+    return xr.Dataset(
+        {
+            "order": ORDER.variable("place", amplitude.order.values),
+            "signal": ("place", amplitude.signal.values),
+            "amplitude": quantity.variable("place", amplitude.max("time").values),
+            "speed": SPEED.named("at").variable("place", np.where(is_resolved, speed, np.nan)),
+        }
+    )
+
+
+def _why_empty(signals: xr.Dataset) -> str:
     """Return why no window of an order map has a value."""
-    step = float(signals.time[1] - signals.time[0])
-    turn = float(np.median(np.abs(np.diff(signals.angle)))) / (2.0 * np.pi)
+    step = float(np.diff(signals.time.values[:2])[0])
+    turn = float(np.median(np.abs(np.diff(signals.drum_angle.values)))) / (2.0 * np.pi)
     if turn > 0.25:
         return (
             f"its samples resolve no order: the drum turns {turn:.3g} revolutions in a step of "

@@ -1,9 +1,10 @@
 """The task of the study of orders: the file read and its maps computed."""
 
+from wm_drake.studies.answer import Answer
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import channel_names, existing_file
 from wm_drake.studies.orders.options import OrdersOptions
-from wm_drake.studies.orders.page import OrdersResult
+from wm_drake.studies.orders.page import orders_answer
 from wm_drake.studies.orders.study import orders_of, read_signals
 from wm_drake.studies.study import Task
 
@@ -18,6 +19,6 @@ class OrdersTask(Task):
         self.signals = read_signals(file, names, unit)
         self.highest = options.highest
 
-    def run(self, executor: Executor) -> OrdersResult:  # noqa: ARG002
+    def run(self, executor: Executor) -> Answer:  # noqa: ARG002
         """Compute the maps."""
-        return OrdersResult(orders_of(self.signals, self.highest))
+        return orders_answer(orders_of(self.signals, self.highest))
