@@ -87,3 +87,20 @@ def test_units_are_named_where_a_file_has_none(wm_drake):
             "record", "orders", "x.mat", "--unit", option, "--json", "--out", "o", "--overwrite"
         )
         assert amplitudes_of(ended).to_numpy() == pytest.approx(0.3, rel=0.01)
+
+
+def test_a_record_of_spin_is_read_in_mm_and_kept_in_metres(wm_drake):
+    """Displacements of 3 mm with order 1, at 300 rpm."""
+    angle = 2.0 * np.pi * 5.0 * TIME
+    displacement = ("time", "sensor"), 3e-3 * np.cos(angle)[:, None], {"units": "m"}
+    xr.Dataset(
+        {"displacement": displacement, "drum_angle": ("time", angle, {"units": "rad"})},
+        {"time": ("time", TIME, {"units": "s"}), "sensor": ["Xr"]},
+    ).to_netcdf("x.nc", engine="h5netcdf")
+    ended = wm_drake("record", "orders", "x.nc", "--json", "--out", "o")
+    assert ended.code == 0, ended.err
+    largest = pd.DataFrame(json.loads(ended.out)["largest"]).set_index("order").loc[1.0]
+    assert largest["signal"] == "Xr"
+    assert [largest["amplitude_mm"], largest["speed_rpm"]] == pytest.approx([3.0, 300.0], rel=1e-3)
+    with xr.open_dataset("o/orders.nc") as maps:
+        assert float(maps.amplitude.max()) == pytest.approx(3e-3, rel=1e-3)
