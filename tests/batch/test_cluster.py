@@ -81,7 +81,9 @@ def test_function_runs_on_a_cluster_for_each_item_and_its_error_is_a_message():
     with Client(processes=False, dashboard_address=None, n_workers=1) as client:
         found = dict(map_on_cluster(math.sqrt, [4.0, 9.0, 16.0], client))
         assert found == {0: 2.0, 1: 3.0, 2: 4.0}
-        with pytest.raises(WmDrakeError, match="--cluster: ValueError: math domain error"):
+        with pytest.raises(ValueError, match=r"\w") as refused:  # its words depend on Python
+            math.sqrt(-1.0)
+        with pytest.raises(WmDrakeError, match=f"--cluster: ValueError: {refused.value}"):
             list(map_on_cluster(math.sqrt, [4.0, -1.0], client))
 
 

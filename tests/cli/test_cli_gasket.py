@@ -19,7 +19,7 @@ WITH_TABLE = """extends: reference
 gasket:
   stiffness_x: {displacement: '(-30, -15, 0, 15, 30) mm', force: '(-140, -46, 0, 46, 140) N'}
 """
-PROFILE = "time: (0, 1) s\nspeed: (0, 60) rpm\n"
+PROFILE = "time: (0, 2) s\nspeed: (60, 200) rpm\n"
 NAMES = ("contributions", "design", "effects", "leading_terms", "runs", "variance")
 TABLES = [f"{name}.csv" for name in NAMES]
 FRICTION = "damper_types.friction.friction_force"

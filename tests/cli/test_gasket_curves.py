@@ -9,9 +9,8 @@ import pandas as pd
 import pytest
 
 import wm_drake as wm
-from wm_drake.errors import InputNotice
 from wm_drake.parameters import load_machine
-from wm_drake.parameters.gasket_drawing import Rubber, load_gasket_drawing, tension_stress
+from wm_drake.parameters.gasket_drawing import load_gasket_drawing, tension_stress
 from wm_drake.solid import curves as solid_curves
 from wm_drake.solid.rubber import energy
 
@@ -96,23 +95,6 @@ def test_constants_are_fitted_to_a_tension_test(wm_drake):
     assert ended.code == 0, ended.err
     page = Path("out/report.html").read_text(encoding="utf-8")
     assert "root mean square of fit less test" in page
-
-
-SCATTERED = {
-    "stretch": [1.0, 1.1, 1.2, 1.3, 1.4, 1.5],
-    "stress": "(0, 0.1662, 0.306, 0.4287, 0.5442, 0.6242) MPa",
-}
-"""Rubber of c1 = 0.3 MPa with 1.2 % of noise: only one constant gives a force that rises."""
-
-
-def test_a_tension_test_is_fitted_with_as_many_constants_as_are_stable():
-    with pytest.warns(InputNotice, match=r"fitted with terms: 1, which deviates by 0\.95 %"):
-        rubber = Rubber.model_validate({"test": SCATTERED})
-    assert rubber.constants == (pytest.approx(0.3e6, rel=0.02), 0.0, 0.0)
-    with pytest.raises(
-        ValueError, match=r"terms: 1 is stable and deviates from the test by 0\.95 %"
-    ):
-        Rubber.model_validate({"test": {**SCATTERED, "terms": 3}})
 
 
 def test_stress_in_tension_is_the_slope_of_the_energy():

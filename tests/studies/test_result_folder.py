@@ -162,8 +162,8 @@ def test_folder_of_a_dead_process_is_removed_and_that_of_a_living_one_stays(tmp_
 def test_killed_process_leaves_a_folder_that_the_next_run_removes(tmp_path):
     code = (
         "import os, signal; from pathlib import Path\n"
-        "from wm_drake.studies.result_folder import Run, result_folder\n"
-        f"with result_folder(Path({str(tmp_path / 'out')!r}), Run('spin')):\n"
+        "from wm_drake.studies.result_folder import CommandRun, result_folder\n"
+        f"with result_folder(Path({str(tmp_path / 'out')!r}), CommandRun('spin')):\n"
         "    os.kill(os.getpid(), signal.SIGKILL)"
     )
     subprocess.run([sys.executable, "-c", code], check=False)

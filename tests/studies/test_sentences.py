@@ -11,7 +11,7 @@ from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.measures.responses import Response
 from wm_drake.studies.orders.page import order_text
-from wm_drake.studies.tolerance.study import Settings, run_tolerances
+from wm_drake.studies.tolerance.study import ToleranceSettings, run_tolerances
 from wm_drake.studies.tolerance.variables import uncertain_machine
 from wm_drake.studies.tolerance.words import about_loads, masses_text, summary
 
@@ -38,7 +38,7 @@ def tolerances(machine, tree, gap):
     uncertain = uncertain_machine(
         machine, tree, Case("middle", machine.loads["middle"], machine.profile)
     )
-    return run_tolerances(uncertain, (GAP,), run, Settings(256, 256, 0), ())
+    return run_tolerances(uncertain, (GAP,), run, ToleranceSettings(256, 256, 0), ())
 
 
 def of_load(machine, *keys):

@@ -18,7 +18,7 @@ from wm_drake.report.formatting import number, percent
 from wm_drake.report.scripts import packed_plotly
 from wm_drake.report.table import readable
 from wm_drake.studies.spin.figures import orbits_figure, revolution_starts, simplified_indices
-from wm_drake.studies.spin.page import amplitude_table, spin_page, warnings_of
+from wm_drake.studies.spin.page import SpinResult, amplitude_table, spin_page, warnings_of
 from wm_drake.studies.spin.study import CaseResult, Files, SpinRuns
 from wm_drake.studies.spin.tables import (
     accelerations,
@@ -225,7 +225,7 @@ def test_terminal_and_page_say_the_same_gap(
     case = case_result(machine, gap=gap)
     text = f"smallest gap {size} tub shell and wall right, at 240 rpm (0.50 s)"
     result = spin_result(machine, [case])
-    assert f"{case.case.name}: {text}" in result.terminal()
+    assert f"{case.case.name}: {text}" in SpinResult(result).terminal()
     assert text.removeprefix("smallest gap ") in spin_page(result)
 
 
