@@ -225,14 +225,14 @@ def critical_table(result: MachineModes) -> LabelledTable:
 
 def gap_table(result: MachineModes, gaps: Mapping[str, Nearness]) -> LabelledTable:
     """Return the smallest gap in each mode."""
+    size, arm = (q.AMPLITUDE.text(length) for length in (result.amplitude, ANGLE_ARM))
     return LabelledTable(
         "gaps",
         of_gaps(gaps),
         "Gap to the housing",
         "Smallest distance between tub and housing over the cycle of each mode, all at an "
-        f"amplitude of {q.AMPLITUDE.text(result.amplitude)}, with angles times {q.AMPLITUDE.text(ANGLE_ARM)}. "
-        "Bold: the mode that brings them nearest. How large a mode becomes in a run depends on "
-        "load and speed.",
+        f"amplitude of {size}, with angles times {arm}. Bold: the mode that brings them nearest. "
+        "How large a mode becomes in a run depends on load and speed.",
         marked=("is_nearest", "ours"),
         words=TITLES,
     )
