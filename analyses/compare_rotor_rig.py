@@ -36,7 +36,9 @@ from wm_drake.report.figure import (
     Text,
     in_grid,
 )
-from wm_drake.studies.modes.study import SLIDING, MachineModes
+from wm_drake.report.quantity import shown
+from wm_drake.studies.modes.linearisation import SLIDING
+from wm_drake.studies.modes.study import MachineModes
 
 HERE = Path(__file__).parent
 BASE = -100.0
@@ -287,13 +289,12 @@ def critical_sentence(found: MachineModes) -> str:
 
 def campbell_figure(found: MachineModes) -> Figure:
     """Return natural frequencies over the speed, with the published critical speeds on order 1."""
-    diagram = found.diagrams[SLIDING]
-    rpm = diagram.speed * 30.0 / np.pi
-    inside = diagram.frequency_hz[0] < 100.0  # the carrier along and about the shaft: above
-    marks = [
-        Line(rpm, frequency, color=OURS, width=2.0, key="wm_drake")
-        for frequency in diagram.frequency_hz.T[inside]
-    ]
+    diagram = found.over_speed.sel(linearisation=SLIDING)
+    rpm = shown(diagram.speed)
+    frequency = diagram.frequency.dropna("curve", how="all")
+    # the carrier along and about the shaft: above
+    inside = frequency.isel(curve=(frequency[0] < 100.0).values)
+    marks = [Line(rpm, one, color=OURS, width=2.0, key="wm_drake") for one in shown(inside).T]
     marks.append(Line(rpm, rpm / 60.0, color=QUIET, dash="dashed", key="order 1"))
     published = (
         (COMPUTED, "#1a1a1a", "circle", "critical speed computed in the paper"),

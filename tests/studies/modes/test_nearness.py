@@ -7,9 +7,10 @@ import pytest
 
 from wm_drake.model.scene import Gap, Scene
 from wm_drake.parameters import load_machine
-from wm_drake.studies.modes.page import about_damping, damping_text
+from wm_drake.studies.modes.linearisation import SLIDING, STUCK
+from wm_drake.studies.modes.page import about_damping
+from wm_drake.studies.modes.quantities import DAMPING
 from wm_drake.studies.modes.shapes import ANGLE_ARM, NAMES, Mode, Nearness, about_nearness, nearness
-from wm_drake.studies.modes.study import SLIDING, STUCK
 
 
 def mode(name, shape=(0.0,) * 6, damping=0.1):
@@ -49,14 +50,14 @@ def test_sentence_names_mode_parts_and_gap():
     near = Nearness(5e-3, gap(20e-3), {"sway": gap(12e-3), "roll": gap(9.04e-3)})
     text = about_nearness(near)
     assert "roll brings the tub nearest" in text
-    assert "9.0 mm of the 20.0 mm" in text
+    assert "9.04 mm of the 20.00 mm" in text
     assert "tub shell and wall right" in text
     touching = Nearness(5e-3, gap(20e-3), {"sway": gap(-1e-3)})
     assert "makes them touch" in about_nearness(touching)
 
 
 def test_damping_of_rounding_errors_is_said_in_words():
-    assert [damping_text(x) for x in (3e-16, -2e-15, 0.0684)] == ["undamped", "undamped", "0.0684"]
+    assert [DAMPING.text(x) for x in (3e-16, -2e-15, 0.0684)] == ["undamped", "undamped", "0.0684"]
     damped, none = mode("sway"), mode("roll", damping=3e-16)
 
     def said(sliding, stuck):

@@ -6,15 +6,24 @@ from dataclasses import replace
 from typing import Literal
 
 import numpy as np
+import xarray as xr
 
 from wm_drake.model.scene import Outline
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report import figure as fig
-from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number
+from wm_drake.report.quantity import SPEED, quantity_of, shown
 from wm_drake.simulation.outputs import point_positions
-from wm_drake.studies.modes.sensitivity import Sensitivity
-from wm_drake.studies.modes.shapes import UNDAMPED, Mode
-from wm_drake.studies.modes.study import ORDERS, SLIDING, STUCK, MachineModes
+from wm_drake.studies.modes.data import RELATIVE
+from wm_drake.studies.modes.linearisation import SLIDING, STUCK
+from wm_drake.studies.modes.quantities import (
+    AMPLITUDE,
+    DAMPING,
+    FREQUENCY,
+    UNDAMPED,
+    without_rounding,
+)
+from wm_drake.studies.modes.shapes import Mode
+from wm_drake.studies.modes.study import ORDERS, MachineModes
 
 VIEWS = (("front", 0, 2), ("side", 1, 2), ("top", 0, 1))
 """Views of the tub, with the coordinate across and the one upwards."""
@@ -44,9 +53,10 @@ ELEMENT_COLOURS = (
 
 def campbell_figure(result: MachineModes) -> fig.Figure:
     """Return the Campbell diagrams: natural frequencies over the speed, coloured by damping."""
-    ratios = np.concatenate([d.damping_ratio.ravel() for d in result.diagrams.values()])
-    scale = fig.Scale(low=0.0, high=max(0.05, float(np.nanmax(ratios))), shades="-viridis")
-    top = 1.08 * max(float(np.nanmax(d.frequency_hz)) for d in result.diagrams.values())
+    diagrams = result.over_speed
+    high = max(0.05, float(diagrams.damping_ratio.max()))
+    scale = fig.Scale(low=0.0, high=high, shades="-viridis")
+    top = 1.08 * float(diagrams.frequency.max())
     panels = [_campbell(result, name, scale, top) for name in (SLIDING, STUCK)]
     panels[-1] = replace(
         panels[-1], marks=tuple(_with_bar(mark, scale) for mark in panels[-1].marks)
@@ -58,7 +68,7 @@ def _with_bar(mark: fig.Mark, scale: fig.Scale) -> fig.Mark:
     """Return a mark whose colours are explained by a colour bar beside the panel."""
     if not isinstance(mark, fig.Points) or mark.scale is None:
         return mark
-    return replace(mark, scale=replace(scale, label="damping ratio"))
+    return replace(mark, scale=replace(scale, label=DAMPING.label))
 
 
 def _campbell(result: MachineModes, name: str, scale: fig.Scale, top: float) -> fig.Panel:
@@ -67,36 +77,44 @@ def _campbell(result: MachineModes, name: str, scale: fig.Scale, top: float) -> 
     Args:
         top: Highest frequency. [Hz]
     """
-    diagram = result.diagrams[name]
-    rpm = RPM_PER_RAD_S * diagram.speed
-    last = float(rpm[-1])
+    diagram = result.over_speed.sel(linearisation=name)
+    speeds = shown(diagram.speed)
+    last, fastest = float(speeds[-1]), float(diagram.speed[-1])
     marks: list[fig.Mark] = []
-    for mode, column in enumerate(diagram.frequency_hz.T):
-        marks.append(fig.Line(rpm, column, color=fig.QUIET, width=1.1))
-        for words, part in stretches([of_speed[mode] for of_speed in result.names[name]]):
-            ratios = diagram.damping_ratio[part, mode]
-            points = fig.Points(rpm[part], column[part], values=ratios, name=words)
+    for _, curve in diagram.dropna("curve", how="all", subset=["frequency"]).groupby("curve"):
+        one = curve.squeeze("curve")
+        marks.append(fig.Line(speeds, shown(one.frequency), color=fig.QUIET, width=1.1))
+        for words, part in stretches(one.mode.values.tolist()):
+            x, y = speeds[part], shown(one.frequency[part])
+            points = fig.Points(x, y, values=shown(one.damping_ratio[part]), name=words)
             marks.append(replace(points, scale=scale, size=5.0))
     for order in ORDERS:
         key = "order of the drum speed"
-        marks.append(fig.Line(rpm, order * rpm / 60.0, color=fig.MARK, dash="dashed", key=key))
-        at = min(0.93 * last, 0.93 * top * 60.0 / order)
-        text = fig.Text(at, order * at / 60.0, f"{order:g}×", is_bold=True, across="right")
+        y = _hertz(order * diagram.speed.values)
+        marks.append(fig.Line(speeds, y, color=fig.MARK, dash="dashed", key=key))
+        at = min(0.93 * fastest, 0.93 * top * 2.0 * np.pi / order)
+        place = float(SPEED.values(at)), float(_hertz(order * at))
+        text = fig.Text(*place, f"{order:g}×", is_bold=True, across="right")
         marks.append(replace(text, up="bottom", shift=(-5.0, 6.0)))
     marks += _critical_marks(result, name, top)
     if result.run_up is not None:
-        speeds = RPM_PER_RAD_S * result.run_up.critical_speed.values.ravel()
-        speeds = np.unique(np.round(speeds[np.isfinite(speeds)]))
+        peaks = SPEED.values(result.run_up.critical_speed.values.ravel())
+        peaks = np.unique(np.round(peaks[np.isfinite(peaks)]))
         key = "largest amplitude of a sensor in a run-up"
-        marks.append(
-            fig.Points(speeds, speeds / 60.0, symbol="triangle-down", opacity=0.75, key=key)
-        )
-    marks += _mode_names(result, name, last, top)
-    speeds = fig.round_numbers(0.0, last, 6)
-    ticks = fig.named((f"{speed:g}" for speed in speeds), speeds)
-    x = fig.Axis(label="drum speed, rpm", range=(-LEFT * last, (1.0 + RIGHT) * last), ticks=ticks)
-    y = fig.Axis(label="natural frequency, Hz", range=(0.0, top))
-    return fig.Panel(title=TITLES[name], marks=tuple(marks), x=x, y=y)
+        y = _hertz(SPEED.to_si(peaks))
+        marks.append(fig.Points(peaks, y, symbol="triangle-down", opacity=0.75, key=key))
+    marks += _mode_names(diagram, last, top)
+    rounds = fig.round_numbers(0.0, last, 6)
+    ticks = fig.named((f"{speed:g}" for speed in rounds), rounds)
+    x_range = (-LEFT * last, (1.0 + RIGHT) * last)
+    x_axis = fig.Axis(label=SPEED.label, range=x_range, ticks=ticks)
+    y_axis = fig.Axis(label=FREQUENCY.label, range=(0.0, top))
+    return fig.Panel(title=TITLES[name], marks=tuple(marks), x=x_axis, y=y_axis)
+
+
+def _hertz(speed: FloatArray | float) -> FloatArray:
+    """Return the turns a second of a speed. [rad/s]"""
+    return np.asarray(speed) / (2.0 * np.pi)
 
 
 LEFT, RIGHT = 0.2, 0.36
@@ -108,25 +126,26 @@ label."""
 
 
 def _critical_marks(result: MachineModes, name: str, top: float) -> list[fig.Mark]:
-    critical = result.critical[name]
-    if not critical:
+    critical = result.critical.isel(row=(result.critical.linearisation == name).values)
+    if not critical.sizes["row"]:
         return []
-    rpm = np.array([RPM_PER_RAD_S * one.speed for one in critical])
-    hertz = np.array([one.order for one in critical]) * rpm / 60.0
+    hertz = _hertz((critical.order * critical.speed).values)
     key = "critical speed"
     marks: list[fig.Mark] = [
-        fig.Points(rpm, hertz, color=fig.MEASURED, is_open=True, size=10.0, key=key)
+        fig.Points(
+            shown(critical.speed), hertz, color=fig.MEASURED, is_open=True, size=10.0, key=key
+        )
     ]
-    of_drum = sorted(float(x) for one, x in zip(critical, rpm, strict=True) if one.order == 1.0)
     groups: list[list[float]] = []
-    for x in of_drum:
-        if groups and x - groups[-1][-1] < 60.0 * NEAR_LABELS * top:
-            groups[-1].append(x)
+    for speed in sorted(critical.speed.values[(critical.order == 1.0).values].tolist()):
+        if groups and _hertz(speed - groups[-1][-1]) < NEAR_LABELS * top:
+            groups[-1].append(speed)
         else:
-            groups.append([x])
+            groups.append([speed])
     for group in groups:
-        words = ", ".join(number(x, 0) for x in group)
-        text = fig.Text(group[-1], group[-1] / 60.0, words, color=fig.MEASURED, size=11.0)
+        x, y = float(SPEED.values(group[-1])), float(_hertz(group[-1]))
+        words = ", ".join(map(SPEED.number, group))
+        text = fig.Text(x, y, words, color=fig.MEASURED, size=11.0)
         marks.append(replace(text, across="left", up="top", shift=(6.0, -4.0)))
     return marks
 
@@ -138,9 +157,9 @@ def stretches(names: Sequence[str]) -> list[tuple[str, slice]]:
     return [(names[begin], slice(begin, end)) for begin, end in bounds]
 
 
-def _mode_names(result: MachineModes, name: str, last_rpm: float, top: float) -> list[fig.Mark]:
+def _mode_names(diagram: xr.Dataset, last: float, top: float) -> list[fig.Mark]:
     """Return the names of the modes at standstill and at the right end, apart from each other."""
-    hertz, names = result.diagrams[name].frequency_hz, result.names[name]
+    hertz, names = diagram.frequency.values, diagram.mode.values
     marks: list[fig.Mark] = []
     ends: tuple[tuple[int, float, Literal["left", "right"]], ...] = (
         (0, -0.015, "right"),
@@ -153,7 +172,7 @@ def _mode_names(result: MachineModes, name: str, last_rpm: float, top: float) ->
         for index in range(1, len(places)):
             places[index] = max(places[index], places[index - 1] + 0.042 * top)
         marks += [
-            fig.Text(x * last_rpm, float(place), names[end][mode], size=12.0, across=side)
+            fig.Text(x * last, float(place), str(names[end][mode]), size=12.0, across=side)
             for place, mode in zip(places, order, strict=True)
         ]
     return marks
@@ -161,29 +180,20 @@ def _mode_names(result: MachineModes, name: str, last_rpm: float, top: float) ->
 
 def amplitude_figure(result: MachineModes) -> fig.Figure:
     """Return frequency and damping ratio of each mode over its amplitude."""
-    panels = []
-    for label, quantity in (("frequency, Hz", "frequency_hz"), ("damping ratio", "damping_ratio")):
-        marks: list[fig.Mark] = [
-            fig.Line(
-                MM_PER_M * mode.amplitude,
-                _without_rounding(getattr(mode, quantity)),
-                color=color,
-                key=mode.name,
-            )
-            for color, mode in zip(fig.COLOURS, result.over_amplitude, strict=False)
-        ]
-        marks.append(fig.Rule(MM_PER_M * result.amplitude, "y", color=fig.MARK, dash="dotted"))
-        x, y = (
-            fig.Axis(label="amplitude, mm", is_log=True),
-            fig.Axis(label=label, range=(0.0, None)),
-        )
-        panels.append(fig.Panel(name=label.split(",")[0], marks=tuple(marks), x=x, y=y))
+    panels, data = [], result.over_amplitude
+    names = list(dict.fromkeys(data.mode.values.tolist()))
+    for name, quantity in (("frequency", FREQUENCY), ("damping_ratio", DAMPING)):
+        marks: list[fig.Mark] = []
+        for color, mode in zip(fig.COLOURS, names, strict=False):
+            curve = data.isel(row=(data.mode == mode).values)
+            x, y = shown(curve.amplitude), without_rounding(shown(curve[name]))
+            marks.append(fig.Line(x, y, color=color, key=mode))
+        at = float(AMPLITUDE.values(result.amplitude))
+        marks.append(fig.Rule(at, "y", color=fig.MARK, dash="dotted"))
+        x_axis = fig.Axis(label=AMPLITUDE.label, is_log=True)
+        y_axis = fig.Axis(label=quantity.label, range=(0.0, None))
+        panels.append(fig.Panel(name=quantity.words, marks=tuple(marks), x=x_axis, y=y_axis))
     return fig.Figure(panels=fig.in_grid(panels, 2), height=310.0)
-
-
-def _without_rounding(values: FloatArray) -> FloatArray:
-    """Return values with 0 in place of errors of rounding, which would set the scale of an axis."""
-    return np.where(np.abs(values) > UNDAMPED, values, 0.0)
 
 
 def shapes_figure(modes: list[Mode], outlines: Mapping[str, Outline]) -> fig.Figure:
@@ -201,9 +211,10 @@ def shapes_figure(modes: list[Mode], outlines: Mapping[str, Outline]) -> fig.Fig
             label = "" if column else f"{view}: {'xyz'[up]} over {'xyz'[across]}"
             panel = replace(view_panel(tuple(marks), reach), y=view_axis(reach, label))
             if not row:
-                hertz, ratio = number(mode.frequency_hz, 2), number(mode.damping_ratio, 3)
-                damping = f"ζ {ratio}" if abs(mode.damping_ratio) > UNDAMPED else "undamped"
-                panel = replace(panel, title=mode.name, subtitle=f"{hertz} Hz\n{damping}")
+                symbol = "ζ " if abs(mode.damping_ratio) > UNDAMPED else ""
+                damping = f"{symbol}{DAMPING.text(mode.damping_ratio)}"
+                words = f"{FREQUENCY.text(mode.frequency_hz)}\n{damping}"
+                panel = replace(panel, title=mode.name, subtitle=words)
             panels.append(panel)
     return fig.Figure(panels=fig.in_grid(panels, len(modes)), height=900.0 / len(modes))
 
@@ -259,20 +270,22 @@ def _ends_of_motion(mode: Mode, lines: list[FloatArray], reach: float) -> list[F
 
 def energy_figure(result: MachineModes) -> fig.Figure:
     """Return which elements store the strain energy of each mode, and which dissipate energy."""
-    elements = [name.replace("_", " ") for name in result.elements]
-    panels = []
+    data, panels = result.labelled(), []
     for name in (SLIDING, STUCK):
-        modes = result.modes[name]
-        y = fig.Axis(ticks=fig.named(mode.name for mode in modes), has_grid=False)
-        y = replace(y, range=(len(modes) - 0.5, -0.5))
-        for kind, words in (("strain_energy", "strain energy"), ("dissipation", "dissipation")):
-            left, marks = np.zeros(len(modes)), []
-            for index, element in enumerate(elements):
-                share = 100.0 * np.array([max(getattr(m, kind)[index], 0.0) for m in modes])
-                bars = fig.Bars(range(len(modes)), share, base=left, is_across=True, key=element)
+        modes = data.isel(row=(data.linearisation == name).values)
+        count = modes.sizes["row"]
+        y = fig.Axis(ticks=fig.named(modes.mode.values.tolist()), has_grid=False)
+        y = replace(y, range=(count - 0.5, -0.5))
+        for kind in ("strain_energy", "dissipation"):
+            left, marks = np.zeros(count), []
+            for index, element in enumerate(result.elements):
+                share = np.maximum(shown(modes[kind].isel(element=index)), 0.0)
+                key = element.replace("_", " ")
+                bars = fig.Bars(range(count), share, base=left, is_across=True, key=key)
                 marks.append(replace(bars, color=ELEMENT_COLOURS[index % len(ELEMENT_COLOURS)]))
                 left = left + share
-            title = f"{words}, {TITLES[name]}, %"
+            quantity = quantity_of(modes[kind])
+            title = quantity.named(f"{quantity.words}, {TITLES[name]}").label
             panels.append(
                 fig.Panel(title=title, marks=tuple(marks), x=fig.Axis(range=(0, 102)), y=y)
             )
@@ -280,38 +293,31 @@ def energy_figure(result: MachineModes) -> fig.Figure:
     return fig.Figure(panels=placed, height=30.0 * len(result.modes[SLIDING]) + 30.0)
 
 
-def sensitivity_figure(result: MachineModes, name: str, quantity: str) -> fig.Figure:
+def sensitivity_figure(result: MachineModes, name: str, change: str) -> fig.Figure:
     """Return the numbers that move each mode most, as sorted bars.
 
     Args:
-        quantity: frequency or damping.
+        change: Variable of the sensitivities.
     """
-    modes = result.modes[name]
-    relative = [entry for entry in result.sensitivities[name] if not entry.per_unit]
-    factor = 1.0 if quantity == "frequency" else 10.0
-    panels = []
-    for index, mode in enumerate(modes):
-        chosen = strongest(relative, quantity, index)
-        changes = np.array([getattr(entry, quantity)[index] for entry in chosen])
-        values = [factor * float(change) for change in _without_rounding(changes)]
+    data, panels = result.sensitivities, []
+    for mode in result.modes[name]:
+        of_mode = (data.linearisation == name) & (data.mode == mode.name) & (data.per == RELATIVE)
+        chosen = strongest(data.isel(row=of_mode.values), change)
+        values = without_rounding(shown(chosen[change]))
         colors = tuple(fig.OURS if value >= 0.0 else fig.MEASURED for value in values)
-        bars = fig.Bars(range(len(chosen)), values, colors=colors, is_across=True)
-        names = fig.named(_short(entry.key) for entry in chosen)
-        y = fig.Axis(ticks=names, range=(len(chosen) - 0.5, -0.5), has_grid=False, size=11.0)
+        bars = fig.Bars(range(len(values)), values, colors=colors, is_across=True)
+        names = fig.named(_short(key) for key in chosen.key.values)
+        y = fig.Axis(ticks=names, range=(len(values) - 0.5, -0.5), has_grid=False, size=11.0)
         marks = (bars, fig.Rule(0.0, "y", color=fig.MARK))
         panels.append(fig.Panel(title=mode.name, marks=marks, y=y))
-    text = (
-        "change of the frequency in % for 1 % more"
-        if quantity == "frequency"
-        else "change of the damping ratio in 0.001 for 1 % more"
-    )
-    return fig.Figure(panels=fig.in_grid(panels, 2), height=150.0, x_label=text)
+    label = quantity_of(data[change]).label
+    return fig.Figure(panels=fig.in_grid(panels, 2), height=150.0, x_label=label)
 
 
-def strongest(entries: list[Sensitivity], quantity: str, mode: int) -> list[Sensitivity]:
-    """Return the numbers that a mode depends on most, strongest first."""
-    ranked = sorted(entries, key=lambda entry: -abs(float(getattr(entry, quantity)[mode])))
-    return ranked[:SHOWN_NUMBERS]
+def strongest(numbers: xr.Dataset, change: str) -> xr.Dataset:
+    """Return the rows with the largest changes, strongest first."""
+    order = np.argsort(-np.abs(numbers[change].values), kind="stable")
+    return numbers.isel(row=order[:SHOWN_NUMBERS])
 
 
 def _short(key: str) -> str:

@@ -20,6 +20,13 @@ from wm_drake.model.machine import Setup
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import ComplexArray, FloatArray
 
+STUCK, SLIDING, AMPLITUDE = "stuck", "sliding", "amplitude"
+"""Linearisations.
+
+stuck: slope of all laws at rest. Friction holds, so that the sponges of dampers are springs.
+sliding: dry friction is saturated. Its force is constant and its slope zero; dashpots remain.
+amplitude: harmonic balance of a free motion of a given amplitude."""
+
 SLOWEST = 2.0 * np.pi * 0.01
 """Least angular frequency of a mode. [rad/s]
 

@@ -9,8 +9,9 @@ import numpy as np
 from wm_drake.engines.trajectory import COORDINATES
 from wm_drake.model.scene import Gap, Scene
 from wm_drake.parameters.types import ComplexArray, FloatArray
-from wm_drake.report.formatting import MM_PER_M, number, shape_name
+from wm_drake.report.formatting import shape_name
 from wm_drake.studies.modes.linearisation import Spectrum
+from wm_drake.studies.modes.quantities import AMPLITUDE, SMALLEST_GAP, UNDAMPED
 
 NAMES = {
     "roll": "roll",
@@ -36,9 +37,6 @@ of their ellipse in that of a circle."""
 
 ANGLE_ARM = 0.25
 """Length that converts angles to displacements in a mode shape: about the radius of the tub. [m]"""
-
-UNDAMPED = 1e-9
-"""Damping ratio below which a mode has no damping but errors of rounding."""
 
 _POSITIONS, _VELOCITIES = slice(0, 6), slice(6, 12)
 """Tub's positions and velocities among the free numbers of the state."""
@@ -240,18 +238,15 @@ def nearness(
 def about_nearness(near: Nearness) -> str:
     """Return the sentence that says which mode brings the tub to the housing."""
     gap = near.of_mode[near.nearest]
-    amplitude, left, rest = (
-        number(MM_PER_M * value, 1)
-        for value in (near.amplitude, gap.distance, near.at_rest.distance)
-    )
+    left, rest = (SMALLEST_GAP.text(one.distance) for one in (gap, near.at_rest))
     ends = (
-        f"leaves {left} mm of the {rest} mm at rest, between {parts(gap)}"
+        f"leaves {left} of the {rest} at rest, between {parts(gap)}"
         if gap.distance > 0.0
-        else f"makes them touch ({parts(gap)}; {rest} mm apart at rest)"
+        else f"makes them touch ({parts(gap)}; {rest} apart at rest)"
     )
     return (
-        f"At an amplitude of {amplitude} mm with sliding friction, {near.nearest} brings the tub "
-        f"nearest to the housing: it {ends}."
+        f"At an amplitude of {AMPLITUDE.text(near.amplitude)} with sliding friction, "
+        f"{near.nearest} brings the tub nearest to the housing: it {ends}."
     )
 
 

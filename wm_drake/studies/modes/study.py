@@ -2,36 +2,40 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 
 from wm_drake.batch import simulate_many
-from wm_drake.engines.trajectory import COORDINATES
 from wm_drake.errors import input_error
 from wm_drake.model.build import AnyMachine, machine_of
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import Load, MachineParameters
 from wm_drake.parameters.types import FloatArray
+from wm_drake.report.labelled import LabelledTable
 from wm_drake.simulation.cases import case_of
-from wm_drake.studies.modes.amplitude import AmplitudeMode, amplitude_modes
-from wm_drake.studies.modes.campbell import Campbell, CriticalSpeed, campbell, critical_speeds
-from wm_drake.studies.modes.linearisation import MODES, Linearisation, Spectrum, check_fixed_cabinet
+from wm_drake.studies.modes import data
+from wm_drake.studies.modes.amplitude import amplitude_modes
+from wm_drake.studies.modes.campbell import Campbell, campbell, critical_speeds
+from wm_drake.studies.modes.linearisation import (
+    MODES,
+    SLIDING,
+    STUCK,
+    Linearisation,
+    Spectrum,
+    check_fixed_cabinet,
+)
+from wm_drake.studies.modes.quantities import AMPLITUDE, DAMPING, FREQUENCY
 from wm_drake.studies.modes.sensitivity import Sensitivity, numbers_of, sensitivities
 from wm_drake.studies.modes.shapes import Mode, modes_of, names_at_speed
 from wm_drake.studies.threads import on_one_thread
 
-STUCK, SLIDING, AMPLITUDE = "stuck", "sliding", "amplitude"
-"""Linearisations.
-
-stuck: slope of all laws at rest. Friction holds, so that the sponges of dampers are springs.
-sliding: dry friction is saturated. Its force is constant and its slope zero; dashpots remain.
-amplitude: harmonic balance of a free motion of a given amplitude."""
-
 DEFAULT_AMPLITUDE = 5e-3
 """Amplitude of the third linearisation. [m]"""
+
+LARGEST_AMPLITUDE = 0.1
+"""Largest amplitude of the third linearisation. [m]"""
 
 AMPLITUDES = np.geomspace(1e-5, 2e-2, 34)
 """Amplitudes of the curves over the amplitude. [m]"""
@@ -45,30 +49,24 @@ ORDERS = (1.0, 2.0)
 
 
 @dataclass(frozen=True)
-class AmplitudeValue:
-    """A mode at the given amplitude; the values are None if it could not be followed there."""
-
-    name: str
-    frequency_hz: float | None
-    damping_ratio: float | None
-
-
-@dataclass(frozen=True)
 class NaturalModes:
     """Natural modes of a machine with a drum that stands still.
+
+    `Mode` has a complex shape and stays an object: figures and animations move the tub with it.
 
     Attributes:
         load: Name of the load; "" for the empty drum.
         modes: Modes by linearisation, stuck and sliding.
         amplitude: Amplitude of the third linearisation. [m]
-        at_amplitude: Its modes; the values are None for a machine with telescopic dampers.
+        at_amplitude: `frequency` [Hz] and `damping_ratio` over `mode` there; NaN for a mode that
+            could not be followed, and for a machine with telescopic dampers.
     """
 
     parameters: MachineParameters
     load: str
     modes: dict[str, list[Mode]]
     amplitude: float
-    at_amplitude: list[AmplitudeValue]
+    at_amplitude: xr.Dataset
 
 
 @dataclass(frozen=True, repr=False)
@@ -79,11 +77,12 @@ class MachineModes(NaturalModes):
         rest_pose: Equilibrium: roll, pitch, yaw, x, y, z. (6,) [rad, m]
         gasket: Whether the gasket is in place.
         elements: Names of the elements on the tub, in the order of the shares of a mode.
-        over_amplitude: Each mode over its amplitude.
-        diagrams: Campbell diagram of `STUCK` and `SLIDING`.
-        names: Name of each mode of these at each speed, from its shape there.
-        critical: Critical speeds of each.
-        sensitivities: Of each, for a drum that stands still.
+        over_amplitude: `frequency` [Hz] and `damping_ratio` of each mode over `amplitude` [m].
+        over_speed: Campbell diagrams of `STUCK` and `SLIDING` over `linearisation`, `speed` [rad/s]
+            and `curve`: `mode`, the name from the shape at the speed, `frequency` [Hz],
+            `damping_ratio` and `mac`.
+        critical: `order`, `speed` [rad/s] and `damping_ratio` of critical speeds of each.
+        sensitivities: Of each to the numbers of the machine file, for a drum that stands still.
         run_up: Peaks of the machine's own run-up, one run a load: `critical_speed` and `amplitude`
             at the sensors, as `simulate_many` returns them. None if not computed.
     """
@@ -91,26 +90,29 @@ class MachineModes(NaturalModes):
     rest_pose: FloatArray
     gasket: bool
     elements: list[str]
-    over_amplitude: list[AmplitudeMode]
-    diagrams: dict[str, Campbell]
-    names: dict[str, list[list[str]]]
-    critical: dict[str, list[CriticalSpeed]]
-    sensitivities: dict[str, list[Sensitivity]]
+    over_amplitude: xr.Dataset
+    over_speed: xr.Dataset
+    critical: xr.Dataset
+    sensitivities: xr.Dataset
     run_up: xr.Dataset | None
 
     def name_at(self, linearisation: str, mode: int, speed: float) -> str:
         """Return the name of a mode at the nearest speed of its diagram. [rad/s]"""
-        nearest = int(np.argmin(np.abs(self.diagrams[linearisation].speed - speed)))
-        return self.names[linearisation][nearest][mode]
+        return data.name_at(self.over_speed, linearisation, mode, speed)
 
     @property
     def critical_speeds(self) -> FloatArray:
         """Return the speeds at which the unbalance meets a mode with sliding friction. [rad/s]"""
-        return np.array([c.speed for c in self.critical[SLIDING] if c.order == 1.0])
+        chosen = (self.critical.linearisation == SLIDING) & (self.critical.order == 1.0)
+        return self.critical.speed.values[chosen.values]
+
+    def labelled(self) -> xr.Dataset:
+        """Return frequency, damping, shape and shares of each mode of both linearisations."""
+        return data.of_modes(self.modes, self.elements)
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return a row for each mode of each linearisation, in units for reading."""
-        return modes_frame(self)
+        return LabelledTable("shapes", self.labelled(), across="element").frame()
 
     def _repr_html_(self) -> str:
         """Return the table of modes for a notebook."""
@@ -119,7 +121,8 @@ class MachineModes(NaturalModes):
     def __repr__(self) -> str:
         """Return frequencies and damping ratios of the modes with sliding friction, in one line."""
         shown = (
-            f"{m.name} {m.frequency_hz:.2f} Hz ({m.damping_ratio:.3f})" for m in self.modes[SLIDING]
+            f"{mode.name} {FREQUENCY.text(mode.frequency_hz)} ({DAMPING.text(mode.damping_ratio)})"
+            for mode in self.modes[SLIDING]
         )
         return f"<Modes of '{self.parameters.name}', sliding friction: {', '.join(shown)}>"
 
@@ -179,31 +182,34 @@ def modes(
         cases = [case_of(parameters, name, gasket=gasket) for name in parameters.loads]
         peaks = simulate_many(machine, cases, measures=["amplitudes"])
     progress(1.0)
+    names = {
+        name: [[mode.name for mode in natural[name]], *map(names_at_speed, diagram.spectra[1:])]
+        for name, diagram in diagrams.items()
+    }
+    over_speed = data.over_speed(diagrams, names)
+    critical = {name: critical_speeds(diagram, ORDERS) for name, diagram in diagrams.items()}
     return MachineModes(
         parameters,
         load if isinstance(load, str) else "" if load is None else "given",
         natural,
         amplitude,
-        _values_at(over, amplitude),
+        data.at_amplitude(over, amplitude),
         linear[STUCK].equilibrium[:6],
         gasket,
         linear[STUCK].names,
-        over,
-        diagrams,
-        {
-            name: [[mode.name for mode in natural[name]], *map(names_at_speed, diagram.spectra[1:])]
-            for name, diagram in diagrams.items()
-        },
-        {name: critical_speeds(diagram, ORDERS) for name, diagram in diagrams.items()},
-        bars,
+        data.over_amplitude(over),
+        over_speed,
+        data.critical_speeds_of(critical, over_speed),
+        data.of_numbers(bars, natural),
         peaks,
     )
 
 
 def _check_amplitude(amplitude: float) -> None:
-    if not 0.0 < amplitude <= 0.1:
+    if not 0.0 < amplitude <= LARGEST_AMPLITUDE:
         raise input_error(
-            f"{1e3 * amplitude:g} mm is no amplitude; allowed are more than 0 and up to 100 mm",
+            f"{AMPLITUDE.text(amplitude)} is no amplitude; allowed are more than 0 and up to "
+            f"{AMPLITUDE.text(LARGEST_AMPLITUDE)}",
             key="amplitude",
         )
 
@@ -243,19 +249,15 @@ def three_linearisations(
         spectrum = linear.spectrum().first(MODES)
         natural[name] = modes_of(spectrum, linear.wrench_slopes())
     # the last setup is the one with friction
-    names = [mode.name for mode in natural[STUCK]]
     if numbers.telescopic_dampers:
-        values = [AmplitudeValue(name, None, None) for name in names]
+        missing = np.full(len(natural[STUCK]), np.nan)
+        values = data.of_names([mode.name for mode in natural[STUCK]], missing, missing)
     else:
         over = amplitude_modes(setup, spectrum, natural[STUCK], np.array([amplitude]))
-        values = _values_at(over, amplitude)
+        values = data.at_amplitude(over, amplitude)
     return NaturalModes(
         numbers, load if isinstance(load, str) else "given", natural, amplitude, values
     )
-
-
-def _values_at(over: list[AmplitudeMode], amplitude: float) -> list[AmplitudeValue]:
-    return [AmplitudeValue(mode.name, *(mode.at(amplitude) or (None, None))) for mode in over]
 
 
 def _linearisation(
@@ -297,27 +299,3 @@ def _sensitivities(
         )
         for name in (STUCK, SLIDING)
     }
-
-
-def modes_frame(result: MachineModes) -> pd.DataFrame:
-    """Return the modes with shapes, participation and shares of the elements."""
-    rows = []
-    for name in (STUCK, SLIDING):
-        for mode in result.modes[name]:
-            row: dict[str, Any] = {
-                "linearisation": name,
-                "mode": mode.name,
-                "frequency_Hz": mode.frequency_hz,
-                "damping_ratio": mode.damping_ratio,
-            }
-            for coordinate, value in zip(COORDINATES, mode.shape, strict=True):
-                unit = "rad" if coordinate in COORDINATES[:3] else "m"
-                row[f"shape_{coordinate}_real_{unit}"] = value.real
-                row[f"shape_{coordinate}_imag_{unit}"] = value.imag
-            for coordinate, share in zip(COORDINATES, mode.participation, strict=True):
-                row[f"participation_{coordinate}"] = share
-            for kind in ("strain_energy", "dissipation"):
-                for element, share in zip(result.elements, getattr(mode, kind), strict=True):
-                    row[f"{kind} {element}"] = share
-            rows.append(row)
-    return pd.DataFrame(rows)

@@ -6,13 +6,15 @@ from wm_drake.model.machine import Machine
 from wm_drake.model.replay import Motion
 from wm_drake.model.scene import REPLAY_RATE
 from wm_drake.parameters.units import Unit
+from wm_drake.studies.answer import Answer
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import quantities_of
+from wm_drake.studies.modes.linearisation import SLIDING
 from wm_drake.studies.modes.options import ModesOptions
-from wm_drake.studies.modes.page import ModesResult
+from wm_drake.studies.modes.page import modes_answer
 from wm_drake.studies.modes.shapes import ANGLE_ARM, Mode
-from wm_drake.studies.modes.study import SLIDING, MachineModes, modes
-from wm_drake.studies.study import Result, Task
+from wm_drake.studies.modes.study import MachineModes, modes
+from wm_drake.studies.study import Task
 
 SHOWN_AMPLITUDE = 0.03
 """Largest displacement of a shown mode, with angles times 0.25 m. [m]"""
@@ -29,7 +31,7 @@ class ModesTask(Task):
         self.options, self.machine = options, machine
         self.amplitude = quantities_of(options.amplitude, Unit("m", "mm"), "--amplitude")[0]
 
-    def run(self, executor: Executor) -> Result:
+    def run(self, executor: Executor) -> Answer:
         """Compute the modes and, with `--replay`, their animations."""
         with executor.fraction("modes") as progress:
             result = modes(
@@ -40,7 +42,7 @@ class ModesTask(Task):
                 run_up=True,
                 progress=progress,
             )
-        return ModesResult(result, _replays(result) if self.options.replay else {})
+        return modes_answer(result, _replays(result) if self.options.replay else {})
 
 
 def _replays(result: MachineModes) -> dict[str, str]:

@@ -161,7 +161,7 @@ def spin_page(result: SpinRuns, facts: Facts | None = None) -> str:
         Section("more", "More measures", tables=more),
     ]
     if modes:
-        shown = (natural_modes_table(modes),)
+        shown = (natural_modes_table(modes).table(),)
         sections.append(
             Section("modes", "Natural modes", tables=shown, text=MODES.format(modes.load))
         )
