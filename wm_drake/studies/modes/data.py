@@ -62,28 +62,29 @@ def at_amplitude(modes: Sequence[AmplitudeMode], amplitude: float) -> xr.Dataset
 
 def of_names(names: Sequence[str], frequency: Any, damping: Any) -> xr.Dataset:
     """Return frequency [Hz] and damping ratio over `mode`."""
-    return xr.Dataset(
-        {
-            "frequency": q.FREQUENCY.variable("mode", frequency),
-            "damping_ratio": q.DAMPING.variable("mode", damping),
-        },
-        {"mode": list(names)},
-    )
+    return xr.Dataset(oscillation("mode", frequency, damping), {"mode": list(names)})
+
+
+def oscillation(dims: str | Sequence[str], frequency: Any, damping: Any) -> dict[str, xr.Variable]:
+    """Return the two numbers of an oscillation: frequency [Hz] and damping ratio."""
+    return {
+        "frequency": q.FREQUENCY.variable(dims, frequency),
+        "damping_ratio": q.DAMPING.variable(dims, damping),
+    }
 
 
 def over_amplitude(modes: Sequence[AmplitudeMode]) -> xr.Dataset:
     """Return frequency and damping ratio of modes over their amplitude, a row for each point."""
     names = [mode.name for mode in modes for _ in mode.amplitude]
+    amplitude, frequency, damping = (
+        np.concatenate([np.zeros(0), *(getattr(mode, name) for mode in modes)])
+        for name in ("amplitude", "frequency_hz", "damping_ratio")
+    )
     return labelled(
         {"mode": names},
-        amplitude=q.AMPLITUDE.variable("row", _joined(mode.amplitude for mode in modes)),
-        frequency=q.FREQUENCY.variable("row", _joined(mode.frequency_hz for mode in modes)),
-        damping_ratio=q.DAMPING.variable("row", _joined(mode.damping_ratio for mode in modes)),
+        amplitude=q.AMPLITUDE.variable("row", amplitude),
+        **oscillation("row", frequency, damping),
     )
-
-
-def _joined(arrays: Any) -> Any:
-    return np.concatenate([np.zeros(0), *arrays])
 
 
 def over_speed(
@@ -98,8 +99,7 @@ def over_speed(
     for name, diagram in diagrams.items():
         each = {
             "mode": (dims, np.array(names[name], dtype=object)),
-            "frequency": q.FREQUENCY.variable(dims, diagram.frequency_hz),
-            "damping_ratio": q.DAMPING.variable(dims, diagram.damping_ratio),
+            **oscillation(dims, diagram.frequency_hz, diagram.damping_ratio),
             "mac": q.MAC.variable(dims, diagram.mac),
         }
         curves = np.arange(1, diagram.value.shape[1] + 1)

@@ -19,7 +19,6 @@ from wm_drake.studies.modes.quantities import (
     AMPLITUDE,
     DAMPING,
     FREQUENCY,
-    UNDAMPED,
     without_rounding,
 )
 from wm_drake.studies.modes.shapes import Mode
@@ -211,7 +210,7 @@ def shapes_figure(modes: list[Mode], outlines: Mapping[str, Outline]) -> fig.Fig
             label = "" if column else f"{view}: {'xyz'[up]} over {'xyz'[across]}"
             panel = replace(view_panel(tuple(marks), reach), y=view_axis(reach, label))
             if not row:
-                symbol = "ζ " if abs(mode.damping_ratio) > UNDAMPED else ""
+                symbol = "ζ " if mode.is_damped else ""
                 damping = f"{symbol}{DAMPING.text(mode.damping_ratio)}"
                 words = f"{FREQUENCY.text(mode.frequency_hz)}\n{damping}"
                 panel = replace(panel, title=mode.name, subtitle=words)

@@ -98,7 +98,7 @@ def about_damping(result: NaturalModes) -> str:
     cases = []
     for name, words in when.items():
         modes = result.modes[name]
-        undamped = [mode.name for mode in modes if abs(mode.damping_ratio) <= q.UNDAMPED]
+        undamped = [mode.name for mode in modes if not mode.is_damped]
         if undamped:
             which = "all modes" if len(undamped) == len(modes) else listed(undamped)
             cases.append(f"{which} {words}")

@@ -68,6 +68,11 @@ class Mode:
     dissipation: FloatArray
 
     @property
+    def is_damped(self) -> bool:
+        """Return whether the damping is more than errors of rounding."""
+        return abs(self.damping_ratio) > UNDAMPED
+
+    @property
     def real_shape(self) -> FloatArray:
         """Return the shape at the phase of its largest component. (6,) [rad, m]"""
         return np.asarray(self.shape.real)
