@@ -145,7 +145,9 @@ def search_facts(fit: Fit) -> list[tuple[str, str]]:
 def fit_parts(
     fit: Fit, error: Quantity, planted: Mapping[str, float] | None = None
 ) -> tuple[Part, ...]:
-    """Return the parts of an answer that every fit has: values, correlations, errors, search.
+    """Return the parts of an answer that every fit has: search, values, correlations, errors.
+
+    The picture of the search comes first, as pictures do on every page.
 
     Args:
         error: Quantity of the data, of which the RMSE is one.
@@ -181,10 +183,10 @@ def fit_parts(
         {"round": np.arange(1, len(fit.log.history) + 1)},
     )
     return (
+        Part("Search", (_history_plot(history), LabelledTable("search", history))),
         Part("Estimated values", (values,), remarks=undetermined_sentences(fit)),
         Part("Correlations", (correlations,)),
         Part("Errors of the fit", (of_tests,)),
-        Part("Search", (_history_plot(history), LabelledTable("search", history))),
     )
 
 

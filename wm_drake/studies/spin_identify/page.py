@@ -45,7 +45,7 @@ def spin_identify_answer(
     names = [sought.unknown.name for sought in model.sought]
     truth = dict(zip(names, planted, strict=True)) if planted is not None else None
     bars = [_bars(model, identified, index) for index in range(len(model.cases))]
-    estimates, *parts = fit_parts(fit, RELATIVE_ERROR, truth)
+    search, estimates, *parts = fit_parts(fit, RELATIVE_ERROR, truth)
     cases = identified[["error_before", "error_after"]].assign(
         about=("case", [case_description(case) for case in model.cases])
     )
@@ -73,6 +73,7 @@ def spin_identify_answer(
                 ),
             ),
             Part("Spin profile", (_profile(model),)),
+            search,
             Part(
                 "Values found",
                 (_parameters(model, fit, identified, truth),),
