@@ -119,6 +119,7 @@ wm-drake identify gasket ring/loop_*.csv --axis axial --law voigt --out ring_fit
 wm-drake identify table2 --quick --out table2
 wm-drake gasket curves folded --points 2 --elements 6 --around 3 --axial '1 mm' --radial '1 mm' --tilt '1 deg' --twist '1 deg' --out curves
 wm-drake spin --load middle --out spin
+wm-drake record channels spin/record_middle.nc
 wm-drake record orders spin/record_middle.nc --out orders
 wm-drake calibrate --machine short.yaml --free free.yaml --targets measured.csv --quick --out calibrate
 wm-drake verdict short.yaml --samples 16 --out verdict

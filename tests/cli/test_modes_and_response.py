@@ -11,20 +11,24 @@ def test_study_modes_prints_the_documented_json(wm_drake, tmp_path):
     result = wm_drake("study", "modes", "--json", "--amplitude", "1 mm", "--out", "m")
     assert result.code == 0, result.err
     found = json.loads(result.out)
-    assert set(found["modes"]) == {"stuck", "sliding", "amplitude"}
-    for modes in found["modes"].values():
-        assert all(set(mode) == {"frequency_Hz", "damping_ratio", "name"} for mode in modes)
-        assert len({mode["name"] for mode in modes}) == 6
-    campbell = found["campbell"]
-    assert np.shape(campbell["frequency_Hz"]) == (6, len(campbell["rpm"]))
-    assert np.shape(campbell["name"]) == np.shape(campbell["frequency_Hz"])
-    at_rest = [mode["name"] for mode in found["modes"]["sliding"]]
-    assert [names[0] for names in campbell["name"]] == at_rest
-    # at a critical speed, order 1 is the frequency of a mode
-    for rpm in found["critical_rpm"]:
-        columns = np.array(campbell["frequency_Hz"])
-        hertz = [np.interp(rpm, campbell["rpm"], column) for column in columns]
-        assert np.min(np.abs(np.array(hertz) - rpm / 60.0)) < 5e-3
+    modes = pd.DataFrame(found["modes"])
+    assert modes["mode"].is_unique
+    for name in ("stuck", "amplitude", "sliding"):
+        assert {f"frequency_{name}_Hz", f"damping_ratio_{name}"} <= set(modes)
+    campbell = pd.DataFrame(found["campbell"])
+    sliding = campbell[campbell["linearisation"] == "sliding"]
+    at_rest = sliding[sliding["speed_rpm"] == 0.0]
+    assert sorted(at_rest["mode"]) == sorted(modes["mode"])
+    assert at_rest.set_index("mode")["frequency_Hz"].to_dict() == pytest.approx(
+        modes.set_index("mode")["frequency_sliding_Hz"].to_dict()
+    )
+    # at a critical speed, the frequency of a curve is its order of the speed
+    curves = dict(list(sliding.groupby("curve")))
+    for row in found["critical"]:
+        if row["linearisation"] == "sliding":
+            rpm = row["speed_rpm"]
+            hertz = [np.interp(rpm, c["speed_rpm"], c["frequency_Hz"]) for c in curves.values()]
+            assert np.min(np.abs(np.array(hertz) - row["order"] * rpm / 60.0)) < 5e-3
     page = (tmp_path / "m" / "report.html").read_text(encoding="utf-8")
     assert "Campbell diagram" in page
     table = pd.read_csv(tmp_path / "m" / "sensitivities.csv")

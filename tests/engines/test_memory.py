@@ -76,7 +76,8 @@ gc.collect()
 Path("/proc/self/clear_refs").write_text("5")  # resets the peak
 before = size("VmRSS")
 wm.simulate(machine, wm.Case("long", given.loads["middle"], profile(300.0)))
-print((size("VmHWM") - before) / needed_memory(profile(300.0), given.step, given.output_period))
+period = profile(300.0).sample_period(given.output_period)
+print((size("VmHWM") - before) / needed_memory(profile(300.0), given.step, period))
 """
 
 

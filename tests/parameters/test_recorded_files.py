@@ -20,6 +20,7 @@ from wm_drake.parameters.recorded import (
     read_recording,
     resampled,
 )
+from wm_drake.parameters.recorded.formats import read_signals
 from wm_drake.parameters.units import Unit, factor_of
 
 STIFFNESS, DAMPING = 10e3, 500.0  # N/m, N s/m
@@ -465,3 +466,15 @@ def test_a_header_and_a_row_of_units_must_agree(tmp_path):
     text = "\n".join(["time [s],displacement [mm],force [N]", "ms,mm,N", *ROWS])
     with pytest.raises(InputError, match=r"time \[s\]: is in s by its header, in ms by the row"):
         read_loop(write_text(tmp_path / "x.csv", text))
+
+
+def test_texts_beside_the_arrays_of_an_hdf5_file_are_no_references(tmp_path):
+    import h5py
+
+    path = tmp_path / "texts.h5"
+    with h5py.File(path, "w") as file:
+        file["labels"] = ["x", "y"]
+        file["force"] = np.arange(5.0)
+        file["force"].attrs["units"] = "N"
+    (signal,) = read_signals(path)
+    assert (signal.name, signal.unit) == ("force", "N")

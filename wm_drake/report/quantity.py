@@ -14,10 +14,11 @@ import numpy as np
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import PureNumber, Unit
 from wm_drake.report.formatting import MISSING, number, significant
-from wm_drake.report.table import Column
 
 if TYPE_CHECKING:  # slow to import, and not needed for declarations
     import xarray as xr
+
+    from wm_drake.report.table import Column
 
 NO_UNIT = PureNumber()
 HIDDEN = "is_hidden"
@@ -101,8 +102,10 @@ class Quantity:
         """
         return {"quantity": self, "long_name": self.words, "units": self.unit.si}
 
-    def column(self, words: str = "") -> Column:
+    def column(self, words: str = "") -> "Column":
         """Return the column of a table, with its words or others."""
+        from wm_drake.report.table import Column  # slow to import: pandas
+
         return Column(words or self.words, self.unit_text, self.decimals, self.form)
 
 

@@ -150,7 +150,7 @@ def _hdf5_group(file: Any, node: Any, group: str, objects: list[str]) -> Iterato
                 yield from _hdf5_group(file, content, inside, objects)
         elif "MATLAB_object_decode" in content.attrs:
             objects.append(f"{name} ({kind or 'object'})")
-        elif content.dtype == h5py.ref_dtype:
+        elif h5py.check_ref_dtype(content.dtype) is not None:  # texts have equal dtypes
             yield from _referenced(file, name, group, content)
         elif _is_array(content):
             yield from _hdf5_array(name, group, content, given)
