@@ -122,7 +122,7 @@ def test_measures_that_a_record_lacks_are_nan(machine):
 
 @pytest.mark.parametrize("name", ["amplitudes", "amplitude", "critical_speed"])
 def test_a_measure_has_the_names_of_its_variables_too(machine, name):
-    """As responses of a study do."""
+    """Choose a measure by its variable, as studies choose responses."""
     table = simulate_many(machine, CASES[:1], measures=["amplitudes", name])
     assert set(table.data_vars) == {"amplitude", "critical_speed", "diverged"}
 

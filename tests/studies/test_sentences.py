@@ -101,7 +101,7 @@ def test_an_order_is_as_sharp_as_its_window(order, words):
     "name", ["gap", "drum_radius", "drum_depth", "tub_mass", "drum_mass", "speed"]
 )
 def test_a_given_number_of_a_new_machine_is_no_assumption(name):
-    """The same number, once given and once left out."""
+    """Compare a number that is given with the same one left out."""
     value = getattr(FirstNumbers(), name)
     texts = []
     for numbers in (FirstNumbers(), FirstNumbers.model_validate({name: value})):

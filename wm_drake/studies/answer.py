@@ -65,7 +65,7 @@ class Part:
 
     @property
     def tables(self) -> Iterator[LabelledTable]:
-        """The tables of the part, also those of files only."""
+        """Yield the tables of the part, also those of files only."""
         return (shown for shown in self.shown if isinstance(shown, LabelledTable))
 
 

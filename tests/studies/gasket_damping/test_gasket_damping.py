@@ -141,7 +141,7 @@ def test_fit_and_grids_find_the_true_damping(short_problem, records):
 
 @pytest.mark.hours
 def test_intervals_hold_the_planted_damping(short_problem, records):
-    """Of 40 intervals of 95 %, fewer than 34 hold by chance in 1 of 100 experiments."""
+    """Count 40 intervals of 95 %: by chance fewer than 34 hold in 1 of 300 experiments."""
     held = 0
     for seed in range(20):
         problem = short_problem(with_noise(records, seed))

@@ -241,7 +241,7 @@ class ComputedResponses:
 
     @cached_property
     def _design(self) -> "_Design":
-        """The machine of the design's trials, built when a target is a mean over the design."""
+        """Build the machine of the design's trials when a target is a mean over the design."""
         return _Design.of(self.machine.parameters)
 
     def __call__(self, machines: Sequence[MachineParameters]) -> FloatArray:

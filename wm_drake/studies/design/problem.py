@@ -197,7 +197,7 @@ class MachineDesigns:
 
     @property
     def shown(self) -> str:
-        """What `shown_runs` runs, in words."""
+        """Return in words what `shown_runs` runs."""
         if self.scattered is not None:
             return "every uncertain quantity at its median"
         return f"loads {', '.join(case.name for case in self.cases)}"

@@ -8,7 +8,7 @@ import pandas as pd
 import xarray as xr
 
 from wm_drake.parameters.units import Unit
-from wm_drake.report.figure import Axis, Figure, Line, Panel
+from wm_drake.report.figure import Axis, Figure, Line, Numbers, Panel
 from wm_drake.report.formatting import MISSING, number
 from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.page import Picture, picture
@@ -105,8 +105,7 @@ def values_table(fit: Fit, fixed: Sequence[FixedNumber] = ()) -> Table:
 def correlations_table(fit: Fit) -> Table:
     """Return the standard deviations of the unknowns, and the correlations between them."""
     deviation = np.sqrt(np.diag(fit.covariance))
-    with np.errstate(invalid="ignore", divide="ignore"):
-        correlation = fit.covariance / np.outer(deviation, deviation)
+    correlation = correlations_of(fit).correlation.values
     groups = []
     for u, s, row in zip(fit.problem.unknowns, deviation, correlation, strict=True):
         size = u.unit.reading(s, 3) if np.isfinite(s) else MISSING
@@ -118,14 +117,8 @@ def correlations_table(fit: Fit) -> Table:
 
 def history_picture(fit: Fit, unit: str) -> Picture:
     """Return the smallest RMSE, with its unit, after each round of the search."""
-    history = np.maximum(fit.log.history, 1e-300)
-    curve = Line(range(1, len(history) + 1), history, symbol="circle", size=5.0)
-    x, y = Axis(label="round of the search"), Axis(label=f"smallest RMSE, {unit}", is_log=True)
-    return picture(
-        Figure(panels=(Panel(marks=(curve,), x=x, y=y),), height=180.0),
-        "Smallest RMSE after each round of the search.",
-        "Smallest RMSE that was found up to the end of each round of the search.",
-    )
+    plot = _history_plot(fit.log.history, f"smallest RMSE, {unit}")
+    return picture(plot.figure, plot.alternative, plot.caption)
 
 
 def search_facts(fit: Fit) -> list[tuple[str, str]]:
@@ -182,8 +175,11 @@ def fit_parts(
         {"least_rmse": rmse.named("least RMSE").variable("round", fit.log.history)},
         {"round": np.arange(1, len(fit.log.history) + 1)},
     )
+    least, least_label = history.least_rmse, quantity_of(history.least_rmse).label
     return (
-        Part("Search", (_history_plot(history), LabelledTable("search", history))),
+        Part(
+            "Search", (_history_plot(shown(least), least_label), LabelledTable("search", history))
+        ),
         Part("Estimated values", (values,), remarks=undetermined_sentences(fit)),
         Part("Correlations", (correlations,)),
         Part("Errors of the fit", (of_tests,)),
@@ -222,11 +218,10 @@ def correlations_of(fit: Fit) -> xr.Dataset:
     )
 
 
-def _history_plot(history: xr.Dataset) -> Plot:
-    rounds, least = history["round"].values, shown(history.least_rmse)
-    curve = Line(rounds, np.maximum(least, 1e-300), symbol="circle", size=5.0)
-    x = Axis(label="round of the search")
-    y = Axis(label=quantity_of(history.least_rmse).label, is_log=True)
+def _history_plot(least: Numbers, label: str) -> Plot:
+    """Return the least RMSE, in the unit of the label, after each round of the search."""
+    curve = Line(range(1, len(least) + 1), np.maximum(least, 1e-300), symbol="circle", size=5.0)
+    x, y = Axis(label="round of the search"), Axis(label=label, is_log=True)
     return Plot(
         Figure(panels=(Panel(marks=(curve,), x=x, y=y),), height=180.0),
         "Smallest RMSE after each round of the search.",
