@@ -13,15 +13,10 @@ from wm_drake.studies.calibrate.computed import Evaluation, PointRunner
 from wm_drake.studies.calibrate.parameter_map import ParameterMap, parameter_map_of
 from wm_drake.studies.calibrate.solutions import Solution, distinct
 from wm_drake.studies.calibrate.targets import Targets
-from wm_drake.studies.fitting.kinks import (
-    DRAWS,
-    least_squares_search,
-    smooth_jacobian,
-    start_number,
-)
 from wm_drake.studies.fitting.posterior import Posterior
 from wm_drake.studies.fitting.problem import PriorProblem, Residuals, Unknown
-from wm_drake.studies.fitting.search import Search
+from wm_drake.studies.fitting.search import Search, descended, smooth_slopes
+from wm_drake.studies.fitting.starts import DRAWS, start_number
 
 RELATIVE_DEVIATION = 0.05
 """Relative standard deviation of a measured amplitude from the computed one.
@@ -139,7 +134,7 @@ def calibrate(
     for number in range(plan.starts):
         search = Search(problem, runner.report_of(number))
         start = start_number(search, number, plan.seed, plan.start_draws)
-        end = least_squares_search(search, start, plan.iterations or ITERATIONS)
+        end = descended(search, start, plan.iterations or ITERATIONS)
         ended.append(_solution(number, search, end.point, values))
     return Calibration(parameter_map, targets, plan, tuple(distinct(ended)), tuple(ended))
 
@@ -195,7 +190,9 @@ def _solution(
     # a limit is a wish: it does not make a quantity more certain
     limited = int(np.isfinite(targets.limit_of_each()).sum())
     limits = slice(targets.count, targets.count + limited)
-    slopes = np.delete(smooth_jacobian(search, coordinates), limits, axis=0)
+    here = search.evaluated(coordinates[None]).smooth
+    slopes = smooth_slopes(search, coordinates, here, problem.descent.steps[0])
+    slopes = np.delete(slopes[: here.shape[1]], limits, axis=0)
     return Solution(
         parameter_map=values.parameter_map,
         targets=targets,
