@@ -1,7 +1,7 @@
 """Result of an identification."""
 
 from dataclasses import dataclass, replace
-from typing import Any, Literal, TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -135,34 +135,3 @@ class Fit:
     def __getitem__(self, name: str) -> Estimate:
         """Return the estimate of an unknown."""
         return next(estimate for estimate in self.estimates if estimate.name == name)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the fit for JSON, in SI.
-
-        Numbers that are not finite become null, and so does the value of an undetermined unknown.
-        """
-        return {
-            "method": self.log.method,
-            "seed": self.log.seed,
-            "rmse": self.rmse,
-            "unknowns": {
-                e.name: {
-                    "value": e.value if e.determined else None,
-                    "interval_95": None if np.isnan(e.lower) else [e.lower, e.upper],
-                    "unit": u.unit.si,
-                    "determined": e.determined,
-                    "at_bound": e.at_bound or None,
-                }
-                for e, u in zip(self.estimates, self.problem.unknowns, strict=True)
-            },
-            "tests": [
-                {"name": t.name, "rmse": t.rmse, "rmse_normalised": t.normalised}
-                for t in self.tests
-            ],
-            "condition": self.condition if np.isfinite(self.condition) else None,
-            "undetermined": [
-                {"unknowns": list(d.names), "parts": list(d.parts)} for d in self.undetermined
-            ],
-            "evaluations": self.log.evaluations,
-            "notes": list(self.log.notes),
-        }
