@@ -169,7 +169,7 @@ def held_out_table_rows(table: pd.DataFrame, studies: pd.DataFrame) -> list[Row]
     """Return rows for tables of [B] that were held out of the fit and predicted.
 
     Args:
-        table: Table from `wm_drake.studies.calibrate.tables.prediction_table`.
+        table: Table from `wm_drake.studies.calibrate.results.predictions_of`.
         studies: Agreement of the gasket study of each held-out load, fitted and predicted, with the
             columns held_out, fit, responses and same_leading_factor.
     """
@@ -228,7 +228,7 @@ def held_out_rows(table: pd.DataFrame) -> list[Row]:
     """Return rows for loads that were held out of the calibration and predicted.
 
     Args:
-        table: Table from `wm_drake.studies.calibrate.tables.prediction_table`.
+        table: Table from `wm_drake.studies.calibrate.results.predictions_of`.
     """
     section, rows = "[B] Tables 1 and 3: loads held out of the calibration", list[Row]()
     for group in table.to_dict("records"):

@@ -60,11 +60,12 @@ def test_planted_friction_comes_back_from_command_line_to_report(wm_drake):
     assert friction["value_1"] == pytest.approx(TRUTH, abs=0.5)
     assert friction["held_by_1"] == "data"
     assert radius["unit"] == "mm"
-    assert result["solutions"][0]["largest_percent"] < 2.0
-    assert result["predictions"][0]["loads"] == ["back"]
+    assert result["searches"][0]["largest_percent"] < 2.0
+    assert result["predictions"][0]["held_out"] == "back"
     names = {path.name for path in Path("out").iterdir()}
     assert names == {
-        "report.html", "machine_1.yaml", "quantities.csv", "amplitudes.csv",
+        "report.html", "machine_1.yaml", "quantities.csv", "amplitudes.csv", "differences.csv",
+        "predictions.csv", "intervals_back.csv", "critical_speeds.csv", "gaps.csv", "searches.csv",
         "ledger.sqlite", "run.json",
     }  # fmt: skip
     written = load_machine(Path("out/machine_1.yaml"))
@@ -75,7 +76,10 @@ def test_planted_friction_comes_back_from_command_line_to_report(wm_drake):
     assert written.name == "short_calibrated_1"
     table = pd.read_csv("out/amplitudes.csv")
     assert np.allclose(
-        *(table[table.source == source][SENSORS] for source in ("experiment", "solution 1")),
+        *(
+            table[table.source == source][[f"{name}_mm" for name in SENSORS]]
+            for source in ("experiment", "solution 1")
+        ),
         rtol=0.03,
     )
     again = wm_drake(command, "--json", "--out", "out")

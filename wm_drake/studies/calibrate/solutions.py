@@ -2,13 +2,13 @@
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import from_base, to_base
+from wm_drake.parameters.units import Share, from_base, to_base
+from wm_drake.report.quantity import Quantity
 from wm_drake.studies.calibrate.parameter_map import ParameterMap
 from wm_drake.studies.calibrate.targets import Targets
 from wm_drake.studies.fitting.posterior import AT_BOUND, DETERMINED, UNDETERMINED, Posterior
@@ -20,27 +20,26 @@ DISTINCT = 0.5
 """Least distance between distinct solutions: RMS over the quantities, in prior deviations."""
 
 
-class Percents(NamedTuple):
-    """Mean and largest absolute value of relative errors, in percent; NaN without errors."""
-
-    mean: float
-    largest: float
-
-    def named(self, prefix: str = "") -> dict[str, float]:
-        """Return both by name, such as `mean_percent`, for files."""
-        return {f"{prefix}{name}_percent": value for name, value in self._asdict().items()}
-
-    def __str__(self) -> str:
-        """Return both as words."""
-        return f"mean {self.mean:.1f} %, largest {self.largest:.1f} %"
+DIFFERENCE = Quantity("difference", Share(), 1)
+BEYOND = Quantity("difference", Share(), form="{:+.0f}".format)
+LIMIT = Quantity("limit", Share(), form="{:g}".format)
+COST = Quantity("cost", decimals=1)
+VALUE = Quantity("value")
+"""Value of a free quantity, in its own unit."""
 
 
-def percents_of(errors: FloatArray) -> Percents:
-    """Return mean and largest absolute value of relative errors; NaN values are ignored."""
+def sizes_of(errors: FloatArray) -> tuple[float, float]:
+    """Return mean and largest absolute value of errors; NaN values are ignored, NaN of none."""
     if not errors.size:
-        return Percents(np.nan, np.nan)
+        return np.nan, np.nan
     sizes = np.abs(errors)
-    return Percents(100.0 * float(np.nanmean(sizes)), 100.0 * float(np.nanmax(sizes)))
+    return float(np.nanmean(sizes)), float(np.nanmax(sizes))
+
+
+def sizes_text(errors: FloatArray) -> str:
+    """Return mean and largest absolute value of relative errors as words."""
+    mean, largest = map(DIFFERENCE.text, sizes_of(errors))
+    return f"mean {mean}, largest {largest}"
 
 
 @dataclass(frozen=True)
@@ -103,13 +102,13 @@ class Solution:
         loads = [f"{name}{'' if gasket else ' without gasket'}" for name, gasket in targets.loads]
         names = [f"{load} {sensor}" for load in loads for sensor in targets.sensors]
         names += [
-            " ".join(filter(None, (target.load, target.response.name, target.factor and target.of)))
-            for target in targets.responses
+            f"{t.load} {t.response.name}{f' {t.of}' if t.is_linear else ''}"
+            for t in targets.responses
         ]
         errors = np.concatenate([self.errors.ravel(), self.response_errors])
         used = [(name, e) for name, e in zip(names, errors, strict=True) if e == e]
         return [
-            f"{name} {100.0 * error:+.0f} % ({100.0 * limit:g} %)"
+            f"{name} {BEYOND.text(error)} ({LIMIT.text(limit)})"
             for (name, error), limit in zip(used, targets.limit_of_each(), strict=True)
             if abs(error) > limit
         ]
@@ -118,14 +117,14 @@ class Solution:
 def distinct(solutions: list[Solution]) -> list[Solution]:
     """Return the good solutions, best first, without those that are close to a better one."""
     ordered = sorted(solutions, key=lambda solution: solution.cost)
-    limit = GOOD * percents_of(ordered[0].errors).mean
+    limit = GOOD * sizes_of(ordered[0].errors)[0]
     kept: list[Solution] = []
     for solution in ordered:
         far = all(
             np.sqrt(np.mean((solution.coordinates - other.coordinates) ** 2)) > DISTINCT
             for other in kept
         )
-        if far and percents_of(solution.errors).mean <= limit:
+        if far and sizes_of(solution.errors)[0] <= limit:
             kept.append(solution)
     return kept
 
