@@ -61,9 +61,11 @@ def amplitudes_of(calibration: Calibration) -> xr.DataArray:
 
     The sources are the experiment, others in the files of measured amplitudes, and each solution.
     """
-    targets, found = calibration.targets, calibration.solutions
+    targets, solutions = calibration.targets, calibration.solutions
     sources = {EXPERIMENT: targets.amplitude, **_others(calibration)}
-    sources |= {f"solution {n}": solution.amplitude for n, solution in enumerate(found, start=1)}
+    sources |= {
+        f"solution {n}": solution.amplitude for n, solution in enumerate(solutions, start=1)
+    }
     return targets.labelled(sources, MEASURED)
 
 

@@ -132,7 +132,7 @@ def estimates_of(
     planted: Mapping[str, float] | None = None,
     fixed: Sequence[FixedNumber] = (),
 ) -> xr.Dataset:
-    """Return value, interval, unit, bounds and remark over the unknowns.
+    """Return value, standard deviation, interval, unit, bounds and remark over the unknowns.
 
     The numbers are in the unit for reading of each unknown, which the variable `unit` names: their
     units differ.
@@ -141,12 +141,18 @@ def estimates_of(
         planted: True values of the unknowns. [SI]
         fixed: Numbers that were not searched; they have a value only.
     """
-    words = {"value": "value", "lower_95": "95 % from", "upper_95": "95 % to", "unit": "unit"}
+    words = {
+        "value": "value",
+        "deviation": "± standard deviation",
+        "lower_95": "95 % from",
+        "upper_95": "95 % to",
+        "unit": "unit",
+    }
     words |= {"lower_bound": "lower bound", "upper_bound": "upper bound", "remark": "remark"}
-    rows = list(map(_row, fit.estimates, fit.problem.unknowns))
-    missing = np.nan
+    deviations = np.sqrt(np.diag(fit.covariance)).tolist()
+    rows = list(map(_row, fit.estimates, fit.problem.unknowns, deviations))
     rows += [
-        (unit.from_si(value), missing, missing, _unit_text(unit), missing, missing, FIXED)
+        (unit.from_si(value), *[np.nan] * 3, _unit_text(unit), *[np.nan] * 2, FIXED)
         for _, value, unit in fixed
     ]
     names = [*(e.name for e in fit.estimates), *(name for name, *_ in fixed)]
@@ -165,9 +171,9 @@ def estimates_of(
     return data
 
 
-def _row(e: Estimate, unknown: Unknown) -> tuple[float | str, ...]:
-    """Return value, interval, unit, bounds and remark of an unknown."""
-    values = (e.value if e.determined else np.nan, e.lower, e.upper)
+def _row(e: Estimate, unknown: Unknown, deviation: float) -> tuple[float | str, ...]:
+    """Return value, deviation, interval, unit, bounds and remark of an unknown."""
+    values = (e.value if e.determined else np.nan, deviation, e.lower, e.upper)
     bounds = (unknown.lower, unknown.upper)
     unit = unknown.unit
     return (

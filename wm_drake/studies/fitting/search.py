@@ -159,7 +159,7 @@ def _gauss_newton(
     """Search with one size of the difference steps, until none of scipy's tolerances is missed."""
     problem, descent = search.problem, search.problem.descent
     steps = 0
-    last: tuple[FloatArray, Residuals] = (np.full(len(begin), np.nan), _NOTHING)
+    last: tuple[FloatArray, Residuals] = (np.full(len(begin), np.nan), NO_RESIDUALS)
 
     def evaluated(point: FloatArray) -> Residuals:
         nonlocal last
@@ -191,7 +191,7 @@ def _gauss_newton(
     )
 
 
-_NOTHING = Residuals(np.empty((1, 0)), np.empty((1, 0)))
+NO_RESIDUALS = Residuals(np.empty((1, 0)), np.empty((1, 0)))
 
 
 def smooth_slopes(

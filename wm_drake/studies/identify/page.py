@@ -180,7 +180,7 @@ def _warnings(law: FittedLaw) -> list[str]:
     judgement, estimates = law.judgement, law.fit.estimates
     # A rise of a monotone curve that is zero means a flat piece, which needs no warning.
     flat = [e.name for e in estimates if ".rise_" in e.name and e.at_bound == "lower"]
-    warnings = list(judgement.sentences[1:])
+    warnings = list(judgement.sentences[judgement.verdict == "good" :])
     warnings += [
         f"The value of {e.name} is at its {e.at_bound} bound."
         for e in estimates

@@ -69,7 +69,7 @@ def static_answer(
         prefix: [curve for curve in measured if is_about(curve.axis) == about]
         for about, prefix in PREFIXES.items()
     }
-    found = {prefix: of_kind for prefix, of_kind in of_kinds.items() if of_kind}
+    kinds = {prefix: of_kind for prefix, of_kind in of_kinds.items() if of_kind}
     return Answer(
         f"Quasi-static tests of {title}",
         summary(measured),
@@ -77,9 +77,9 @@ def static_answer(
         (
             Part(
                 "Force and hysteresis",
-                (plot, *(_curves(prefix, of_kind) for prefix, of_kind in found.items())),
+                (plot, *(_curves(prefix, of_kind) for prefix, of_kind in kinds.items())),
             ),
-            Part("Values", [_measures(prefix, of_kind) for prefix, of_kind in found.items()]),
+            Part("Values", [_measures(prefix, of_kind) for prefix, of_kind in kinds.items()]),
         ),
         (("Files", ", ".join(loop.path for of_axis in tests.values() for loop in of_axis)),),
         METHOD,
