@@ -171,10 +171,12 @@ def _check_entries(table: "pd.DataFrame", column: str, allowed: tuple[str, ...],
 
 
 def _read(path: str, sensors: list[str]) -> "pd.DataFrame":
-    columns = [f"{name}_mm" for name in sensors]  # as in files of results
-    if not set(columns) <= set(read_header(Path(path), key="measured")):
+    head, written = read_header(Path(path), key="measured"), [f"{name}_mm" for name in sensors]
+    if set(head) - {BAND} == {*_KEYS, *written}:  # as commands write it
+        table, columns = read_csv(path, head, key="measured"), written
+    else:
+        table = read_csv(path, _KEYS + sensors, key="measured", optional=BAND)
         columns = sensors
-    table = read_csv(path, _KEYS + columns, key="measured", optional=BAND)
     _check_entries(table, "gasket", ("yes", "no", CHANGE), path)
     values = finite_numbers(table[columns], path, key="measured")
     return table[_KEYS].assign(**dict(zip(sensors, values.T, strict=True)))

@@ -94,11 +94,15 @@ def differences_of(amplitudes: xr.DataArray) -> xr.Dataset:
     mean = abs(difference).mean("sensor")
     return xr.Dataset(
         {
-            "difference": DIFFERENCE.variable(difference.dims, difference),
-            "mean_absolute": DIFFERENCE.named("mean absolute").variable(mean.dims, mean),
+            "difference": DIFFERENCE.variable(_names(difference), difference),
+            "mean_absolute": DIFFERENCE.named("mean absolute").variable(_names(mean), mean),
         },
         difference.coords,
     )
+
+
+def _names(array: xr.DataArray) -> list[str]:
+    return list(map(str, array.dims))
 
 
 def responses_of(calibration: Calibration) -> xr.Dataset:
