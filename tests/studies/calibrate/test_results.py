@@ -44,9 +44,9 @@ def calibration(machine, tmp_path_factory):
     slopes = np.zeros((18, 3))
     slopes[:2] = [[10.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
     coordinates = (point - parameter_map.expected) / parameter_map.deviation
-    at, none = Posterior(coordinates, slopes, 18), np.empty(0)
+    at, none = Posterior(coordinates, slopes, 18, parameter_map.unknowns), np.empty(0)
     best = Solution(parameter_map, targets, 0, point, computed, none, 20.0, 2.0, at, 123)
-    mirrored = Posterior(-coordinates, slopes, 18)
+    mirrored = replace(at, coordinates=-coordinates)
     other = replace(best, start=1, data_cost=21.0, posterior=mirrored, evaluations=77)
     bad = replace(best, start=2, amplitude=2.0 * computed, data_cost=2000.0, evaluations=55)
     return Calibration(

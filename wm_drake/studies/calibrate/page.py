@@ -27,10 +27,12 @@ from wm_drake.studies.calibrate.results import (
     relations_of,
     responses_of,
     searches_of,
+    solutions_of,
 )
 from wm_drake.studies.calibrate.solutions import BEYOND, LIMIT, sizes_text, solved_machine
 from wm_drake.studies.calibrate.study import BEYOND_LIMIT, Calibration
 from wm_drake.studies.calibrate.targets import AMPLITUDE, GASKET, case_title
+from wm_drake.studies.fitting.page import correlations_part
 from wm_drake.studies.machine_show.description import Modes
 from wm_drake.studies.modes.quantities import FREQUENCY
 from wm_drake.studies.spin.figures import envelopes_figure
@@ -83,6 +85,7 @@ def calibrate_answer(
             Part("Effect of the gasket", _effects(calibration)),
             _prediction(calibration, predictions, held_out),
             Part("Quantities", _quantity_tables(calibration)),
+            correlations_part(calibration.solutions[0].posterior),
             Part("Critical speeds and smallest gaps", _motion_tables(motion)),
             Part("Searches", (_searches(calibration),)),
         ),
@@ -304,20 +307,24 @@ def _prediction(
 
 
 def _quantity_tables(calibration: Calibration) -> list[LabelledTable]:
-    data = quantities_of(calibration)
-    ranks = data.solution.values.tolist()
     quantities = LabelledTable(
-        "quantities",
-        data,
+        "estimates",
+        quantities_of(calibration),
         "Quantities",
-        "Free quantities, each in its unit, with their standard deviations before and after the "
-        "fit. The best solution is machine_1.yaml.",
-        across="solution",
-        words={rank: f"solution {rank}" if rank != ranks[0] else "best solution" for rank in ranks},
+        "Free quantities of the best solution (machine_1.yaml), each in its unit, with their 95 % "
+        "intervals and their standard deviations before and after the fit. There is no interval "
+        "if the value is at a bound.",
         is_in_terminal=True,
     )
+    solutions = LabelledTable(
+        "solutions",
+        solutions_of(calibration),
+        "Solutions" if len(calibration.solutions) > 1 else "",
+        "Free quantities of each distinct good solution (machine_1.yaml and others).",
+        across="solution",
+    )
     if not calibration.parameter_map.relations:
-        return [quantities]
+        return [quantities, solutions]
     relations = LabelledTable(
         "relations",
         relations_of(calibration),
@@ -325,7 +332,7 @@ def _quantity_tables(calibration: Calibration) -> list[LabelledTable]:
         "Ratios of free quantities to what physics gives for them (free file), and those of the "
         "calibrated machine.",
     )
-    return [quantities, relations]
+    return [quantities, solutions, relations]
 
 
 def _motion_tables(motion: xr.Dataset) -> list[LabelledTable]:

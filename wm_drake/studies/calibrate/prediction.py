@@ -168,7 +168,9 @@ def _predicted(
     drawn = np.concatenate(
         [
             generator.multivariate_normal(
-                solution.coordinates, solution.posterior.covariance(scatter / plan.deviation), each
+                solution.coordinates,
+                solution.posterior.spread_matrix(scatter / plan.deviation),
+                each,
             )
             for solution in calibration.solutions
         ]

@@ -16,6 +16,7 @@ from wm_drake.studies.calibrate.prediction import FITS, Prediction
 from wm_drake.studies.calibrate.solutions import COST, DIFFERENCE, VALUE, sizes_of
 from wm_drake.studies.calibrate.study import Calibration
 from wm_drake.studies.calibrate.targets import GASKET, MEASURED
+from wm_drake.studies.fitting.page import estimates_of
 
 CHANGE = Quantity("change by the gasket", Share(), form="{:+.0f}".format)
 COVERED = Quantity("in the 95 % intervals", Share(), 0)
@@ -25,34 +26,37 @@ COUNT = Quantity("number", decimals=0)
 
 
 def quantities_of(calibration: Calibration) -> xr.Dataset:
-    """Return the free quantities, each in the unit that the coordinate `unit` names.
+    """Return the free quantities at the best solution, each in the unit that `unit` names.
 
     Returns:
-        Over `quantity`: bounds `lower` and `upper`, and the prior, `expected` and
-        `prior_deviation`. Over `quantity` and `solution`: `value`, `deviation`, and what it is
-        `held_by` (see `Solution.verdicts`).
+        Over `unknown`: `estimates_of` of `wm_drake.studies.fitting.page`, and what determines it,
+        `held_by` (see `Solution.verdicts`); the prior, `expected` and `prior_deviation`.
     """
-    m, solutions = calibration.parameter_map, calibration.solutions
-    expected, deviation = map(m.in_units, m.prior)
-    dims = ("quantity", "solution")
-    columns = {
-        "lower": VALUE.named("lower bound").variable("quantity", m.in_units(m.lower)),
-        "upper": VALUE.named("upper bound").variable("quantity", m.in_units(m.upper)),
-        "expected": VALUE.named("expected").variable("quantity", expected),
-        "prior_deviation": VALUE.named("± deviation").variable("quantity", deviation),
-        "value": VALUE.variable(dims, np.transpose([m.in_units(s.point) for s in solutions])),
-        "deviation": VALUE.named("± deviation").variable(
-            dims, np.transpose([s.posterior.spread() * deviation for s in solutions])
-        ),
-        "held_by": xr.Variable(
-            dims,
-            np.transpose([s.verdicts() for s in solutions]),
-            Quantity("determined by").attributes(),
-        ),
-    }
-    ranks = [str(number) for number in range(1, len(solutions) + 1)]
-    return xr.Dataset(
-        columns, {"quantity": list(m.names), "unit": ("quantity", list(m.units)), "solution": ranks}
+    best, m = calibration.solutions[0], calibration.parameter_map
+    data = estimates_of(best.posterior)
+    held = xr.Variable("unknown", best.verdicts(), Quantity("determined by").attributes())
+    expected, deviation = map(m.in_units, (m.expected, m.deviation))
+    return data.drop_vars("remark").assign(
+        expected=VALUE.named("expected").variable("unknown", expected),
+        prior_deviation=VALUE.named("± deviation").variable("unknown", deviation),
+        held_by=held,
+    )
+
+
+def solutions_of(calibration: Calibration) -> xr.Dataset:
+    """Return `value`, standard `deviation` and what determines it of each solution (`held_by`).
+
+    Over `unknown` and `solution`, in the unit that the coordinate `unit` names.
+    """
+    parts = [estimates_of(solution.posterior) for solution in calibration.solutions]
+    ranks = xr.Variable("solution", [str(n) for n in range(1, len(parts) + 1)])
+    data = xr.concat(parts, ranks)
+    held = [solution.verdicts() for solution in calibration.solutions]
+    attributes = Quantity("determined by").attributes()
+    return (
+        data[["value", "deviation"]]
+        .assign(held_by=(("solution", "unknown"), held, attributes))
+        .assign_coords(unit=("unknown", parts[0].unit.values))
     )
 
 

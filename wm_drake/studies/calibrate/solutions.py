@@ -11,7 +11,7 @@ from wm_drake.parameters.units import Share, from_base, to_base
 from wm_drake.report.quantity import Quantity
 from wm_drake.studies.calibrate.parameter_map import ParameterMap
 from wm_drake.studies.calibrate.targets import Targets
-from wm_drake.studies.fitting.posterior import AT_BOUND, DETERMINED, UNDETERMINED, Posterior
+from wm_drake.studies.fitting.posterior import DETERMINED, UNDETERMINED, Posterior
 
 GOOD = 1.25
 """Largest ratio of the mean error of a good solution to that of the best solution."""
@@ -90,8 +90,7 @@ class Solution:
 
     def verdicts(self) -> list[str]:
         """Return what determines each quantity: "data", "prior", "data and prior" or "bound"."""
-        lower, upper = self.parameter_map.lower, self.parameter_map.upper
-        at_bound = np.minimum(self.point - lower, upper - self.point) < AT_BOUND * (upper - lower)
+        at_bound = [bool(estimate.at_bound) for estimate in self.posterior.estimates]
         spread = self.posterior.spread()
         cases = [at_bound, spread < DETERMINED, spread > UNDETERMINED]
         return list(map(str, np.select(cases, ["bound", "data", "prior"], "data and prior")))
@@ -169,16 +168,16 @@ def fit_texts(solution: Solution) -> list[str]:
     """Return for each quantity ``damper_friction 27.5 ± 2.1 N (expected 35 ± 9 N)``."""
     parameter_map, texts = solution.parameter_map, []
     values = parameter_map.in_units(_rounded(solution))
-    expected, deviation = map(parameter_map.in_units, parameter_map.prior)
+    expected, deviation = map(
+        parameter_map.in_units, (parameter_map.expected, parameter_map.deviation)
+    )
     posterior = solution.posterior.spread() * deviation
-    for index, (name, unit) in enumerate(
-        zip(parameter_map.names, parameter_map.units, strict=True)
-    ):
+    for index, unknown in enumerate(parameter_map.unknowns):
         after, before = (
-            f"{n[index]:.10g} ± {_short(s[index])} {unit}".rstrip()
+            f"{n[index]:.10g} ± {_short(s[index])} {unknown.unit.shown}".rstrip()
             for n, s in ((values, posterior), (expected, deviation))
         )
-        texts.append(f"{name} {after} (expected {before})")
+        texts.append(f"{unknown.name} {after} (expected {before})")
     return texts
 
 
@@ -188,7 +187,8 @@ def _rounded(solution: Solution) -> FloatArray:
     The rounding is decimal in the unit in which each quantity is written.
     """
     parameter_map, point = solution.parameter_map, []
-    for index, unit in enumerate(parameter_map.units):
+    for index, unknown in enumerate(parameter_map.unknowns):
+        unit = unknown.unit.shown
         value, deviation = (
             from_base(float(a[index]), unit) for a in (solution.point, parameter_map.deviation)
         )

@@ -14,7 +14,7 @@ from wm_drake.studies.calibrate.parameter_map import ParameterMap, parameter_map
 from wm_drake.studies.calibrate.solutions import Solution, distinct
 from wm_drake.studies.calibrate.targets import Targets
 from wm_drake.studies.fitting.posterior import Posterior
-from wm_drake.studies.fitting.problem import PriorProblem, Residuals, Unknown
+from wm_drake.studies.fitting.problem import PriorProblem, Residuals
 from wm_drake.studies.fitting.search import Search, descended, smooth_slopes
 from wm_drake.studies.fitting.starts import DRAWS, start_number
 
@@ -147,14 +147,6 @@ def calibration_problem(values: Evaluation, plan: SearchPlan) -> PriorProblem:
     """
     parameter_map, targets = values.parameter_map, values.targets
     spread = plan.spread(targets.amplitude)
-    m = parameter_map
-    columns = np.stack([m.lower, m.upper, np.clip(m.start, m.lower, m.upper), *m.prior])
-    unknowns = tuple(
-        Unknown(name, lower, upper, start=start, prior=(expected, deviation))
-        for name, (lower, upper, start, expected, deviation) in zip(
-            m.names, columns.T.tolist(), strict=True
-        )
-    )
 
     def residuals(points: FloatArray) -> Residuals:
         computed = values(points)
@@ -166,7 +158,7 @@ def calibration_problem(values: Evaluation, plan: SearchPlan) -> PriorProblem:
         )
         return Residuals(exact, smooth)
 
-    return PriorProblem(unknowns, residuals)
+    return PriorProblem(parameter_map.unknowns, residuals)
 
 
 def costs_at(problem: PriorProblem, point: FloatArray, targets: Targets) -> tuple[float, float]:
@@ -202,6 +194,6 @@ def _solution(
         responses=computed.responses[0],
         data_cost=data,
         prior_cost=prior,
-        posterior=Posterior(coordinates, slopes, targets.count),
+        posterior=Posterior(coordinates, slopes, targets.count, problem.unknowns),
         evaluations=search.evaluations,
     )

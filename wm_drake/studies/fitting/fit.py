@@ -1,12 +1,12 @@
 """Result of an identification."""
 
 from dataclasses import dataclass, replace
-from typing import Literal, TypeAlias
+from typing import Literal, Protocol, TypeAlias
 
 import numpy as np
 
 from wm_drake.parameters.types import FloatArray
-from wm_drake.studies.fitting.problem import FitProblem
+from wm_drake.studies.fitting.problem import FitProblem, Unknown
 
 FitVerdict: TypeAlias = Literal["good", "fair", "poor"]
 
@@ -55,6 +55,22 @@ class Estimate:
     upper: float
     determined: bool
     at_bound: str
+
+
+class Assessed(Protocol):
+    """Unknowns with estimates: a `Fit`, or the `Posterior` of a problem with priors."""
+
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """The unknowns."""
+
+    @property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """Estimate of each."""
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Covariance of the unknowns (p, p). [SI]"""
 
 
 @dataclass(frozen=True)
@@ -116,6 +132,11 @@ class Fit:
     covariance: FloatArray
     condition: float
     undetermined: tuple[Direction, ...]
+
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """The unknowns."""
+        return self.problem.unknowns
 
     def without_intervals(self, reason: str) -> "Fit":
         """Return the fit without intervals and covariance, with the reason as a note."""

@@ -11,11 +11,14 @@ from wm_drake.report.figure import Axis, Figure, Line, Panel
 from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.quantity import Quantity, shown
 from wm_drake.studies.answer import Part, Plot
-from wm_drake.studies.fitting.fit import Estimate, Fit
+from wm_drake.studies.fitting.fit import Assessed, Estimate, Fit
 from wm_drake.studies.fitting.problem import Unknown
 
 FixedNumber: TypeAlias = tuple[str, float, Unit]
 """Name, SI value and unit of a number that was not searched."""
+
+MOST_CORRELATED = 20
+"""Largest number of unknowns whose correlations a page shows."""
 
 FIXED = "fixed"
 """Remark on a number that was not searched."""
@@ -83,19 +86,24 @@ def fit_parts(
         "a bound, if the data do not determine it or if it was fixed.",
         is_in_terminal=True,
     )
-    correlations = LabelledTable(
-        "correlations", correlations_of(fit), "Correlations", "Correlations of the errors of the "
-        "estimates.", across="with"
-    )  # fmt: skip
     of_tests = LabelledTable(
         "errors", errors_of(fit, error), "Errors", "What the fit misses of each measured curve."
     )
     return (
         Part("Search", _history(fit, error) if fit.log.history else ()),
         Part("Estimated values", (values,), remarks=undetermined_sentences(fit)),
-        Part("Correlations", (correlations,) if fit.estimates else ()),
+        correlations_part(fit),
         Part("Errors of the fit", (of_tests,)),
     )
+
+
+def correlations_part(fit: Assessed) -> Part:
+    """Return the correlations of the errors of the estimates; of many, in the file only."""
+    data = correlations_of(fit)
+    heading = "Correlations" if len(fit.estimates) <= MOST_CORRELATED else ""
+    caption = "Correlations of the errors of the estimates."
+    table = LabelledTable("correlations", data, heading, caption, across="with")
+    return Part("Correlations", (table,) if fit.estimates else ())
 
 
 def errors_of(fit: Fit, error: Quantity) -> xr.Dataset:
@@ -128,7 +136,7 @@ def _history(fit: Fit, error: Quantity) -> tuple[Plot, LabelledTable]:
 
 
 def estimates_of(
-    fit: Fit,
+    fit: Assessed,
     planted: Mapping[str, float] | None = None,
     fixed: Sequence[FixedNumber] = (),
 ) -> xr.Dataset:
@@ -150,7 +158,7 @@ def estimates_of(
     }
     words |= {"lower_bound": "lower bound", "upper_bound": "upper bound", "remark": "remark"}
     deviations = np.sqrt(np.diag(fit.covariance)).tolist()
-    rows = list(map(_row, fit.estimates, fit.problem.unknowns, deviations))
+    rows = list(map(_row, fit.estimates, fit.unknowns, deviations))
     rows += [
         (unit.from_si(value), *[np.nan] * 3, _unit_text(unit), *[np.nan] * 2, FIXED)
         for _, value, unit in fixed
@@ -165,7 +173,7 @@ def estimates_of(
         {"unknown": names},
     )
     if planted is not None:
-        units = {unknown.name: unknown.unit for unknown in fit.problem.unknowns}
+        units = {unknown.name: unknown.unit for unknown in fit.unknowns}
         truth = [units[name].from_si(planted[name]) for name in names]
         data["planted"] = Quantity("planted").variable("unknown", truth)
     return data
@@ -188,12 +196,12 @@ def _unit_text(unit: Unit) -> str:
     return unit.shown.replace("*", " ")
 
 
-def correlations_of(fit: Fit) -> xr.Dataset:
+def correlations_of(fit: Assessed) -> xr.Dataset:
     """Return the correlations of the errors of the unknowns."""
     deviation = np.sqrt(np.diag(fit.covariance))
     with np.errstate(invalid="ignore", divide="ignore"):
         correlation = fit.covariance / np.outer(deviation, deviation)
-    names = [unknown.name for unknown in fit.problem.unknowns]
+    names = [unknown.name for unknown in fit.unknowns]
     quantity = Quantity("correlation", decimals=2)
     return xr.Dataset(
         {"correlation": quantity.variable(("unknown", "with"), correlation)},
