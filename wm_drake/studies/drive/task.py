@@ -8,6 +8,7 @@ import numpy as np
 from wm_drake.engines.compiled.step_check import drum_inertia
 from wm_drake.errors import input_error
 from wm_drake.model.machine import Machine
+from wm_drake.report.quantity import SPEED
 from wm_drake.studies.answer import Answer
 from wm_drake.studies.drive.options import DriveOptions
 from wm_drake.studies.drive.page import drive_answer
@@ -59,6 +60,6 @@ class DriveTask(Task):
         if options.loads:
             inertia = drum_inertia(self.machine.set_up())
             loads = random_loads(options.loads, options.seed, self.cases[0].load)
-            speed = options.speed * np.pi / 30.0
+            speed = float(SPEED.to_si(options.speed))
             estimation = estimate_unbalance(parameters, speed, loads, run, inertia)
         return drive_answer(parameters, self.cases[0].profile, thresholds, grid, estimation)
