@@ -70,7 +70,7 @@ def tolerance_answer(
         (
             *_distributions(trials, samples, measures, limits, contact),
             _causes(trials, indices),
-            Part("Limits", _limits(limits)),
+            Part("Limits", _limits(trials, limits)),
             _contact(contact),
             Part("Distributions in numbers", _statistics(measures)),
             Part("Sobol indices", _indices(trials, indices)),
@@ -135,7 +135,7 @@ def _where(contact: xr.Dataset) -> list[str]:
         share, begin = contact.nearest, "of the runs have the smallest gap"
     if not share.any():
         return []
-    at = int(share.argmax())
+    at = int(share.argmax("pair"))
     return [f"{WHOLE_SHARE.text(share[at])} {begin} at {pair_words(contact.isel(pair=at))}."]
 
 
@@ -357,7 +357,7 @@ def _causes(trials: ToleranceTrials, indices: xr.Dataset) -> Part:
     return Part("What causes the scatter", plots, indices.attrs["refused"])
 
 
-def _limits(limits: xr.Dataset) -> tuple[LabelledTable, ...]:
+def _limits(trials: ToleranceTrials, limits: xr.Dataset) -> tuple[LabelledTable, ...]:
     """Return the verdict on each limit; nothing without limits."""
     if not limits:
         return ()
@@ -366,9 +366,16 @@ def _limits(limits: xr.Dataset) -> tuple[LabelledTable, ...]:
         "interval is allowed, fail if none of it is, else undecided: more samples decide it."
     )
     data = limits.assign(is_broken=limits.verdict == "fail")
+    words = {r.name: _titles(trials)[name_of(r)] for r in trials.chosen} | _titles(trials)
     return (
         LabelledTable(
-            "limits", data, "Limits", caption, marked=("is_broken", "alarm"), is_in_terminal=True
+            "limits",
+            data,
+            "Limits",
+            caption,
+            marked=("is_broken", "alarm"),
+            words=words,
+            is_in_terminal=True,
         ),
     )
 

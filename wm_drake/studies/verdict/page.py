@@ -237,7 +237,7 @@ def changes_table(states: xr.Dataset) -> LabelledTable:
 
 def loads_table(question: VerdictQuestion, states: xr.Dataset) -> LabelledTable:
     """Return gap, place and speed of each load, before and after the best change."""
-    base, best = states.isel(state=0), states.isel(state=-1)
+    base, best = states.isel(state=0, drop=True), states.isel(state=-1)
     runs = [base.isel(load=at) for at in range(base.sizes["load"])]
     gaps = base.smallest_gap.fillna(-np.inf)
     data = xr.Dataset(

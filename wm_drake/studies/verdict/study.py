@@ -149,7 +149,7 @@ def states_of(base: xr.Dataset, steps: Sequence[xr.Dataset]) -> xr.Dataset:
     """
     runs = [base, *steps[:1], *steps[1:][-1:]]
     alike = [run[[*base.data_vars]].reset_coords(drop=True) for run in runs]
-    states = xr.concat(alike, xr.Variable("state", STATES[: len(runs)]))
+    states = xr.concat(alike, xr.Variable("state", list(STATES[: len(runs)])))
     return states.assign_attrs(changes=[run.attrs.get("changes", {}) for run in runs])
 
 
