@@ -40,7 +40,7 @@ def stop_force(compression, rate, loss, stiffness):
 def rubbing_force(normal_force, velocity, friction, full_friction_velocity):
     """Return the friction force on a body that rubs against a surface.
 
-        f = -mu N v / sqrt(v . v + v_t^2)         own choice: Coulomb's law, smooth at rest
+        f = -mu N v / w,   w^2 = v . v + v_t^2      own choice: Coulomb's law, smooth at rest
 
     Args:
         normal_force: N, >= 0. [N]

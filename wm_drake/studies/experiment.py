@@ -35,7 +35,7 @@ Simulate: TypeAlias = Callable[..., xr.Dataset]
 """Function of a built machine, names of measures, cases and a word for them, with the table of
 their runs: `Executor.simulate`, `run_here`, or another one in tests."""
 
-Labels: TypeAlias = Mapping[str, Sequence[Any]]
+PlaceLabels: TypeAlias = Mapping[str, Sequence[Any]]
 """Labels by the name of their dimension."""
 
 
@@ -82,7 +82,7 @@ class Experiment:
     simulate: Simulate = run_here
     loads: tuple[Case, ...] = ()
 
-    def over(self, labels: Labels, cases: Iterable[Case], what: str = "runs") -> xr.Dataset:
+    def over(self, labels: PlaceLabels, cases: Iterable[Case], what: str = "runs") -> xr.Dataset:
         """Run cases and return their measures over labelled dimensions.
 
         Args:
@@ -139,7 +139,7 @@ class Experiment:
         return machines
 
 
-def placed(table: xr.Dataset, labels: Labels) -> xr.Dataset:
+def placed(table: xr.Dataset, labels: PlaceLabels) -> xr.Dataset:
     """Return a table of runs over labelled dimensions.
 
     Args:
@@ -151,13 +151,13 @@ def placed(table: xr.Dataset, labels: Labels) -> xr.Dataset:
         run failed, "" if it did not.
     """
     shape = tuple(map(len, labels.values()))
-    own = {name: c.variable for name, c in table.coords.items() if "run" not in c.dims}
+    without_runs = {name: c.variable for name, c in table.coords.items() if "run" not in c.dims}
     return xr.Dataset(
         {
             name: ((*labels, *v.dims[1:]), v.values.reshape(*shape, *v.shape[1:]), v.attrs)
             for name, v in table.data_vars.items()
         },
-        {**own, **{name: list(values) for name, values in labels.items()}},
+        {**without_runs, **{name: list(values) for name, values in labels.items()}},
     )
 
 
