@@ -15,12 +15,12 @@ from pathlib import Path
 
 import numpy as np
 from analysis_tools import validation_page as page
+from analysis_tools.spin_profiles import faster_profile
 
 from wm_drake.batch import simulate_many, sources_version
 from wm_drake.batch.ledger import LedgerEntry, key_of, open_ledger
 from wm_drake.model.build import build_machine
-from wm_drake.parameters import SpinProfile, load_machine, load_profile
-from wm_drake.parameters.spin import Region
+from wm_drake.parameters import load_machine, load_profile
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.unbalance_cases import load_unbalance_cases
 from wm_drake.studies.spin_identify.options import SpinIdentifyOptions
@@ -71,17 +71,8 @@ def _model(faster: float, *, quick: bool) -> SpinModel:
     sought = unknowns_of(parameters, QUICK if quick else ())
     regions = partial(simulate_many, machine, measures=("regions",), workers=1)
     return SpinModel(
-        parameters, _faster(load_profile("spin_cycle"), faster), cases, sought, regions
+        parameters, faster_profile(load_profile("spin_cycle"), faster), cases, sought, regions
     )
-
-
-def _faster(profile: SpinProfile, factor: float) -> SpinProfile:
-    """Return a profile with all times divided by a factor."""
-    regions = [
-        Region(name=r.name, begin=r.begin / factor, end=r.end / factor) for r in profile.regions
-    ]
-    times = tuple(time / factor for time in profile.time)
-    return SpinProfile(time=times, speed=profile.speed, regions=tuple(regions))
 
 
 def _identified(model: SpinModel, seed: int) -> FloatArray:

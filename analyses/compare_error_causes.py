@@ -14,50 +14,20 @@ import argparse
 import sys
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import xarray as xr
 from analysis_tools import validation_page as page
+from analysis_tools.error_causes import CAUSES, with_cause
+from analysis_tools.spin_profiles import begin_of
 from write_paper_a import CASES, GROUPS
 
 from wm_drake import build_machine, load_machine, load_profile
 from wm_drake.batch import simulate_many, sources_version
 from wm_drake.batch.ledger import Ledger, LedgerEntry, key_of, open_ledger
 from wm_drake.parameters import MachineParameters, SpinProfile
-from wm_drake.parameters.machine import Imperfections
 from wm_drake.parameters.unbalance_cases import UnbalanceCase, load_unbalance_cases
 from wm_drake.studies.spin_cycle.study import DIMS, average_errors, labels_of, runs_of
-
-BEARING = {
-    "axial_stiffness": "8 kN/mm",
-    "tilting_stiffness": "100 kN m/rad",
-    "axial_damping": "1 N s/mm",
-    "tilting_damping": "10 N m s/rad",
-    "y": "170 mm",
-}
-STIFF = {"radial_stiffness": "10 kN/mm", "radial_damping": "1 N s/mm"}
-LOOSE = {
-    "radial_stiffness": "50 N/mm",
-    "radial_damping": "0.05 N s/mm",
-    "contact_stiffness": "10 kN/mm",
-    "contact_damping": "1 N s/mm",
-}
-CAUSES: dict[str, dict[str, Any]] = {
-    "whirl: a compliant bearing without clearance": {"bearing": BEARING | STIFF},
-    **{
-        f"whirl: radial clearance {size}": {"bearing": BEARING | LOOSE | {"clearance": size}}
-        for size in ("0.05 mm", "0.15 mm", "0.5 mm")
-    },
-    **{
-        f"residual imbalance, {size}": {
-            "residual_imbalance": {"mass": size, "radius": "240 mm", "y": "0 mm"}
-        }
-        for size in ("10 g", "20 g", "50 g")
-    },
-    **{f"phase error, {size}": {"phase_error": size} for size in ("2 deg", "5 deg", "10 deg")},
-}
-"""Causes of error that [A] names in section 4.2; all sizes are assumptions."""
 
 AT_AN_ANGLE = ("two, 90 deg", "two, 180 deg")
 """Groups of cases that have an error of the phase."""
@@ -81,7 +51,7 @@ def main() -> None:
         found = partial(_displacement, ledger, cases=cases, profile=profile)
         perfect = found(machine)
         errors = {
-            name: 100.0 * average_errors(perfect, found(_with(machine, imperfections)))
+            name: 100.0 * average_errors(perfect, found(with_cause(machine, imperfections)))
             for name, imperfections in CAUSES.items()
         }
     text = page.origin("python analyses/compare_error_causes.py --page docs/error-causes.md", [])
@@ -92,18 +62,6 @@ def main() -> None:
     )
     print(text)
     page.write(text, arguments.out, arguments.page)
-
-
-def begin_of(profile: SpinProfile) -> SpinProfile:
-    """Return the first region of a profile."""
-    end = profile.regions[0].end
-    speed = 0.0, float(profile.speed_at(end))
-    return SpinProfile(time=(0.0, end), speed=speed, regions=profile.regions[:1])
-
-
-def _with(machine: MachineParameters, imperfections: dict[str, Any]) -> MachineParameters:
-    checked = Imperfections.model_validate(imperfections)
-    return machine.model_copy(update={"imperfections": checked})
 
 
 def _displacement(

@@ -20,16 +20,10 @@ from pathlib import Path
 
 import numpy as np
 from analysis_tools import validation_page as page
-from analysis_tools.machine_net import LAWS, PRIORS, Net, Scored
+from analysis_tools.machine_net import Net
+from analysis_tools.net_ledger import BLOCK, add_block, block_of, identity_of, law_of, ranked
 
-from wm_drake.batch.ledger import Ledger, LedgerEntry, key_of, open_ledger
-from wm_drake.parameters.types import FloatArray
-
-BLOCK = 16
-"""Machines of a block; all of one have the same damper law."""
-
-PASSED = 0.05
-"""Fraction of the machines that make the gasket study."""
+from wm_drake.batch.ledger import Ledger, open_ledger
 
 SHOWN = 12
 """Machines in the table."""
@@ -49,66 +43,17 @@ def main() -> None:
     begin = time.monotonic()
     with open_ledger(arguments.ledger, identity_of(arguments.seed), resume=True) as ledger:
         if arguments.quick:
-            _add_block(ledger, {}, arguments.seed, 0, size=2)
+            add_block(ledger, {}, arguments.seed, 0, size=2)
         else:
             nets: dict[str, Net] = {}
             number = len(ledger)
             while time.monotonic() - begin < 60.0 * arguments.minutes:
-                _add_block(ledger, nets, arguments.seed, number)
+                add_block(ledger, nets, arguments.seed, number)
                 number += 1
                 print(f"{BLOCK * number} machines", file=sys.stderr, flush=True)
         text = _table(ledger, arguments.seed)
     print(text)
     page.write(text, arguments.out, None)
-
-
-def identity_of(seed: int) -> dict[str, str]:
-    """Return the texts that identify the net; a change of the program does not end it."""
-    return {
-        "study": "net",
-        "seed": str(seed),
-        "priors": key_of(text=PRIORS.read_text(encoding="utf-8"), laws=LAWS, block=BLOCK)[:8],
-    }
-
-
-def block_of(ledger: Ledger, seed: int, number: int) -> Scored:
-    """Return a block of the ledger."""
-    return Scored(**ledger.get(key_of(seed=seed, block=number)).values)
-
-
-def ranked(ledger: Ledger, seed: int) -> list[tuple[float, int, int]]:
-    """Return score, block and place of the machines with a second score, best first."""
-    return sorted(
-        (float(scored.first[place] + scored.second[place]), number, int(place))
-        for number in range(len(ledger))
-        for scored in [block_of(ledger, seed, number)]
-        for place in np.flatnonzero(np.isfinite(scored.second))
-    )
-
-
-def law_of(number: int) -> str:
-    """Return the damper law of a block."""
-    return LAWS[number % len(LAWS)]
-
-
-def _add_block(
-    ledger: Ledger, nets: dict[str, Net], seed: int, number: int, size: int = BLOCK
-) -> None:
-    law = law_of(number)
-    net = nets.setdefault(law, Net(law)) if law not in nets else nets[law]
-    rng = np.random.default_rng([seed, number])
-    scored = net.scored(np.array([net.drawn(rng) for _ in range(size)]))
-    limit = _limit(ledger, seed, number, scored.first)
-    chosen = np.flatnonzero(scored.first <= limit)
-    scored = net.with_second_stage(scored, chosen)
-    values = {name: np.asarray(value, dtype=float) for name, value in vars(scored).items()}
-    ledger.put_all({key_of(seed=seed, block=number): LedgerEntry(values)})
-
-
-def _limit(ledger: Ledger, seed: int, number: int, first: FloatArray) -> float:
-    """Return the first score below which a machine makes the gasket study."""
-    before = [block_of(ledger, seed, k).first for k in range(max(0, number - 200), number)]
-    return float(np.nanquantile(np.concatenate([*before, first]), PASSED))
 
 
 def _table(ledger: Ledger, seed: int) -> str:
