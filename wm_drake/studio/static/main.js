@@ -91,7 +91,7 @@ async function openMachine(next) {
   byId('about').textContent = `${machine.name}: ${machine.about}`;
   byId('load').replaceChildren(...[...machine.loads, DESCRIBED].map((name) => make('option', {value: name}, name)));
   byId('gasket').disabled = !machine.gasket;
-  document.title = `${machine.name} – wm-drake studio`;
+  document.title = `${machine.name} – wm-drake`;
   makePanels();
   search();
 }
@@ -614,7 +614,7 @@ async function begin() {
   showHistory();
   showLoad();
   await runVariants();
-  new Studies(found.studies, () => state);
+  if (found.studies) new Studies(found.studies, () => state);
 }
 
 begin().catch(fail);
