@@ -30,6 +30,7 @@ from wm_drake.export.wasm import wasm_module
 from wm_drake.model.build import build_machine
 from wm_drake.model.scene import REPLAY_RATE, Scene
 from wm_drake.parameters import MachineParameters
+from wm_drake.parameters.files import machine_tree
 from wm_drake.parameters.spin import SAMPLES_OF_TURN
 from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import shape_name
@@ -90,11 +91,16 @@ class ExportedPage:
 
 
 def export_page(
-    parameters: MachineParameters, out: str | Path, loads: Sequence[str] = ()
+    parameters: MachineParameters,
+    out: str | Path,
+    loads: Sequence[str] = (),
+    given: str = "",
 ) -> ExportedPage:
     """Write a machine as one HTML file that runs it.
 
     Args:
+        given: Name or path of the machine at the command line, for the commands that the page
+            writes; its name if empty.
         out: File to write; it is replaced if it exists.
         loads: Names of the loads that run; all if empty.
 
@@ -113,7 +119,7 @@ def export_page(
     path = Path(out)
     _check_place(path)
     notice_jumping_friction(parameters)
-    data = page_data(parameters)
+    data = page_data(parameters) | {"given": given or parameters.name}
     text = _page(data)
     _write(path, text)
     numbers = data["machine"]["numbers"]
@@ -153,6 +159,7 @@ def _page_data(parameters: MachineParameters) -> dict[str, Any]:
     rows = round(profile.duration / contents.period) + 1
     return {
         "program": program(),
+        "tree": machine_tree(parameters),
         "machine": _machine(opened, model.places, model.refused),
         "model": {
             "at": model.plan.at._asdict(),
@@ -214,6 +221,9 @@ def _machine(
         key = number["key"]
         slider = opened.sliders[key]
         number["units"] = labels[slider.unit.si]
+        number["kind"] = (
+            "table" if slider.number.is_table else "entry" if slider.is_entry else "number"
+        )
         number["least"], number["most"] = _limits(slider)
         runs = key in places or re.fullmatch(r"loads\..*\.unbalances\.\d+\.\w+|profile\.(time|speed)\.\d+", key)
         if not runs and not number["needs"]:

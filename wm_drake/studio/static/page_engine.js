@@ -236,3 +236,66 @@ export async function post(path, body) {
   if (!answer) throw new Error(`this page has no server: ${path}`);
   return inTurn(`${path} ${body.page}`, () => answer(body));
 }
+
+/* ---- back to the command line ---- */
+
+/** Return the changes of a state as texts by key path, as `--set` takes them. */
+function changedTexts(state) {
+  const {values, profile} = chosen(state);
+  const texts = new Map();
+  for (const [key, value] of Object.entries(values)) {
+    const {unit, kind, value: original} = numberOf.get(key);
+    const whole = key.slice(0, key.lastIndexOf('.'));
+    if (kind === 'table') texts.set(key, `${digits(100 * (value / original))} %`);
+    else if (kind === 'entry') {
+      const entries = machine.numbers.filter((other) => other.kind === 'entry' && other.key.startsWith(`${whole}.`));
+      texts.set(whole, `(${entries.map((other) => digits(values[other.key] ?? other.value)).join(', ')}) ${unit}`);
+    } else texts.set(key, `${digits(value)} ${unit}`.trim());
+  }
+  const isOther = (name) => profile[name].some((value, k) => value !== data.profile[name][k]);
+  if (isOther('time') || isOther('speed')) texts.set('profile.band', `(${data.band.map(digits).join(', ')}) Hz`);
+  return texts;
+}
+
+const digits = (value) => String(Number(value.toPrecision(12)));
+
+/** Return the node of a tree at a path, made of `base` where it is missing. */
+function nodeAt(tree, base, path) {
+  let [node, origin] = [tree, base];
+  for (const name of path) {
+    origin = origin?.[name];
+    const isWhole = Array.isArray(origin) || ['force', 'torque', 'time', 'steps'].some((part) => origin && part in origin);
+    node[name] ??= isWhole ? JSON.parse(JSON.stringify(origin)) : {};
+    node = node[name];
+  }
+  return node;
+}
+
+const scaled = (text, factor) => text.replace(/[-+]?[\d.]+(?:e[-+]?\d+)?(?=[,)])/gi, (number) => digits(factor * Number(number)));
+
+/** Return the command that runs a state, and a machine file with what differs. */
+export function take(state) {
+  const texts = changedTexts(state);
+  const quoted = (text) => `'${text.replaceAll("'", "'\\''")}'`;
+  const sets = [...texts].map(([key, text]) => ` --set ${quoted(`${key}=${text}`)}`);
+  const tree = {extends: data.given, name: `${machine.name}_changed`, about: `${machine.name}, changed on its page`.slice(0, 300)};
+  for (const [key, text] of texts) {
+    const path = key.split('.');
+    const last = path.pop();
+    const node = nodeAt(tree, data.tree, path);
+    if (!text.endsWith(' %')) node[last] = text;
+    else {
+      const table = nodeAt(node, nodeIn(data.tree, path), [last]);
+      for (const name of ['force', 'torque']) if (name in table) table[name] = scaled(table[name], Number(text.slice(0, -2)) / 100);
+    }
+  }
+  if (state.masses.length) tree.loads = {described: {unbalances: state.masses}};
+  if (!state.gasket) tree.gasket = null;
+  const load = state.masses.length ? '' : ` --load ${quoted(state.load)}`;
+  return {
+    command: `wm-drake spin --machine ${quoted(data.given)}${load}${state.gasket ? '' : ' --no-gasket'}${sets.join('')}`,
+    file: `${JSON.stringify(tree, null, 1)}\n`, name: `${machine.name}_changed.yaml`,
+  };
+}
+
+const nodeIn = (tree, path) => path.reduce((node, name) => node?.[name], tree);
