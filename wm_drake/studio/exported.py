@@ -63,6 +63,7 @@ SOURCES = {
 index in it, from the sensors or the points on."""
 NOT_HERE = ("loads.", "profile.", "step", "output_period")
 """Numbers that do not enter the packed numbers: the page changes loads and profile itself."""
+AS_EXPORTED = "it is that of the exported file"
 LARGEST = 1e300
 """In place of an infinite number, which JSON does not have."""
 WORKER = """
@@ -227,7 +228,7 @@ def _machine(
         number["least"], number["most"] = _limits(slider)
         runs = key in places or re.fullmatch(r"loads\..*\.unbalances\.\d+\.\w+|profile\.(time|speed)\.\d+", key)
         if not runs and not number["needs"]:
-            number["needs"] = refused.get(key, "is that of the exported file")
+            number["needs"], number["fixed"] = refused.get(key, AS_EXPORTED), True
         if number["needs"]:
             number["low"] = number["high"] = number["value"]
     return machine

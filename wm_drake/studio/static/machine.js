@@ -132,18 +132,20 @@ export class Machine {
   run(profile) {
     const {model} = this;
     this.free = this.kept;
-    const stepping = steppingOf(profile, model.stepping);
-    const s = scheduleOf(profile, stepping);
+    const key = JSON.stringify(profile);
+    if (key !== this.profile) {
+      this.schedule = scheduleOf(profile, steppingOf(profile, model.stepping));
+      this.profile = key;
+    }
+    const s = this.schedule;
     const rows = s.time.length;
     const steps = [s.length, s.rate, s.drum, s.row, s.controls, s.one].map((part) => this.put(part));
     this.rows = rows;
-    this.schedule = s;
     this.samples = this.floats(rows * model.sample);
     this.call('wm_integrate', this.v, this.c, ...steps, s.count, this.samples, rows);
     this.moved = this.floats(rows * model.count.points);
     this.call('wm_measure', this.v, this.samples, rows, this.moved);
     this.good = this.answer()[9];
-    return stepping;
   }
 
   answer() { return this.view(this.v + 8 * this.model.at.answer, 10 + this.model.count.mounts); }

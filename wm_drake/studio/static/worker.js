@@ -71,7 +71,7 @@ function numbers() {
   };
 }
 
-/** Return what a job asks for: the gap, and "picture" or "numbers" of the run. */
+/** Return what a job asks for: the gap, and "picture", "numbers" or "samples" of the run. */
 export function answer(job) {
   prepare(job);
   if (status < 0) return {status};
@@ -83,6 +83,7 @@ export function answer(job) {
     diverged: good < rows ? time[good] : null,
     gap: gap && {...gap, time: time[gap.row], pose: poseAt(gap.row)},
     ...more, ...(good > 1 && job.kind === 'numbers' ? numbers() : {}),
+    ...(job.kind === 'samples' ? {moved: machine.view(machine.moved, rows * machine.model.count.points).slice()} : {}),
   };
 }
 
