@@ -263,7 +263,7 @@ class ToleranceTrials:
             "probability_lower": ("95 % from", ends[1]),
             "probability_upper": ("to", ends[2]),
         }
-        found = xr.Dataset(
+        data = xr.Dataset(
             {
                 **{name: SHARE.named(w).variable((), v) for name, (w, v) in named.items()},
                 "method": ((), method),
@@ -274,9 +274,9 @@ class ToleranceTrials:
             {"pair": samples["pair"].values},
             {"samples": samples.sizes["sample"]},
         )
-        seen = found.touches + found.nearest + found.get("rare_touches", 0.0) > 0.0
-        order = np.lexsort((-found.nearest.values, -found.touches.values))
-        return found.isel(pair=order[seen.values[order]])
+        seen = data.touches + data.nearest + data.get("rare_touches", 0.0) > 0.0
+        order = np.lexsort((-data.nearest.values, -data.touches.values))
+        return data.isel(pair=order[seen.values[order]])
 
     def gaps_of_loads(self) -> xr.DataArray:
         """Return the smallest gap of each load of the machine over `load`. [m]"""
@@ -366,7 +366,7 @@ def statistics_of(measures: xr.Dataset) -> xr.Dataset:
         The measures over `statistic`: `mean`, `deviation`, and percentiles such as `p5` with the
         ends of their 95 % intervals, `p5_lower` and `p5_upper`.
     """
-    found: dict[str, xr.Variable] = {}
+    columns: dict[str, xr.Variable] = {}
     names: list[str] = []
     for name, column in measures.items():
         good = column.values[np.isfinite(column.values)]
@@ -376,8 +376,8 @@ def statistics_of(measures: xr.Dataset) -> xr.Dataset:
             ends = {"": of.value, "_lower": of.lower, "_upper": of.upper}
             numbers |= {f"p{percent}{end}": value for end, value in ends.items()}
         names = list(numbers)
-        found[str(name)] = xr.Variable("statistic", list(numbers.values()), column.attrs)
-    return xr.Dataset(found, {"statistic": names})
+        columns[str(name)] = xr.Variable("statistic", list(numbers.values()), column.attrs)
+    return xr.Dataset(columns, {"statistic": names})
 
 
 def judged(measures: xr.Dataset, limits: Sequence[tuple[Limit, Response, float]]) -> xr.Dataset:

@@ -286,11 +286,11 @@ def gaps_plot(question: VerdictQuestion, states: xr.Dataset, laundry: xr.Dataset
     """Return the gaps of the loads and of the laundry, before and after the best change."""
     styles = ((0, fig.OURS, "as it is", 0.13), (-1, fig.QUIET, "after the best change", -0.13))
     names = [*states["load"].values.tolist(), LAUNDRY]
-    wanted = SMALLEST_GAP.values(question.clearance).item()
+    clearance = SMALLEST_GAP.values(question.clearance).item()
     marks: list[fig.Mark] = [fig.Rule(0.0, "y", color=fig.MARK)]
-    if wanted:
-        marks.append(fig.Rule(wanted, "y", color=fig.MEASURED, dash="dashed"))
-    largest = wanted
+    if clearance:
+        marks.append(fig.Rule(clearance, "y", color=fig.MEASURED, dash="dashed"))
+    largest = clearance
     for state, color, key, shift in styles[: laundry.sizes["state"]]:
         of_loads, of_laundry = states.smallest_gap[state].values, laundry.smallest_gap[state].item()
         gaps = SMALLEST_GAP.values([*of_loads, of_laundry])
