@@ -36,7 +36,7 @@ Simulate: TypeAlias = Callable[..., xr.Dataset]
 their runs: `Executor.simulate`, `run_here`, or another one in tests."""
 
 RunLabels: TypeAlias = Mapping[str, Sequence[Any]]
-"""RunLabels by the name of their dimension."""
+"""Labels by the name of their dimension."""
 
 
 @dataclass(frozen=True)
