@@ -139,8 +139,8 @@ def largest_of(case: xr.Dataset) -> xr.Dataset:
     Both are NaN if no motion is reachable.
     """
     at = case.amplitude.where(case.reachable, -np.inf).argmax("point")
-    found = case[["amplitude"]].isel(point=at).reset_coords("speed")
-    return found.where(case.reachable.any())
+    largest = case[["amplitude"]].isel(point=at).reset_coords("speed")
+    return largest.where(case.reachable.any())
 
 
 def peaks_of(case: xr.Dataset) -> xr.Dataset:
