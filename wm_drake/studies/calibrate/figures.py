@@ -9,11 +9,10 @@ import xarray as xr
 from wm_drake.engines.trajectory import COORDINATES
 from wm_drake.report import figure as fig
 from wm_drake.report.formatting import number
-from wm_drake.report.quantity import SPEED, quantity_of, shown
+from wm_drake.report.quantity import SPEED, quantity_of, shown, text_of
 from wm_drake.studies.calibrate.study import Calibration
 from wm_drake.studies.calibrate.targets import GASKET, case_title
-from wm_drake.studies.machine_show.description import Modes
-from wm_drake.studies.modes.quantities import FREQUENCY
+from wm_drake.studies.modes.shapes import ANGLE_ARM
 
 OTHER = "#8a8f98"
 """Colour of the errors of another model."""
@@ -24,8 +23,8 @@ SMALLEST_SHOWN = 0.05
 """Difference that an axis of differences reaches at least."""
 
 _SHAPE_ORDER = (3, 4, 5, 0, 1, 2)
-_SHAPE_WEIGHTS = np.array([0.25, 0.25, 0.25, 1.0, 1.0, 1.0])
-"""Weights of the components of a mode shape: angles are multiplied by 0.25 m, as in `Modes`."""
+_SHAPE_WEIGHTS = np.repeat([ANGLE_ARM, 1.0], 3)
+"""Weights of the components of a mode shape, as in `natural_modes`."""
 
 
 def errors_figure(differences: xr.DataArray) -> fig.Figure:
@@ -58,7 +57,7 @@ def errors_figure(differences: xr.DataArray) -> fig.Figure:
     return fig.Figure(panels=fig.in_grid(panels, 3, share="both"), height=150.0)
 
 
-def modes_figure(modes: Mapping[str, Modes]) -> fig.Figure:
+def modes_figure(modes: Mapping[str, xr.Dataset]) -> fig.Figure:
     """Return mode shapes as coloured tables: one row per mode, one column per direction of motion.
 
     Angles are multiplied by 0.25 m. The frequency is at the left of each row.
@@ -67,18 +66,18 @@ def modes_figure(modes: Mapping[str, Modes]) -> fig.Figure:
         modes: Modes of each state of the machine, by its title; they are drawn side by side.
     """
     scale = fig.Scale(low=-1.3, high=1.3, shades="RdBu")
-    count = max(len(state.frequency_hz) for state in modes.values())
+    count = max(state.sizes["mode"] for state in modes.values())
     plain = fig.Axis(has_grid=False, has_line=False)
     x = replace(plain, ticks=fig.named(COORDINATES[k] for k in _SHAPE_ORDER), range=(-0.5, 5.5))
     panels = []
     for title, state in modes.items():
-        shape = (state.shape * _SHAPE_WEIGHTS)[:, _SHAPE_ORDER]
+        shape = (state["shape"].values * _SHAPE_WEIGHTS)[:, _SHAPE_ORDER]
         marks: list[fig.Mark] = [fig.Cells(shape, range(6), range(len(shape)), scale=scale)]
         for (row, column), value in np.ndenumerate(shape):
             if abs(value) >= 0.1:
                 color = "#ffffff" if abs(value) > 0.75 else fig.MARK
                 marks.append(fig.Text(column, row, number(value), color=color))
-        labels = [f"{FREQUENCY.text(f)}, {SPEED.text(2.0 * np.pi * f)}" for f in state.frequency_hz]
+        labels = [f"{text_of(f)}, {SPEED.text(2.0 * np.pi * f)}" for f in state.frequency]
         y = replace(plain, ticks=fig.named(labels), range=(count - 0.5, -0.5))
         panels.append(fig.Panel(title=title, marks=tuple(marks), x=x, y=y))
     return fig.Figure(panels=fig.in_grid(panels, len(panels)), height=42.0 * count)

@@ -33,8 +33,6 @@ from wm_drake.studies.calibrate.solutions import BEYOND, LIMIT, sizes_text, solv
 from wm_drake.studies.calibrate.study import BEYOND_LIMIT, Calibration
 from wm_drake.studies.calibrate.targets import AMPLITUDE, GASKET, case_title
 from wm_drake.studies.fitting.page import correlations_part
-from wm_drake.studies.machine_show.description import Modes
-from wm_drake.studies.modes.quantities import FREQUENCY
 from wm_drake.studies.spin.figures import envelopes_figure
 
 
@@ -43,7 +41,7 @@ def calibrate_answer(
     predictions: Sequence[Prediction],
     machine: MachineParameters,
     records: Sequence[Record],
-    modes: Mapping[str, Modes],
+    modes: Mapping[str, xr.Dataset],
 ) -> Answer:
     """Return the answer of a calibration.
 
@@ -388,10 +386,9 @@ def _certainty(calibration: Calibration) -> Plot:
     )
 
 
-def _modes(modes: Mapping[str, Modes]) -> Plot:
+def _modes(modes: Mapping[str, xr.Dataset]) -> Plot:
     alternative = "; ".join(
-        f"{title}: {', '.join(map(FREQUENCY.number, shown.frequency_hz))} Hz"
-        for title, shown in modes.items()
+        f"{title}: {', '.join(map(text_of, state.frequency))}" for title, state in modes.items()
     )
     return Plot(
         modes_figure(modes),

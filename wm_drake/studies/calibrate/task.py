@@ -28,7 +28,7 @@ from wm_drake.studies.calibrate.study import RELATIVE_DEVIATION, SearchPlan, cal
 from wm_drake.studies.calibrate.targets import AMPLITUDE, MEASURED, Targets, targets_of
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import existing_file, pairs_of, with_measured
-from wm_drake.studies.machine_show.description import natural_modes
+from wm_drake.studies.modes.natural import natural_modes
 from wm_drake.studies.study import Task
 
 
