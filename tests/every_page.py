@@ -50,6 +50,7 @@ def _fit(template: str, bench: tuple[str, ...], *words: str) -> Kind:
 
 
 KINDS = {
+    "machine": _one("sections.html", "machine", "check", "ball_rings", "--page", "out/report.html"),
     "spin": _one("sections.html", "spin"),
     "spin_of_motor": _one("sections.html", "spin", "--machine", "motor", "--load", "middle", "--detail"),
     "spin_of_cabinet": _one("sections.html", "spin", "--machine", "light_cabinet", "--load", "middle"),
@@ -151,7 +152,7 @@ def _with_files(command: tuple[str, ...], folder: Path) -> list[str]:
             words.append(str(_write_recording(folder / "bench")))
         else:
             words.append(word)
-    return words if "--out" in words else [*words, "--out", "out"]
+    return words if {"--out", "--page"} & set(words) else [*words, "--out", "out"]
 
 
 def _write_recording(folder: Path) -> Path:
