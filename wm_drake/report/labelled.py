@@ -136,7 +136,7 @@ def _labels_first(frame: pd.DataFrame, data: xr.Dataset) -> Sequence[str]:
 
 
 def _in_reading_unit(array: xr.DataArray) -> xr.DataArray:
-    unit = quantity_of(array).unit
+    unit = quantity_of(array).reading
     if unit.si == unit.shown:
         return array
     return array.copy(data=quantity_of(array).values(array.values))
