@@ -121,7 +121,7 @@ class Answer(Result):
         chosen = [table for table in self.labelled().values() if table.is_in_terminal]
         facts = self.short.facts if self.short else ()
         return [
-            *(table.table().terminal(table.heading) for table in chosen),
+            *(table.terminal() for table in chosen),
             self.answer,
             *(f"{word}: {text}" for word, text in facts),
         ]
