@@ -52,9 +52,7 @@ def proposal_part(
                 "proposal",
                 proposal.drop_dims("changed").drop_vars(["is_confirmed", "line_to_copy"]),
                 "Before and after",
-                "Responses of the worst load, as it is and with the proposal. D, F and M are the "
-                "largest absolute displacement of the tub, force and moment of the gasket over the "
-                "run; seen from the door, x points right, y along the drum axis to the rear, z up.",
+                "Responses of the worst load, as it is and with the proposal.",
                 words=words,
             ),
             LabelledTable("changes", proposal[["value", "keys"]]),

@@ -112,11 +112,11 @@ def _short(designs: MachineDesigns, front: xr.Dataset, envelopes: xr.Dataset) ->
     is_made = PROPOSED in front.attrs["chosen"]
     command = f"wm-drake spin --machine {machine_file_name(PROPOSED)}" if is_made else ""
     aim = "gap" if GAP in [goal.name for goal in designs.objectives] else "desirability"
-    count, limit = front.sizes["design"], f"no objective by more than {SHARE.text(MOST_LOSS)}"
+    limit = f"no objective worse by more than {SHARE.text(MOST_LOSS)}"
     why = (
-        f"of the {count} designs of the front that raise {limit} it has the largest {aim}"
+        f"Of the designs of the front that make {limit}, it has the largest {aim}."
         if is_made
-        else f"no design of the front is clearly better and raises {limit}"
+        else f"No design of the front is clearly better and makes {limit}."
     )
     growth = _growth(envelopes, front.attrs["chosen"][PROPOSED]) if is_made else ""
     proposal = design_proposal(designs, front, command)

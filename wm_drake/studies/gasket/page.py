@@ -99,6 +99,7 @@ def gasket_answer(
             ("SDF model", Path(parameters.model).name),
             ("Loads", ", ".join(loads)),
             *_about_responses(screening),
+            ("Axes", "seen from the door, x points right, y along the drum axis to the rear, z up"),
             *_other_profile(trials),
             ("Parameters", "those of level 0 of all factors"),
         ),

@@ -81,20 +81,22 @@ NOT_ON_TERMINAL = (
 """Columns of the variance for which a terminal is too narrow."""
 
 
+TESTS_OF_MODEL = ("unexplained", "adjusted_r2", "predicted_r2")
+"""Variables that tell how well the model fits."""
+
+
 def _variance(screening: xr.Dataset, published: xr.Dataset) -> xr.Dataset:
     """Return the numbers of each response, with the published ones beside them if there are any."""
     data = screening[["mean"]]
-    for name in ("mean", "smallest", "largest", "main", "interaction"):
+    for name in ("mean", "main", "interaction", *TESTS_OF_MODEL, "smallest", "largest"):
         data[name] = screening[name]
-        if published and published[name].notnull().any():
+        if name in published and published[name].notnull().any():
             words = f"published {quantity_of(screening[name]).words}"
             data[f"published_{name}"] = named(published[name], words)
         if published and name == "mean":
             difference = mean_difference(screening, published)
             data["difference"] = CHANGE.named("difference").variable(difference.dims, difference)
             data["is_far"] = np.abs(difference) > FAR
-    for name in ("unexplained", "adjusted_r2", "predicted_r2"):
-        data[name] = screening[name]
     for name in ("deviation", "residual_deviation", "residual_df"):
         data[name] = screening[name].assign_attrs({HIDDEN: True})
     return data
@@ -120,12 +122,14 @@ def leading_table(screening: xr.Dataset, published: xr.Dataset, words: Words) ->
     Published numbers are beside ours; a term that was published is in the table although it is not
     among our leading terms.
     """
-    data = screening[["share", "effect"]]
-    data = data.assign(values=("term", [_values_text(t, words) for t in data.term.values.tolist()]))
+    terms = screening.term.values.tolist()
+    values = [words.values(term.split(":")[0]) for term in terms]
+    data = screening[["effect"]].assign(values=("term", values), share=screening.share)
     if published:
         data["published_share"] = named(published.share, "published contribution")
         data["published_effect"] = named(published.effect, "published effect")
         data["sign_differs"] = sign_differs(screening, published)
+    symbols = {term: term.replace(":", " × ") for term in terms}
     places = [
         (*label, term, other)
         for label in labels_of(screening)
@@ -154,7 +158,7 @@ def leading_table(screening: xr.Dataset, published: xr.Dataset, words: Words) ->
         caption,
         across="level",
         marked=("sign_differs", "alarm") if published else ("", ""),
-        words={**words.labels(), **LEVEL_WORDS},
+        words={**words.labels(), **symbols, **LEVEL_WORDS},
     )
 
 
@@ -165,11 +169,6 @@ def _shown_terms(screening: xr.Dataset, published: xr.Dataset, label: Label) -> 
         compared = at(compared_terms(published), label)
         terms += [t for t in compared.term.values[compared.values].tolist() if t not in terms]
     return terms
-
-
-def _values_text(term: str, words: Words) -> str:
-    """Return the physical values of the first factor of a term."""
-    return words.values(term.split(":")[0])
 
 
 def published_table(screening: xr.Dataset, published: xr.Dataset) -> LabelledTable:
