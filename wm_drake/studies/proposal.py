@@ -121,7 +121,7 @@ class Aim:
         most = float(gains.max())
         if not most >= LEAST_GAIN:
             return None
-        good = np.flatnonzero(gains >= (1.0 - SMALL_SHARE) * most)
+        good = np.flatnonzero(gains >= (1.0 - SMALL_SHARE) * most).tolist()
         return int(min(good, key=lambda number: (changes[number], -gains[number])))
 
 

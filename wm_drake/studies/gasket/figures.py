@@ -204,7 +204,7 @@ def main_effects_figure(
 
     def panel_of(of_label: xr.Dataset, name: str) -> fig.Panel:
         number_of_response, quantity = responses.index(name), quantity_of(of_label["mean"])
-        marks: list[fig.Mark] = [fig.Rule(shown(of_label["mean"]), "y", color=fig.QUIET)]
+        marks: list[fig.Mark] = [fig.Rule(float(shown(of_label["mean"])), "y", color=fig.QUIET)]
         means = quantity.values([mean_at(of_label, factor) for factor in names])
         strong = of_label.share.sel(term=names).values >= LEADING_MAIN
         gap = np.full((len(names), 1), np.nan)

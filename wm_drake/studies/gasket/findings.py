@@ -255,7 +255,7 @@ def level_zero_text(zero: xr.Dataset, words: Words) -> str:
 
 def _largest(difference: xr.DataArray) -> tuple[float, Label]:
     """Return the largest size of a difference, and where it is."""
-    sizes = np.abs(difference).fillna(0.0)
+    sizes = abs(difference.fillna(0.0))
     label = max(labels_of(sizes), key=lambda label: at(sizes, label).item())
     return at(sizes, label).item(), label
 

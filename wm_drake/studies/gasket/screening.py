@@ -164,8 +164,8 @@ def analyse(design: Design, runs: xr.Dataset) -> xr.Dataset:
                 where=f"load {load}",
             )
         frame = pd.DataFrame(values.values[good], columns=names)
-        of_load = anova(levels[good], frame, interactions=design.model != "main")
-        tables.append([of_load[name] for name in names])
+        by_response = anova(levels[good], frame, interactions=design.model != "main")
+        tables.append([by_response[name] for name in names])
         trials.append(good)
     screening = runs.assign(_of_runs(runs.value) | _of_tables(tables, runs.value.attrs["each"]))
     for name in ("fitted", "residual"):

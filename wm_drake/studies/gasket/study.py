@@ -174,5 +174,7 @@ def run_level_zero(
     for name in TABLES:
         difference = (zero[name] - zero[MACHINE]) / zero[MACHINE].where(zero[MACHINE] != 0.0)
         words = f"difference, tables {name}"
-        zero[f"{name}_difference"] = DIFFERENCE.named(words).variable(difference.dims, difference)
+        zero[f"{name}_difference"] = DIFFERENCE.named(words).variable(
+            ("load", "response"), difference
+        )
     return zero.drop_vars("trial", errors="ignore")

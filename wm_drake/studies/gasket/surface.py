@@ -115,7 +115,7 @@ def _inverses(screening: xr.Dataset, interactions: bool) -> FloatArray:
         if good.tobytes() not in known:
             rows = pd.DataFrame(design.levels[good], columns=list(design.factors))
             matrix = SumCoding(rows, interactions).matrix
-            known[good.tobytes()] = np.linalg.inv(matrix.T @ matrix)
+            known[good.tobytes()] = np.asarray(np.linalg.inv(matrix.T @ matrix), dtype=float)
         inverses.append(known[good.tobytes()])
     return np.array(inverses)
 

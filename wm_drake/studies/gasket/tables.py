@@ -95,7 +95,9 @@ def _variance(screening: xr.Dataset, published: xr.Dataset) -> xr.Dataset:
             data[f"published_{name}"] = named(published[name], words)
         if published and name == "mean":
             difference = mean_difference(screening, published)
-            data["difference"] = CHANGE.named("difference").variable(difference.dims, difference)
+            data["difference"] = CHANGE.named("difference").variable(
+                ("load", "response"), difference
+            )
             data["is_far"] = np.abs(difference) > FAR
     for name in ("deviation", "residual_deviation", "residual_df"):
         data[name] = screening[name].assign_attrs({HIDDEN: True})
@@ -174,14 +176,15 @@ def _shown_terms(screening: xr.Dataset, published: xr.Dataset, label: Label) -> 
 def published_table(screening: xr.Dataset, published: xr.Dataset) -> LabelledTable:
     """Return our numbers and the published ones of each term that was published, for a file."""
     known = compared_terms(published) & screening.effect.notnull()
-    signs = xr.where(sign_differs(screening, published), "yes", "").astype(object)
+    signs = sign_differs(screening, published)
+    texts = xr.DataArray(np.where(signs, "yes", "").astype(object), signs.coords, signs.dims)
     data = xr.Dataset(
         {
             "contribution": screening.share.where(known),
             "published_contribution": published.share.where(known),
             "effect": screening.effect.where(known),
             "published_effect": published.effect,
-            "sign_differs": signs.where(known),
+            "sign_differs": texts.where(known),
         }
     )
     return LabelledTable("published", data)
@@ -216,7 +219,7 @@ def run_tables(screening: xr.Dataset, trials: GasketTrials) -> tuple[LabelledTab
     plan = xr.Dataset({**levels, **physical_values(design, trials)}, {"trial": screening.trial})
     runs = plan.assign(
         value=screening.value,
-        touches=xr.where(touches, "yes", ""),
+        touches=(("load", "trial"), np.where(touches, "yes", "")),
         slack=screening.slack,
         failed=screening.failed,
     )

@@ -195,7 +195,7 @@ def _predicted(runs: xr.Dataset, responses: xr.Dataset) -> dict[str, xr.DataArra
     """Return what the models predict of each response with its worst load after the change."""
     place = {"load": responses.load_after, "response": responses.response}
     of_setting = runs[["predicted", "half_width"]].sel(setting=AFTER, drop=True).sel(place)
-    return {name: of_setting[name].drop_vars("load") for name in of_setting}
+    return {str(name): array.drop_vars("load") for name, array in of_setting.items()}
 
 
 def _factors(parameters: MachineParameters, options: GasketOptions) -> tuple[FactorLevels, ...]:
