@@ -36,8 +36,8 @@ def best_places(gap, displacement):
 
 
 @pytest.fixture(scope="module")
-def factors(earlier):
-    return levels_of(earlier, {n: f for n, f in load_factors(GASKET_FACTORS).items() if n in NAMES})
+def factors(sponges):
+    return levels_of(sponges, {n: f for n, f in load_factors(GASKET_FACTORS).items() if n in NAMES})
 
 
 def test_largest_gap_is_proposed_and_idle_factors_stay():
@@ -57,11 +57,11 @@ def test_nothing_is_proposed_where_level_zero_is_best():
     assert best is None
 
 
-def test_the_line_sets_what_was_run(earlier, factors):
+def test_the_line_sets_what_was_run(sponges, factors):
     damping, _, stiffness, _ = factors
-    assert sets_of(damping, text_at(earlier, damping, 1.0)[0]) == {"C_L": "0.0285 N*s/mm"}
-    text, place = text_at(earlier, stiffness, -0.5)
+    assert sets_of(damping, text_at(sponges, damping, 1.0)[0]) == {"C_L": "0.0285 N*s/mm"}
+    text, place = text_at(sponges, stiffness, -0.5)
     assert sets_of(stiffness, text) == {"K_Lx": "1.64 N/mm"}
     before, after = settings_of({"K_Lx": place}, factors)
     assert (before.places, after.places) == ((0.0,) * 4, (0.0, 0.0, place, 0.0))
-    assert is_level_zero(earlier, factors)
+    assert is_level_zero(sponges, factors)
