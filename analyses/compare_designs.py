@@ -19,6 +19,7 @@ from wm_drake import build_machine, load_machine, progress_bar, simulate_many
 from wm_drake.parameters import GASKET_FACTORS, SpinProfile, at_levels, levels_of, load_factors
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.doe.design import Design, make_design
+from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.gasket.screening import analyse
 from wm_drake.studies.gasket.study import LOADS, GasketTrials
 
@@ -72,10 +73,15 @@ def main() -> None:
     *_, (full, _) = made.values()
     begin = time.perf_counter()
     with progress_bar(full.trials * len(LOADS)) as progress:
-        runs = study.responses(
-            full,
-            lambda cases: simulate_many(machine, cases, measures=("extremes",), progress=progress),
+        experiment = Experiment(
+            machine,
+            ("extremes",),
+            lambda machine, measures, cases, _: simulate_many(
+                machine, cases, measures=measures, progress=progress
+            ),
+            tuple(study.loads),
         )
+        runs = study.responses(full, experiment)
     each_s = (time.perf_counter() - begin) / full.trials
     reference, rows = analyse(full, runs).share, []
     for name, (design, made_s) in made.items():

@@ -2,12 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 import xarray as xr
 
-from wm_drake.batch import simulate_many
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import (
     GASKET_FACTORS,
@@ -18,6 +16,7 @@ from wm_drake.parameters import (
 )
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.doe.design import make_design
+from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.gasket.screening import (
     is_main,
     leaders,
@@ -54,8 +53,8 @@ def screening_of(
     middle = at_levels(machine, levels, [0] * len(levels))
     cases = [Case(name, machine.loads[name], machine.profile) for name in loads]
     study = GasketTrials(middle, levels, cases, ["D", "F", "M"])
-    run = partial(simulate_many, build_machine(middle), measures=study.measures)
-    return run_screening(design, lambda plan: study.responses(plan, run))
+    experiment = Experiment(build_machine(middle), study.measures, loads=tuple(cases))
+    return run_screening(design, lambda plan: study.responses(plan, experiment))
 
 
 @dataclass(frozen=True)

@@ -132,9 +132,9 @@ def levels(screening):
     return levels_of(load_machine("reference"), {name: known[name] for name in names})
 
 
-def fake_run(parameters, cases):
+def fake_simulate(machine, _measures, cases, _what):
     """Return responses of a machine that has the gasket's force at 30 mm as its displacement."""
-    value = parameters.gasket.stiffness_x
+    value = machine.parameters.gasket.stiffness_x
     force = 0.03 * value if isinstance(value, float) else value.force[-1]
     shape = (len(cases), 3)
     values = np.full(shape, 1e-3 * force)
@@ -153,7 +153,7 @@ def test_level_zero_is_the_machine_if_tables_are_scaled(reference):
     every = {name: levels_of(machine, known, name) for name in TABLES}
     loads = [Case("middle", machine.loads["middle"], machine.profile)]
     trials = GasketTrials(machine, every["scaled"], loads, ["D"])
-    zero = at(run_level_zero(machine, every, trials, fake_run), ("middle", "Dx"))
+    zero = at(run_level_zero(machine, every, trials, fake_simulate), ("middle", "Dx"))
     assert zero.machine.item() == pytest.approx(1e-3 * machine.gasket.stiffness_x.force[-1])
     assert zero.scaled_difference.item() == 0.0
     slope = at_levels(machine, every["linear"], [0]).gasket.stiffness_x

@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+from made_up_runs import made_up
 
-from wm_drake.batch import simulate_many
 from wm_drake.errors import InputError
 from wm_drake.model.build import build_machine
 from wm_drake.model.scene import Scene
@@ -28,6 +28,7 @@ from wm_drake.simulation.measures.responses import chosen_responses, measures_of
 from wm_drake.simulation.runs import simulate
 from wm_drake.studies.doe.coding import level_matrix
 from wm_drake.studies.doe.design import Design, make_design, read_design
+from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.gasket.page import gasket_answer
 from wm_drake.studies.gasket.screening import at, leading, mean_at, run_screening, runs_of
 from wm_drake.studies.gasket.study import GasketTrials, responses_of
@@ -136,13 +137,13 @@ def test_cases_of_trials_have_their_levels(reference):
     trials = GasketTrials(middle, factors, loads)
     assert trials.measures == ("extremes", "gap", "spring tensions")
     design = Design("own", texts, level_matrix(2), "main")
-    responses = trials.responses(
-        design, lambda cases: simulate_many(machine, cases, measures=trials.measures)
-    )
+    experiment = Experiment(machine, trials.measures, loads=tuple(loads))
+    responses = trials.responses(design, experiment)
     assert responses["load"].values.tolist() == ["middle", "counter"]
     names = [letter + axis for letter in "DFM" for axis in "xyz"]
     assert responses.response.values.tolist() == [*names, "gap"]
-    heavy = list(trials.cases(design))[2 * 5]  # levels 0, 1: heavier, middle load
+    # levels 0, 1: heavier, middle load
+    heavy, _ = experiment.cases_of(at_levels(middle, factors, design.levels[5]), "")
     assert heavy.load.unbalances[0].mass == pytest.approx(1.2)
     measures = measure(simulate(machine, heavy), Scene(heavy.parameters))
     expected = [
@@ -166,8 +167,9 @@ def test_any_measure_can_be_a_response(machine, reference):
     names += ("turn_margin", "drive_mean_torque", "drive_speed_ripple", "drive_end_speed")
     chosen = chosen_responses(reference, profile, names)
     case = Case("middle", reference.loads["middle"], profile)
-    table = simulate_many(machine, [case], measures=measures_of(reference, chosen))
-    values = responses_of(table, ["middle"], chosen).value.sel(load="middle", trial=1)
+    experiment = Experiment(machine, measures_of(reference, chosen), loads=(case,))
+    table = experiment.at([""], [reference])
+    values = responses_of(table, chosen).value.sel(load="middle", trial=1)
     found = dict(zip(values.response.values.tolist(), shown(values), strict=True))
     assert found["gap"] == pytest.approx(1e3 * table.smallest_gap.item())
     assert found["amplitude_Xr"] == pytest.approx(1e3 * table.amplitude.sel(sensor="Xr").item())
@@ -210,7 +212,9 @@ def test_runs_that_touch_are_marked(reference):
         },
         {"run": range(4), "spring": ["left", "rear"]},
     )
-    runs = responses_of(table, ["one", "two"], chosen)
+    loads = [Case(name, reference.loads["middle"], SHORT) for name in ("one", "two")]
+    data = made_up(lambda _: table, reference, loads).at(["1", "2"], [reference] * 2)
+    runs = responses_of(data, chosen)
     assert runs.overlap.sel(load="two", trial=1) == -0.001
     assert runs.overlap.sel(load="one", trial=2) == 0.0
     assert int(runs.overlap.notnull().sum()) == 2

@@ -4,14 +4,14 @@ It computes the effects of stiffness and damping of the gasket on the displaceme
 the forces and moments of the gasket.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TypeAlias
 
 import numpy as np
 import xarray as xr
 
+from wm_drake.model.build import build_machine
 from wm_drake.parameters import TABLES, FactorLevels, MachineParameters, at_levels
 from wm_drake.parameters.units import Share
 from wm_drake.report.formatting import three_digits
@@ -19,7 +19,7 @@ from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.cases import Case, load_of
 from wm_drake.simulation.measures.responses import Response, chosen_responses, measures_of
 from wm_drake.studies.doe.design import Design
-from wm_drake.studies.executor import RunCases
+from wm_drake.studies.experiment import Experiment, Simulate, responses
 from wm_drake.studies.gasket.screening import VALUE, runs_of
 
 LOADS = ("middle", "counter")
@@ -58,73 +58,48 @@ class GasketTrials:
         """Measures of each run, as for `simulate_many`."""
         return measures_of(self.parameters, self.chosen)
 
-    def cases(self, design: Design) -> Iterator[Case]:
-        """Yield all runs: for each trial, one for each load."""
-        for number, levels in enumerate(design.levels, start=1):
-            changed = at_levels(self.parameters, self.factors, levels.tolist())
-            yield from self.cases_of(changed, f"trial {number}")
-
-    def cases_of(self, changed: MachineParameters, name: str) -> Iterator[Case]:
-        """Yield a case of each load for a changed machine."""
-        for case in self.loads:
-            load = load_of(case, self.parameters, changed)
-            yield Case(f"{case.name}, {name}", load, case.profile, parameters=changed)
-
-    def responses(self, design: Design, run: RunCases) -> xr.Dataset:
-        """Run all trials and return their responses, as of `screening.runs_of`."""
-        return self.of_table(run(self.cases(design)))
-
-    def of_table(self, table: xr.Dataset) -> xr.Dataset:
-        """Return the responses of a table of runs, as of `screening.runs_of`.
+    def responses(self, design: Design, experiment: Experiment) -> xr.Dataset:
+        """Run all trials and return their responses, as of `screening.runs_of`.
 
         Args:
-            table: Table of runs; the loads of one trial follow each other.
+            design: The trials.
+            experiment: Runs of the machine with the loads of the study.
         """
-        return responses_of(table, [case.name for case in self.loads], self.chosen)
+        names = [f"trial {number}" for number in range(1, design.trials + 1)]
+        machines = (
+            at_levels(self.parameters, self.factors, levels) for levels in design.levels.tolist()
+        )
+        return responses_of(experiment.at(names, machines), self.chosen)
 
 
-def responses_of(table: xr.Dataset, loads: Sequence[str], chosen: Sequence[Response]) -> xr.Dataset:
-    """Return the responses of a table of runs, as of `screening.runs_of`.
+def responses_of(data: xr.Dataset, chosen: Sequence[Response]) -> xr.Dataset:
+    """Return the responses of an experiment, as of `screening.runs_of`; a trial is a point.
 
     Args:
-        table: Table of runs; the loads of one trial follow each other.
+        data: As of `Experiment.at`.
+        chosen: The responses.
     """
-
-    def by_load(values: np.ndarray) -> np.ndarray:
-        return values.reshape(-1, len(loads)).T
-
-    reasons = by_load(table.diverged.values)
-    failed = reasons != ""
-    columns = {r.name: np.where(failed, np.nan, by_load(r.of_runs(table))) for r in chosen}
+    data = data.transpose("load", "point", ...)
+    values = responses(data, chosen)
     runs = runs_of(
         {
-            load: {name: c[number] for name, c in columns.items()}
-            for number, load in enumerate(loads)
+            load: {r.name: values[r.name].sel(load=load).values for r in chosen}
+            for load in data["load"].values.tolist()
         },
         {r.name: Quantity(r.title, r.unit, form=three_digits) for r in chosen},
         {r.name: r.better for r in chosen},
         {r.name: r.kind for r in chosen},
     )
-    runs["failed"][:] = reasons
+    runs["failed"][:] = data.diverged.values
     runs["about"][:] = [r.variable.about for r in chosen]
-    if "smallest_gap" in table:
-        gaps = by_load(table.smallest_gap.values)
-        runs.overlap[:] = np.where((gaps <= 0.0) & ~failed, gaps, np.nan)
-    runs["slack"][:] = np.where(failed, "", by_load(_slack(table)))
+    if "smallest_gap" in data:
+        gaps = data.smallest_gap.values
+        runs.overlap[:] = np.where(gaps <= 0.0, gaps, np.nan)
+    if "smallest_spring_tension" in data:
+        names, is_slack = data.spring.values, data.smallest_spring_tension.values == 0.0
+        runs["slack"][:] = [[", ".join(names[one]) for one in of_load] for of_load in is_slack]
     return runs
 
-
-def _slack(table: xr.Dataset) -> np.ndarray:
-    """Return the names of the springs that go slack in each run of a table. (runs,)"""
-    if "smallest_spring_tension" not in table:
-        return np.full(table.run.size, "", dtype=object)
-    names = np.array(list(map(str, table.spring.values)))
-    is_slack = table.smallest_spring_tension.values == 0.0
-    return np.array([", ".join(names[slack]) for slack in is_slack], dtype=object)
-
-
-RunMachine: TypeAlias = Callable[[MachineParameters, Sequence[Case]], xr.Dataset]
-"""Function that builds a machine, runs cases and returns their table, as `simulate_many` does."""
 
 MACHINE = "machine"
 """Name of the machine itself beside level 0."""
@@ -136,7 +111,7 @@ def run_level_zero(
     machine: MachineParameters,
     levels: Mapping[str, tuple[FactorLevels, ...]],
     trials: GasketTrials,
-    run: RunMachine,
+    simulate: Simulate,
 ) -> xr.Dataset:
     """Run the machine and level 0 of all factors with each treatment of tables.
 
@@ -145,7 +120,10 @@ def run_level_zero(
     machine where the table hardens.
 
     Args:
+        machine: The machine.
         levels: Levels of the factors by treatment of tables, all of `TABLES`.
+        trials: Loads and responses.
+        simulate: Function that runs cases.
 
     Returns:
         Over `load` and `response`: `machine`, `linear` and `scaled`, and the differences
@@ -160,13 +138,13 @@ def run_level_zero(
         variants[name] = at_levels(machine, levels[name], [0] * len(levels[name]))
     runs = []
     for name, parameters in variants.items():
-        cases = []
-        for case in trials.loads:
-            load = load_of(case, machine, parameters)
-            cases.append(Case(f"{case.name}, {name}", load, case.profile, case.gasket))
         # a table and a number are different structures, so each variant is built
-        runs.append(run(parameters, cases))
-    values, zero = trials.of_table(xr.concat(runs, "run")).value, xr.Dataset()
+        experiment = Experiment(build_machine(parameters), trials.measures, simulate)
+        loads = [replace(case, load=load_of(case, machine, parameters)) for case in trials.loads]
+        cases = [replace(case, name=f"{case.name}, {name}") for case in loads]
+        labels = {"point": [name], "load": [case.name for case in trials.loads]}
+        runs.append(experiment.over(labels, cases, "level 0"))
+    values, zero = responses_of(xr.concat(runs, "point"), trials.chosen).value, xr.Dataset()
     for number, name in enumerate(variants):
         zero[name] = values.isel(trial=number)
         words = name if name == MACHINE else f"level 0, tables {name}"

@@ -18,7 +18,7 @@ settings like those of the design, not for each single setting.
 """
 
 import itertools
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,10 +30,10 @@ from wm_drake.parameters import at_places
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report.formatting import three_digits
 from wm_drake.report.quantity import Quantity
-from wm_drake.simulation.cases import Case
 from wm_drake.studies.doe.anova import SumCoding
+from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.gasket.screening import MEAN, good_trials
-from wm_drake.studies.gasket.study import GasketTrials
+from wm_drake.studies.gasket.study import GasketTrials, responses_of
 
 CONFIDENCE = 0.95
 """Probability of the intervals."""
@@ -188,20 +188,28 @@ def run_settings(
     trials: GasketTrials,
     settings: Sequence[Setting],
     models: xr.Dataset,
-    run: Callable[[Iterable[Case]], xr.Dataset],
+    experiment: Experiment,
 ) -> xr.Dataset:
     """Run settings and return them with their predictions.
+
+    Args:
+        trials: Machine, factors and responses.
+        settings: The settings.
+        models: As of `models_of`.
+        experiment: Runs of the machine with some loads.
 
     Returns:
         Over `setting`, `load` and `response`: `predicted` and `half_width` as of `predicted`, NaN
         with a load that the models do not have; `run`, `difference` of both, and `is_inside`,
         whether the run lies in the interval.
     """
-    cases: list[Case] = []
-    for number, setting in enumerate(settings, start=1):
-        changed = at_places(trials.parameters, trials.factors, setting.places)
-        cases += trials.cases_of(changed, f"check {number}")
-    runs = trials.of_table(run(cases)).value.rename(trial="setting").transpose("setting", ...)
+    machines = (
+        at_places(trials.parameters, trials.factors, setting.places) for setting in settings
+    )
+    names = [f"check {number}" for number in range(1, len(settings) + 1)]
+    data = experiment.at(names, machines, "settings")
+    runs = responses_of(data, trials.chosen).value.rename(trial="setting")
+    runs = runs.transpose("setting", ...)
     return compared_with_models(models, settings, runs)
 
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +27,8 @@ from wm_drake.simulation.cases import Case, is_as_measured
 from wm_drake.studies.answer import Answer
 from wm_drake.studies.doe.coding import MODELS
 from wm_drake.studies.doe.design import DESIGNS, Design, make_design, read_design
-from wm_drake.studies.executor import Executor, RunCases
+from wm_drake.studies.executor import Executor
+from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.gasket.options import GasketOptions
 from wm_drake.studies.gasket.page import Comparisons, gasket_answer
 from wm_drake.studies.gasket.proposal import (
@@ -66,7 +66,6 @@ class GasketTask(Task):
         middle = at_levels(parameters, levels, [0] * len(levels))
         with problems_at("--response", ""):
             self.trials = GasketTrials(middle, levels, self.cases, options.response)
-            self.verified = replace(self.trials, loads=self._every_load())
         self.published, self.source = self._published()
 
     def _every_load(self) -> list[Case]:
@@ -107,52 +106,48 @@ class GasketTask(Task):
 
     def run(self, executor: Executor) -> Answer:
         """Run the trials, level 0 with each treatment of tables, and the settings to check."""
-        trials = self.trials
-        middle = build_machine(trials.parameters)
-        run = partial(executor.simulate, middle, trials.measures)
-        with executor.progress(self.design.trials * len(trials.loads)):
-            screening = run_screening(self.design, lambda design: trials.responses(design, run))
+        trials, machine = self.trials, build_machine(self.trials.parameters)
+        experiment = Experiment(machine, trials.measures, executor.simulate, tuple(self.cases))
+        with executor.progress(self.design.trials * len(self.cases)):
+            screening = run_screening(self.design, lambda d: trials.responses(d, experiment))
         models = models_of(screening)
         check, published = xr.Dataset(), xr.Dataset()
         if self.settings:
-            check = run_settings(trials, self.settings, models, partial(run, what="check"))
+            check = run_settings(trials, self.settings, models, experiment)
         if self.published:
             published = published_for(self.published, screening, self.source)
-        proposed, proposal = self._proposal(screening, models, partial(run, what="proposal"))
-        comparisons = Comparisons(published, self._level_zero(executor), check, proposed, proposal)
+        zero = self._level_zero(executor)
+        every_load = replace(experiment, loads=tuple(self._every_load()))
+        proposed, proposal = self._proposal(screening, models, every_load)
+        comparisons = Comparisons(published, zero, check, proposed, proposal)
         return gasket_answer(screening, models, trials, comparisons)
 
     def _level_zero(self, executor: Executor) -> xr.Dataset:
         """Run the machine and level 0 with each treatment of tables."""
-        trials, options = self.trials, self.options
-
-        def run(machine: MachineParameters, cases: Sequence[Case]) -> xr.Dataset:
-            built = build_machine(machine)
-            return executor.simulate(built, trials.measures, cases, "level 0")
-
+        options = self.options
         every = {
             name: _factors(self.parameters, options.model_copy(update={"tables": name}))
             for name in TABLES
         }
-        zero = run_level_zero(self.parameters, every, trials, run)
+        zero = run_level_zero(self.parameters, every, self.trials, executor.simulate)
         return zero.assign_attrs(tables=options.tables)
 
     def _proposal(
-        self, screening: xr.Dataset, models: xr.Dataset, run: RunCases
+        self, screening: xr.Dataset, models: xr.Dataset, experiment: Experiment
     ) -> tuple[xr.Dataset, xr.Dataset]:
         """Choose a setting on the fitted models, and run it and level 0 with all loads.
 
         Returns:
             The runs and the proposal, as of `page.Comparisons`.
         """
-        factors, parameters = self.verified.factors, self.parameters
+        factors, parameters = self.trials.factors, self.parameters
         candidates = Candidates(screening, models)
         places = candidates.best() or (0.0,) * len(factors)
         changed = [(f, x) for f, x in zip(factors, places, strict=True) if x]
         every = [(factor, *text_at(parameters, factor, place)) for factor, place in changed]
         chosen = [(factor, text, place) for factor, text, place in every if place]
         settings = settings_of({factor.name: place for factor, _, place in chosen}, factors)
-        runs = run_settings(self.verified, settings, models, run)
+        runs = run_settings(self.trials, settings, models, experiment)
         responses = compared(runs.run, candidates.aim.goals)
         confirmed = is_confirmed(candidates.aim, responses)
         words = Words(factors, screening)
