@@ -35,7 +35,7 @@ Simulate: TypeAlias = Callable[..., xr.Dataset]
 """Function of a built machine, names of measures, cases and a word for them, with the table of
 their runs: `Executor.simulate`, `run_here`, or another one in tests."""
 
-PlaceLabels: TypeAlias = Mapping[str, Sequence[Any]]
+RunLabels: TypeAlias = Mapping[str, Sequence[Any]]
 """Labels by the name of their dimension."""
 
 
@@ -82,11 +82,11 @@ class Experiment:
     simulate: Simulate = run_here
     loads: tuple[Case, ...] = ()
 
-    def over(self, labels: PlaceLabels, cases: Iterable[Case], what: str = "runs") -> xr.Dataset:
+    def over(self, labels: RunLabels, cases: Iterable[Case], what: str = "runs") -> xr.Dataset:
         """Run cases and return their measures over labelled dimensions.
 
         Args:
-            labels: Labels of each dimension.
+            labels: RunLabels of each dimension.
             cases: One for each combination of labels; the last dimension varies fastest. They
                 are taken one by one.
             what: Word beside the progress bar.
@@ -107,7 +107,7 @@ class Experiment:
         """Run all loads with changed machines and return their measures over `point` and `load`.
 
         Args:
-            points: Labels of the machines; the name of a case is that of its load and this label.
+            points: RunLabels of the machines; the name of a case is that of its load and this label.
             machines: The machines. They are taken one by one.
             what: Word beside the progress bar.
         """
@@ -139,25 +139,25 @@ class Experiment:
         return machines
 
 
-def placed(table: xr.Dataset, labels: PlaceLabels) -> xr.Dataset:
+def placed(table: xr.Dataset, labels: RunLabels) -> xr.Dataset:
     """Return a table of runs over labelled dimensions.
 
     Args:
         table: As of `wm_drake.simulate_many`.
-        labels: Labels of each dimension; the last one varies fastest over the runs.
+        labels: RunLabels of each dimension; the last one varies fastest over the runs.
 
     Returns:
         The measures in SI over these dimensions and their own ones, and `diverged`, when and why a
         run failed, "" if it did not.
     """
     shape = tuple(map(len, labels.values()))
-    without_runs = {name: c.variable for name, c in table.coords.items() if "run" not in c.dims}
+    coordinates = {name: c.variable for name, c in table.coords.items() if "run" not in c.dims}
     return xr.Dataset(
         {
             name: ((*labels, *v.dims[1:]), v.values.reshape(*shape, *v.shape[1:]), v.attrs)
             for name, v in table.data_vars.items()
         },
-        {**without_runs, **{name: list(values) for name, values in labels.items()}},
+        {**coordinates, **{name: list(values) for name, values in labels.items()}},
     )
 
 

@@ -19,7 +19,7 @@ from wm_drake.report.page import as_json, fragment
 from wm_drake.report.quantity import SPEED, Quantity
 from wm_drake.studies.answer import Answer, Part
 from wm_drake.studies.machine_show.description import Description, description_of
-from wm_drake.studies.machine_show.elements import Spring, Strut, TelescopicDamper
+from wm_drake.studies.machine_show.elements import Damper, Spring, Strut, TelescopicDamper
 from wm_drake.studies.modes.quantities import FREQUENCY
 
 MASS = Quantity("mass", Unit("kg", "kg"))
@@ -189,7 +189,8 @@ def _elements(shown: Description, tub: RigidTransform) -> Iterator[Thing]:
         tension = TENSION.text(spring.tension_at_rest)
         words = f"spring {name}: {_stiffness(spring)}, tension at rest {tension}"
         yield _thing("spring", name, words, [_between(spring, tub)])
-    for name, damper in (*shown.dampers.items(), *shown.telescopic_dampers.items()):
+    dampers: dict[str, Damper | TelescopicDamper] = {**shown.dampers, **shown.telescopic_dampers}
+    for name, damper in dampers.items():
         yield _thing("damper", name, f"damper {name}: {damper.law}", [_between(damper, tub)])
     for name, bushing in shown.bushings.items():
         lines = _mark(tub @ np.array(bushing.tub_point_T), 3.0 * MARK_ARM)

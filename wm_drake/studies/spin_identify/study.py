@@ -324,7 +324,8 @@ def identified_machine(model: SpinModel, fit: Fit, *, is_virtual: bool) -> Machi
 def _problem(model: SpinModel, measured: xr.DataArray) -> FitProblem:
     """Return the fit problem, whose residuals are those of [A] Eq. (9).
 
-    Each value is divided by the norm of the measured values in its case and region.
+    Each value is divided by the norm of the measured values in its case and region. Its error is a
+    part of the value, so each has a variance of its own.
     """
     is_measured = np.isfinite(measured.values)
     data = np.where(is_measured, measured.values, 0.0)
@@ -341,7 +342,7 @@ def _problem(model: SpinModel, measured: xr.DataArray) -> FitProblem:
         return [(values[..., k, :, :, :] * weights[k])[..., is_measured[k]] for k in with_data]
 
     tests = tuple(
-        Measurement(f"case {model.cases[k].name}", numbers)
+        Measurement(f"case {model.cases[k].name}", numbers, heteroscedastic=True)
         for k, numbers in zip(with_data, scaled(data), strict=True)
     )
     unknowns = tuple(s.unknown for s in model.sought)
