@@ -40,6 +40,17 @@ SIGNS: Mapping[Better, float] = {"smaller": 1.0, "larger": -1.0}
 """Sign of a response with which less is better, by which change is an improvement."""
 
 
+def worst_of(values: FloatArray, goals: Mapping[str, Better]) -> FloatArray:
+    """Return each response of its worst load; NaN if a run failed. (..., responses)
+
+    Args:
+        values: Responses of the runs. (..., loads, responses)
+        goals: Which change of each response is an improvement.
+    """
+    signs = np.array([SIGNS[goal] for goal in goals.values()])
+    return np.asarray(signs * (signs * values).max(axis=-2))
+
+
 @dataclass(frozen=True)
 class Aim:
     """What a proposed candidate shall reach.

@@ -19,7 +19,7 @@ from wm_drake.report.formatting import significant
 from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.measures.kind import Better
 from wm_drake.studies.gasket.surface import Setting, model_rows
-from wm_drake.studies.proposal import AFTER, BEFORE, SIGNS, Aim
+from wm_drake.studies.proposal import AFTER, BEFORE, Aim, worst_of
 
 MOST_GRID = 20_000
 """Largest number of level combinations that are tried; of more, a random part is."""
@@ -48,11 +48,10 @@ class Candidates:
         """
         goals, self._models = goals_of(screening), models
         self._count = len(models.factors)
-        # (response, load, column)
-        coefficients = models.coefficient.sel(response=list(goals)).transpose("response", ...)
-        self._coefficients = [(SIGNS[goal], of_loads) for goal, of_loads in zip(
-            goals.values(), coefficients.values, strict=True
-        )]  # fmt: skip
+        coefficients = models.coefficient.sel(response=list(goals))
+        self._shape = (-1, *coefficients.shape[:2])
+        self._coefficients = coefficients.values.reshape(-1, models.sizes["column"]).T
+        self._goals = goals
         runs = screening.value.sel(response=list(goals)).values.reshape(-1, len(goals))
         self.aim = Aim(goals, runs, self._worst(np.zeros((1, self._count)))[0])
 
@@ -71,11 +70,7 @@ class Candidates:
     def _worst(self, places: FloatArray) -> FloatArray:
         """Return the responses of the worst load at settings (n, factors). (n, responses)"""
         rows = model_rows(places, interactions=self._models.interactions)
-        columns = [
-            sign * np.max([sign * (rows @ c) for c in of_loads], axis=0)
-            for sign, of_loads in self._coefficients
-        ]
-        return np.stack(columns, axis=-1) if columns else np.empty((len(places), 0))
+        return worst_of((rows @ self._coefficients).reshape(self._shape), self._goals)
 
     def _value(self, places: FloatArray) -> FloatArray:
         return self.aim.value(self._worst(places))
