@@ -243,11 +243,20 @@ def _sags(elements: PlacedElements) -> bool:
 
 def _is_far(elements: PlacedElements, pose: FloatArray) -> bool:
     """Return whether a pose is too far from the drawn one, or not finite."""
-    largest = (_LARGEST_REST_ANGLE, _LARGEST_REST_POSITION)
-    if _sags(elements):
-        largest = (_LARGEST_SAG_ANGLE, _LARGEST_SAG)
+    largest = largest_rest(sags=_sags(elements))
     near = np.abs(pose[:3]).max() <= largest[0] and np.abs(pose[3:]).max() <= largest[1]
     return not near
+
+
+def largest_rest(*, sags: bool) -> tuple[float, float]:
+    """Return the largest angle and displacement of a rest pose from the drawn one. [rad, m]
+
+    Args:
+        sags: Whether preloads are given, so that the tub rests away from its drawn pose.
+    """
+    if sags:
+        return _LARGEST_SAG_ANGLE, _LARGEST_SAG
+    return _LARGEST_REST_ANGLE, _LARGEST_REST_POSITION
 
 
 def _is_at_rest(
