@@ -11,8 +11,8 @@ ledger, workers or cluster with retries, progress, and the check of the step.
 
 Machines and cases are made one by one when they are run, so that 100,000 of them take the memory of
 their results. Cases that are no product of points and loads go to `Experiment.over`, with the
-labels of any dimensions; what needs the motion itself, such as an envelope, to `Experiment.records`.
-`placed` alone keeps what was measured of a run until it failed.
+labels of any dimensions; what needs the motion itself, such as an envelope, to
+`Experiment.records`. `placed` alone keeps what was measured of a run until it failed.
 """
 
 import math
