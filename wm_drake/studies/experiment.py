@@ -39,8 +39,8 @@ Simulate: TypeAlias = Callable[..., xr.Dataset]
 """Function of a built machine, names of measures, cases and a word for them, with the table of
 their runs: `Executor.simulate`, `run_here`, or another one in tests."""
 
-RunLabels: TypeAlias = Mapping[str, Sequence[Any]]
-"""RunLabels by the name of their dimension."""
+PlaceLabels: TypeAlias = Mapping[str, Sequence[Any]]
+"""Labels by the name of their dimension."""
 
 
 @dataclass(frozen=True)
@@ -101,11 +101,11 @@ class Experiment:
     loads: tuple[Case, ...] = ()
     record: Callable[..., None] = record_here
 
-    def over(self, labels: RunLabels, cases: Iterable[Case], what: str = "runs") -> xr.Dataset:
+    def over(self, labels: PlaceLabels, cases: Iterable[Case], what: str = "runs") -> xr.Dataset:
         """Run cases and return their measures over labelled dimensions.
 
         Args:
-            labels: RunLabels of each dimension.
+            labels: PlaceLabels of each dimension.
             cases: One for each combination of labels; the last dimension varies fastest. They
                 are taken one by one.
             what: Word beside the progress bar.
@@ -136,7 +136,7 @@ class Experiment:
 
     def records(
         self,
-        labels: RunLabels,
+        labels: PlaceLabels,
         cases: Iterable[Case],
         measure: Callable[[Record], FloatArray],
         size: int,
@@ -188,25 +188,25 @@ class Experiment:
         return machines
 
 
-def placed(table: xr.Dataset, labels: RunLabels) -> xr.Dataset:
+def placed(table: xr.Dataset, labels: PlaceLabels) -> xr.Dataset:
     """Return a table of runs over labelled dimensions.
 
     Args:
         table: As of `wm_drake.simulate_many`.
-        labels: RunLabels of each dimension; the last one varies fastest over the runs.
+        labels: PlaceLabels of each dimension; the last one varies fastest over the runs.
 
     Returns:
         The measures in SI over these dimensions and their own ones, and `diverged`, when and why a
         run failed, "" if it did not.
     """
     shape = tuple(map(len, labels.values()))
-    coordinates = {name: c.variable for name, c in table.coords.items() if "run" not in c.dims}
+    without_runs = {name: c.variable for name, c in table.coords.items() if "run" not in c.dims}
     return xr.Dataset(
         {
             name: ((*labels, *v.dims[1:]), v.values.reshape(*shape, *v.shape[1:]), v.attrs)
             for name, v in table.data_vars.items()
         },
-        {**coordinates, **{name: list(values) for name, values in labels.items()}},
+        {**without_runs, **{name: list(values) for name, values in labels.items()}},
     )
 
 

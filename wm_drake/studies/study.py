@@ -131,9 +131,10 @@ class Facts:
     def rows(self) -> list[tuple[str, str]]:
         """Return the facts as pairs of word and text, for the end of a page."""
         from wm_drake.batch import sources_version
+        from wm_drake.report.quantity import STEP
         from wm_drake.simulation.records import versions
 
-        step = f"{1e3 * self.step:g} ms, integrator {self.integrator}"
+        step = f"{STEP.text(self.step)}, integrator {self.integrator}"
         return [
             *([("Largest step", step)] if self.step else []),
             *([("Check of the step", self.verified)] if self.verified else []),

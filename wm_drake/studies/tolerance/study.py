@@ -264,7 +264,7 @@ class ToleranceTrials:
             "probability_lower": ("95 % from", ends[1]),
             "probability_upper": ("to", ends[2]),
         }
-        data = xr.Dataset(
+        pairs = xr.Dataset(
             {
                 **{name: SHARE.named(w).variable((), v) for name, (w, v) in named.items()},
                 "method": ((), method),
@@ -275,9 +275,9 @@ class ToleranceTrials:
             {"pair": samples["pair"].values},
             {"samples": samples.sizes["sample"]},
         )
-        seen = data.touches + data.nearest + data.get("rare_touches", 0.0) > 0.0
-        order = np.lexsort((-data.nearest.values, -data.touches.values))
-        return data.isel(pair=order[seen.values[order]])
+        seen = pairs.touches + pairs.nearest + pairs.get("rare_touches", 0.0) > 0.0
+        order = np.lexsort((-pairs.nearest.values, -pairs.touches.values))
+        return pairs.isel(pair=order[seen.values[order]])
 
     def gaps_of_loads(self) -> xr.DataArray:
         """Return the smallest gap of each load of the machine over `load`. [m]"""

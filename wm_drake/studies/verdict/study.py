@@ -183,10 +183,10 @@ def laundry_of(samples: Sequence[xr.Dataset], clearance: float) -> xr.Dataset:
 
 def worst_of(question: VerdictQuestion, states: xr.Dataset) -> xr.Dataset:
     """Return the smallest gap and the largest other responses of all loads, over `state`. [SI]"""
-    values = responses(states, question.responses)
+    numbers = responses(states, question.responses)
     return xr.Dataset(
         {
-            r.name: (values[r.name].min if r.name == GAP else values[r.name].max)(
+            r.name: (numbers[r.name].min if r.name == GAP else numbers[r.name].max)(
                 "load", keep_attrs=True
             )
             for r in question.responses
