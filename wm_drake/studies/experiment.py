@@ -105,7 +105,7 @@ class Experiment:
         """Run cases and return their measures over labelled dimensions.
 
         Args:
-            labels: PlaceLabels of each dimension.
+            labels: Labels of each dimension.
             cases: One for each combination of labels; the last dimension varies fastest. They
                 are taken one by one.
             what: Word beside the progress bar.
@@ -193,7 +193,7 @@ def placed(table: xr.Dataset, labels: PlaceLabels) -> xr.Dataset:
 
     Args:
         table: As of `wm_drake.simulate_many`.
-        labels: PlaceLabels of each dimension; the last one varies fastest over the runs.
+        labels: Labels of each dimension; the last one varies fastest over the runs.
 
     Returns:
         The measures in SI over these dimensions and their own ones, and `diverged`, when and why a

@@ -264,19 +264,6 @@ def laundry_of(samples: Sequence[xr.Dataset], clearance: float) -> xr.Dataset:
     return data.assign(gap=gap).assign_coords(state=states)
 
 
-def worst_of(question: VerdictQuestion, states: xr.Dataset) -> xr.Dataset:
-    """Return the smallest gap and the largest other responses of all loads, over `state`. [SI]"""
-    numbers = responses(states, question.responses)
-    return xr.Dataset(
-        {
-            r.name: (numbers[r.name].min if r.name == GAP else numbers[r.name].max)(
-                "load", keep_attrs=True
-            )
-            for r in question.responses
-        }
-    )
-
-
 def _text(parameters: MachineParameters, key: str, factor: float) -> str:
     """Return a multiple of a number as the text that `--set` takes, so that it is what is run."""
     if isinstance(value_at(parameters, key), CurveTable):
