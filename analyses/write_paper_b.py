@@ -206,9 +206,10 @@ def damping_line(machine: MachineParameters, is_quick: bool) -> list[str]:
             found = calibrate(PointRunner(built, ledger), free, targets, plan)
     best, known = found.solutions[0], found.parameter_map
     misses = float(np.sqrt(np.nanmean(np.log1p(best.errors) ** 2)))
-    spread = np.sqrt(np.diag(best.posterior.covariance(misses / DEVIATION)))
+    spread = np.sqrt(np.diag(best.posterior.spread_matrix(misses / DEVIATION)))
     spread = known.in_units(spread * known.deviation)
-    values = zip(known.in_units(best.point), spread, known.units, strict=True)
+    units = (unknown.unit.shown for unknown in known.unknowns)
+    values = zip(known.in_units(best.point), spread, units, strict=True)
     cells = [
         f"{value:.3g} ± {float(f'{deviation:.1g}'):g} {unit}" for value, deviation, unit in values
     ]

@@ -167,7 +167,7 @@ def held_out_table_rows(table: pd.DataFrame, studies: pd.DataFrame) -> list[Row]
     """Return rows for tables of [B] that were held out of the fit and predicted.
 
     Args:
-        table: Table from `wm_drake.studies.calibrate.tables.prediction_table`.
+        table: Table from `wm_drake.studies.calibrate.results.predictions_of`.
         studies: Agreement of the gasket study of each held-out load, fitted and predicted, with the
             columns held_out, fit, responses and same_leading_factor.
     """

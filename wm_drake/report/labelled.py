@@ -165,7 +165,7 @@ def _dims_of(data: xr.Dataset) -> list[Hashable]:
 
 
 def _in_reading_unit(array: xr.DataArray) -> xr.DataArray:
-    unit = quantity_of(array).unit
+    unit = quantity_of(array).reading
     if array.dtype.kind not in NUMBERS or (unit.si == unit.shown and units_of(array) is None):
         return array
     return array.copy(data=shown(array))

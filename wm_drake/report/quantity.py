@@ -14,6 +14,7 @@ import numpy as np
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import PureNumber, Unit
 from wm_drake.report.formatting import MISSING, number, significant
+from wm_drake.report.reading import finer_decimals, reading_unit
 
 if TYPE_CHECKING:  # slow to import, and not needed for declarations
     import xarray as xr
@@ -47,9 +48,14 @@ class Quantity:
     form: Callable[[float], str] | None = None
 
     @property
+    def reading(self) -> Unit:
+        """Unit in which it is read."""
+        return reading_unit(self.unit)
+
+    @property
     def unit_text(self) -> str:
         """Unit for reading, without line breaks: `N m`."""
-        return self.unit.label.replace(" ", "\u00a0")
+        return self.reading.label.replace(" ", "\u00a0")
 
     @property
     def label(self) -> str:
@@ -59,7 +65,7 @@ class Quantity:
     @property
     def suffix(self) -> str:
         """End of names in files: `_mm`, `_N_per_mm`; "" without a unit."""
-        text = self.unit.shown.replace("*", "").replace("/", "_per_").replace("%", "percent")
+        text = self.reading.shown.replace("*", "").replace("/", "_per_").replace("%", "percent")
         return f"_{text.replace('^', '')}" if text else ""
 
     def named(self, words: str) -> "Quantity":
@@ -68,11 +74,11 @@ class Quantity:
 
     def values(self, array: Any) -> FloatArray:
         """Return SI values in the unit for reading."""
-        return np.asarray(array, dtype=float) * self.unit.from_si(1.0)
+        return np.asarray(array, dtype=float) * self.reading.from_si(1.0)
 
     def to_si(self, values: Any) -> FloatArray:
         """Return values in the unit for reading as SI values."""
-        return np.asarray(values, dtype=float) / self.unit.from_si(1.0)
+        return np.asarray(values, dtype=float) / self.reading.from_si(1.0)
 
     def number(self, value: Any) -> str:
         """Return an SI value as text without its unit; NaN and infinity become a dash."""
@@ -81,11 +87,16 @@ class Quantity:
             return MISSING
         if self.form is not None:
             return self.form(shown)
-        return significant(shown) if self.decimals is None else number(shown, self.decimals)
+        decimals = self._decimals
+        return significant(shown) if decimals is None else number(shown, decimals)
 
     def text(self, value: Any) -> str:
         """Return an SI value as text with its unit."""
-        return f"{self.number(value)} {self.unit.label}".rstrip()
+        return f"{self.number(value)} {self.reading.label}".rstrip()
+
+    @property
+    def _decimals(self) -> int | None:
+        return None if self.decimals is None else finer_decimals(self.unit, self.decimals)
 
     def variable(self, dims: str | Sequence[str], values: Any) -> "xr.Variable":
         """Return values in SI as a variable that carries this quantity."""
@@ -129,7 +140,7 @@ class Quantity:
         """Return the column of a table, with its words or others."""
         from wm_drake.report.table import Column  # slow to import: pandas
 
-        return Column(words or self.words, self.unit_text, self.decimals, self.form)
+        return Column(words or self.words, self.unit_text, self._decimals, self.form)
 
 
 def quantity_of(array: "xr.DataArray") -> Quantity:

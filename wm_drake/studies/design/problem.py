@@ -224,7 +224,7 @@ class MachineDesigns:
         """Return the cases whose histories represent a design: all loads, or the median sample."""
         if self.scattered is None or self.scores is None:
             return self.runs_of(parameters, name)
-        return self.scattered(parameters).cases(np.zeros((1, self.scores.shape[1])))
+        return list(self.scattered(parameters).cases(np.zeros((1, self.scores.shape[1]))))
 
     def evaluate(
         self, designs: FloatArray, experiment: Experiment

@@ -1,9 +1,9 @@
 """The design study: search, chosen designs, check of robust designs, envelopes of the front."""
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -13,7 +13,6 @@ from wm_drake.parameters.tolerances import fraction
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.report.quantity import TIME, Quantity
-from wm_drake.simulation.cases import Case
 from wm_drake.simulation.displacements import envelopes
 from wm_drake.simulation.measures.kind import Better
 from wm_drake.simulation.records import Record, sample_period
@@ -237,32 +236,33 @@ def summary_of(goal: DesignGoal, values: FloatArray) -> Percentile:
     return Percentile(value, estimate.lower, estimate.upper)
 
 
-Histories: TypeAlias = Callable[[Sequence[Case], Callable[[int, Record], None]], None]
-"""Function that runs cases and calls its second argument with number and record of each."""
-
 INTERVALS = 120
 """Number of intervals of time, each with the largest value of an envelope in it."""
 
 
-def front_envelopes(designs: MachineDesigns, front: xr.Dataset, histories: Histories) -> xr.Dataset:
+def front_envelopes(
+    designs: MachineDesigns, front: xr.Dataset, experiment: Experiment
+) -> xr.Dataset:
     """Return the envelopes of the filtered displacements, the largest over the loads of a design.
 
     Returns:
         Over `sensor` and `time`, the middle of each interval [s]: `envelope` over `design` too, and
-        `nominal`, that of the machine itself [m]. NaN behind the end of a run that failed.
+        `nominal`, that of the machine itself [m]. NaN if its runs failed.
     """
     points = [*front.place.values, designs.nominal()]
     runs = [designs.shown_runs(designs.machine_at(p), f"{i}") for i, p in enumerate(points, 1)]
-    owners = [number for number, cases in enumerate(runs) for _ in cases]
+    labels = {"design": range(len(runs)), "scenario": range(len(runs[0]))}
+    cases = [case for of_design in runs for case in of_design]
+    duration = max(case.profile.duration for case in cases)
     sensors = list(designs.parameters.sensors)
-    largest = np.full((len(points), len(sensors), INTERVALS), np.nan)
-    duration = max(case.profile.duration for cases in runs for case in cases)
-
-    def add(number: int, record: Record) -> None:
-        owner = owners[number]
-        largest[owner] = np.fmax(largest[owner], envelope_of(record, duration))
-
-    histories([case for cases in runs for case in cases], add)
+    values = experiment.records(
+        labels,
+        cases,
+        lambda record: envelope_of(record, duration).ravel(),
+        len(sensors) * INTERVALS,
+        "envelopes of the front",
+    )
+    largest = np.fmax.reduce(values, axis=1).reshape(len(points), len(sensors), INTERVALS)
     time = (np.arange(INTERVALS) + 0.5) * duration / INTERVALS
     return xr.Dataset(
         {
