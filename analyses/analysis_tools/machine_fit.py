@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from calibrate_reference import ADAMS_PLAN, REFERENCE, adams_targets
+from calibrate_reference import PLAN, REFERENCE, adams_targets
 
 from analysis_tools.goals import changes_of, printed_changes
 from wm_drake.batch.ledger import open_ledger
@@ -39,11 +39,11 @@ def fitted_point(
     reference = load_machine(REFERENCE)
     targets = adams_targets(reference)
     parameter_map = parameter_map_of(machine, free)
-    identity = identity_of(machine, free, targets, ADAMS_PLAN)
+    identity = identity_of(machine, free, targets, PLAN)
     with open_ledger(ledger_path, identity, resume=True) as ledger:
         values = PointRunner(machine, ledger, workers=1).values(parameter_map, targets)
         problem = _with_changes(
-            calibration_problem(values, ADAMS_PLAN), values, printed_changes(reference, targets)
+            calibration_problem(values, PLAN), values, printed_changes(reference, targets)
         )
         search = Search(problem, _report)
         end = least_squares_search(search, problem.coordinates_of(start), iterations)
