@@ -16,9 +16,8 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.calibrate.computed import Evaluation, PointRunner
 from wm_drake.studies.calibrate.parameter_map import ParameterMap, parameter_map_of
 from wm_drake.studies.calibrate.study import calibration_problem, identity_of
-from wm_drake.studies.fitting.kinks import least_squares_search
 from wm_drake.studies.fitting.problem import PriorProblem, Residuals
-from wm_drake.studies.fitting.search import Search
+from wm_drake.studies.fitting.search import Search, descended
 
 CHANGE_DEVIATION = 0.06
 """Standard deviation of a change by the gasket, of the logarithm of its ratio."""
@@ -46,7 +45,7 @@ def fitted_point(
             calibration_problem(values, PLAN), values, printed_changes(reference, targets)
         )
         search = Search(problem, _report)
-        end = least_squares_search(search, problem.coordinates_of(start), iterations)
+        end = descended(search, problem.coordinates_of(start), iterations)
         return problem.points_at(end.point)
 
 
