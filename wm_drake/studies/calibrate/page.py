@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import machine_yaml
@@ -29,7 +30,7 @@ from wm_drake.studies.calibrate.tables import (
     response_table,
     responses_shown,
 )
-from wm_drake.studies.machine_show.description import Modes, natural_modes
+from wm_drake.studies.modes.natural import natural_modes
 from wm_drake.studies.spin import tables
 from wm_drake.studies.spin.figures import envelopes_figure
 from wm_drake.studies.spin.study import ComparedCases, SpinRuns, band_text, run_spin
@@ -126,7 +127,7 @@ def calibration_page(result: CalibrateResult, facts: Facts) -> str:
 
 
 def drawn_page(
-    result: CalibrateResult, best: SpinRuns, modes: Sequence[tuple[str, Modes]], facts: Facts
+    result: CalibrateResult, best: SpinRuns, modes: Sequence[tuple[str, xr.Dataset]], facts: Facts
 ) -> str:
     """Return the page with computed runs.
 
@@ -152,7 +153,7 @@ def drawn_page(
 def _picture_sections(
     result: CalibrateResult,
     best: SpinRuns,
-    modes: Sequence[tuple[str, Modes]],
+    modes: Sequence[tuple[str, xr.Dataset]],
     table: pd.DataFrame,
 ) -> list[Section]:
     calibration = result.calibration
@@ -447,14 +448,14 @@ def _quantities_picture(calibration: Calibration) -> Picture:
     return picture(quantities_figure(calibration), "The numbers are in the table below.", caption)
 
 
-def _modes_picture(modes: Sequence[tuple[str, Modes]]) -> Picture:
+def _modes_picture(modes: Sequence[tuple[str, xr.Dataset]]) -> Picture:
     caption = (
         "Rigid-body modes of the empty tub without dampers and with the drum at rest: natural "
         "frequency, drum speed of the same frequency, and mode shape. Angles are multiplied by "
         "0.25 m. The largest component of each shape is 1."
     )
     alternative = "; ".join(
-        f"{title}: {', '.join(number(f, 2) for f in shown.frequency_hz)} Hz"
+        f"{title}: {', '.join(number(f, 2) for f in shown.frequency.values)} Hz"
         for title, shown in modes
     )
     return picture(modes_figure(modes), f"Natural frequencies {alternative}.", caption)
