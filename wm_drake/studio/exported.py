@@ -99,12 +99,14 @@ def export_page(
     out: str | Path,
     loads: Sequence[str] = (),
     given: str = "",
+    sets: Sequence[str] = (),
 ) -> ExportedPage:
     """Write a machine as one HTML file that runs it.
 
     Args:
         given: Name or path of the machine at the command line, for the commands that the page
             writes; its name if empty.
+        sets: Changes of that machine in these parameters, as `--set` has them.
         out: File to write; it is replaced if it exists.
         loads: Names of the loads that run; all if empty.
 
@@ -123,7 +125,7 @@ def export_page(
     path = Path(out)
     _check_place(path)
     notice_jumping_friction(parameters)
-    data = page_data(parameters) | {"given": given or parameters.name}
+    data = page_data(parameters) | {"given": given or parameters.name, "sets": [*sets]}
     text = _page(data)
     _write(path, text)
     numbers = data["machine"]["numbers"]
