@@ -24,7 +24,7 @@ class LoopUnits:
 
     @property
     def unit(self) -> str:
-        """Unit of the motion."""
+        """Return the unit of the motion."""
         return self.displacement.unit.label
 
     @property
@@ -34,12 +34,12 @@ class LoopUnits:
 
     @property
     def force(self) -> str:
-        """Name of the force."""
+        """Return the name of the force."""
         return self.load.words
 
     @property
     def force_unit(self) -> str:
-        """Unit of the force."""
+        """Return the unit of the force."""
         return self.load.unit.label
 
     @property
@@ -49,7 +49,7 @@ class LoopUnits:
 
     @property
     def in_heads(self) -> str:
-        """Unit of the force in the names of columns of files."""
+        """Return the unit of the force in the names of columns of files."""
         return self.load.suffix.removeprefix("_")
 
     def over(self, abscissa: str) -> Quantity:
