@@ -111,9 +111,9 @@ def quantity_of(name: str) -> dict[str, Any]:
     return {key: entry[key] for key in ("bounds", "prior", "source")}
 
 
-def free_of(law: str) -> FreeFile:
-    """Return the free quantities of the reference machine with the numbers of a law."""
-    tree = read_yaml(FREE)
+def free_tree_of(law: str) -> dict[str, Any]:
+    """Return the free file of the reference machine with the numbers of a law, as a tree."""
+    tree: dict[str, Any] = read_yaml(FREE)
     quantities = tree["quantities"]
     del quantities[VELOCITY]
     if law not in DASHPOT:
@@ -121,7 +121,12 @@ def free_of(law: str) -> FreeFile:
     quantities["damper_friction"]["bounds"] = FRICTION
     for name in NUMBERS[law]:
         quantities[name] = quantity_of(name) | {"sets": {f"{KEY}.{name}": 1}}
-    return FreeFile.model_validate(tree)
+    return tree
+
+
+def free_of(law: str) -> FreeFile:
+    """Return the free quantities of the reference machine with the numbers of a law."""
+    return FreeFile.model_validate(free_tree_of(law))
 
 
 def row_of(law: str, best: Solution) -> dict[str, Any]:

@@ -39,6 +39,7 @@ NOT_RUN = {  # beginning of a command, and why this test does not run it
     "python analyses/": "tests/analyses runs it with --quick",
     "sphinx-build": "builds the manual: .ci/run",
     "wm-drake export fmu": "compiles for a minute: tests/export",
+    "wm-drake export page": "compiles for a minute: tests/browser",
     "wm-drake studio": "serves until it is stopped: tests/studio",
     "wm-drake study gasket --cluster": "needs a cluster: tests/batch/test_cluster.py and a tutorial",
     "wm-drake study tolerance laundry_and_parts": "minutes: as laundry",

@@ -9,9 +9,10 @@ import typer
 from wm_drake.cli.common import JsonOption
 from wm_drake.cli.components import group_of
 from wm_drake.report.terminal import Console
+from wm_drake.studies.compare.options import COMPARE
 from wm_drake.studies.orders.options import ORDERS
 
-app = group_of((ORDERS,))
+app = group_of((COMPARE, ORDERS))
 
 
 @app.command("channels")

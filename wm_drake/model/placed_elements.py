@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 
-from wm_drake.elements.bearing import DRUM_BEARING
+from wm_drake.elements.bearing import DRUM_BEARING, DrumBearingParameters
 from wm_drake.elements.bushing import SixComponentBushingParameters, packed_bushing_law
 from wm_drake.elements.damper_law import packed_damper_law
 from wm_drake.elements.friction_damper import FRICTION_DAMPER_STRUT, FrictionDamperParameters
@@ -33,7 +33,7 @@ from wm_drake.elements.state_map import (
     tubes_part,
 )
 from wm_drake.elements.telescopic_damper import TelescopicDamperParameters
-from wm_drake.errors import input_error
+from wm_drake.errors import input_error, problems_inside
 from wm_drake.model.bodies import drawn_pose
 from wm_drake.model.frame_poses import FramePoses
 from wm_drake.model.state_layout import StateLayout
@@ -69,7 +69,7 @@ class PlacedElements:
     dampers: dict[str, FrictionDamperParameters]
     bushings: dict[str, SixComponentBushingParameters]
     telescopes: dict[str, TelescopicDamperParameters]
-    bearing: SixComponentBushingParameters | None
+    bearing: DrumBearingParameters | None
     others: dict[str, PlacedElement]
 
     def without_gasket(self) -> "PlacedElements":
@@ -331,7 +331,8 @@ def _placed(poses: FramePoses, key: str, kind: ElementKind | None, parts: Sequen
             f"they must be more than {1e3 * SHORTEST_STRUT:g} mm apart",
             key=key,
         )
-    return kind.place(ends, *parts)
+    with problems_inside(key):
+        return kind.place(ends, *parts)
 
 
 def _telescopes(
@@ -359,9 +360,7 @@ def _telescopes(
     return placed
 
 
-def _bearing(
-    plant: MultibodyPlant, parameters: MachineParameters
-) -> SixComponentBushingParameters | None:
+def _bearing(plant: MultibodyPlant, parameters: MachineParameters) -> DrumBearingParameters | None:
     """Place the compliant bearing between tub and drum carrier; return None if it is rigid.
 
     The tub is its ground side.
@@ -377,6 +376,13 @@ def _bearing(
     x = across - (across @ axis) * axis
     x /= np.linalg.norm(x)
     rotation = np.column_stack([x, axis, np.cross(x, axis)])
-    return SixComponentBushingParameters(
-        point, rotation, point, rotation, packed_bushing_law(bearing.as_bushing())
+    return DrumBearingParameters(
+        point,
+        rotation,
+        point,
+        rotation,
+        packed_bushing_law(bearing.as_bushing()),
+        clearance=bearing.clearance,
+        contact_stiffness=bearing.contact_stiffness or 0.0,
+        contact_damping=bearing.contact_damping,
     )

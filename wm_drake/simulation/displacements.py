@@ -74,17 +74,29 @@ def filtered_lanes(
             filters often can use the same memory again.
     """
     groups, rows, _ = signals.shape
-    padding = min(round(PADDING_PERIODS / band[0] / period), rows - 1)
-    if padding <= 6 * FILTER_ORDER + 3:  # the padding that sosfiltfilt chooses by default
+    padding = padding_of(rows, period, band)
+    if not padding:
         return np.full(signals.shape, np.nan)
     answer, work = array("filtered", rows * groups), array("filter", rows + 2 * padding)
-    sections = _band_pass(period, band)
+    sections = band_pass(period, band)
     filter_both_ways(signals.ravel(), (rows, groups), *sections, padding, work, answer)
     return answer.reshape(signals.shape)
 
 
+def padding_of(rows: int, period: float, band: tuple[float, float]) -> int:
+    """Return by how many samples signals are mirrored at both ends; 0 if too few to be filtered.
+
+    Args:
+        rows: Number of samples.
+        period, band: As for `filtered`.
+    """
+    padding = min(round(PADDING_PERIODS / band[0] / period), rows - 1)
+    # the padding that sosfiltfilt chooses by default
+    return padding if padding > 6 * FILTER_ORDER + 3 else 0
+
+
 @functools.cache
-def _band_pass(period: float, band: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+def band_pass(period: float, band: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
     """Return the sections of the filter, and their states at a constant signal, flat."""
 
     def designed() -> bytes:

@@ -84,7 +84,7 @@ class Answer(Result):
         warned: Sentences on what a reader must know before the answer, in a box at the top and on
             the terminal.
         short: Part in a box between the answer and the contents. Its facts are also printed.
-        diverged: A line for each run that diverged.
+        diverged: A line for each run that diverged, or another reason for exit code 1.
         script: Script of the page, beside that of the pictures.
     """
 
@@ -157,7 +157,7 @@ class Answer(Result):
         return self.warned
 
     def failures(self) -> tuple[str, ...]:
-        """Return a line for each run that diverged."""
+        """Return the lines for which the exit code is 1."""
         return self.diverged
 
 

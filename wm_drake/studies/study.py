@@ -20,9 +20,9 @@ A study has four parts, as in `studies/drive`:
 
 Each imports only those above it.
 
-A task gets an `Executor` and calls it for tables of runs, as often as it needs: once for a plain
-study, many times for an adaptive one. So optimisers of libraries and bisections are written as
-plain functions, and tests can pass any other function of the same form.
+A task gets an `Executor` and makes an `Experiment` with it (`wm_drake.studies.experiment`), which
+it calls as often as it needs: once for a plain study, many times for an adaptive one. So optimisers
+of libraries and bisections are written as plain functions, and tests make up the runs.
 """
 
 import pkgutil

@@ -278,6 +278,25 @@ def test_correlated_samples_claim_less():
     assert 4.0 < widths[True] / widths[False] < 9.0  # root of 40 samples that move together
 
 
+def coverage_of_line(heteroscedastic, repeats=300):
+    """Return how often the interval of a slope holds it, with an error of 2 % of each value."""
+    x = np.geomspace(0.02, 2.0, 60)  # a few large values, which determine the slope
+    rng, hits = np.random.default_rng(8), 0
+    for _ in range(repeats):
+        values = 1.5 * x * (1.0 + 0.02 * rng.standard_normal(x.size))
+        test = Measurement("line", values, heteroscedastic=heteroscedastic)
+        problem = FitProblem((Unknown("slope", 1.0, 2.0),), (test,), lambda points: points * x)
+        slope = float(values @ x / (x @ x))
+        fit = assess(problem, problem.coordinates_of(np.array([slope])), SearchLog("by hand"))
+        hits += fit["slope"].lower <= 1.5 <= fit["slope"].upper
+    return hits / repeats
+
+
+def test_errors_that_grow_with_the_values_widen_the_interval_so_that_it_holds():
+    assert 0.92 < coverage_of_line(heteroscedastic=True) < 0.98
+    assert coverage_of_line(heteroscedastic=False) < 0.85
+
+
 def test_correlation_time_of_white_noise_is_one():
     assert correlation_time(np.random.default_rng(1).normal(size=4000)) == pytest.approx(
         1.0, abs=0.05

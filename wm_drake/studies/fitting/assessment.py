@@ -51,7 +51,8 @@ def assess(problem: FitProblem, point: FloatArray, log: SearchLog) -> Fit:
 
     The covariance is the sandwich of generalised least squares: each test has its own variance,
     larger by the correlation of its samples where they follow each other. So a densely sampled test
-    does not count for more than it contains. An interval that would leave the bounds ends by its
+    does not count for more than it contains. Values with errors of different size have a variance
+    each (`Measurement.heteroscedastic`). An interval that would leave the bounds ends by its
     profile (`wm_drake.studies.fitting.profile`).
 
     Args:
@@ -267,8 +268,9 @@ def _variances(problem: FitProblem, residuals: FloatArray, jacobian: FloatArray)
     """Return the variance of each scaled residual (n,).
 
     Samples of one test have a variance of their own; its degrees of freedom are less by its
-    baseline and by its share of the unknowns (its leverages). Values that are no samples share one
-    variance.
+    baseline and by its share of the unknowns (its leverages). Of heteroscedastic values each has
+    the square of its residual over 1 - leverage: HC3 of MacKinnon and White, Journal of
+    Econometrics 29 (1985) 305-325. Other values share one variance.
     """
     leverage = np.sum(np.square(np.linalg.svd(jacobian, full_matrices=False)[0]), axis=1)
     pooled = float(np.sum(np.square(residuals))) / max(
@@ -277,11 +279,13 @@ def _variances(problem: FitProblem, residuals: FloatArray, jacobian: FloatArray)
     parts = []
     for where, m in zip(problem.slices, problem.measurements, strict=True):
         series = residuals[where]
-        variance = pooled
+        variance = np.full(len(series), pooled)
         if m.correlated:
             freedom = max(len(series) - m.basis.shape[1] - float(np.sum(leverage[where])), 1e-12)
-            variance = float(np.sum(np.square(series))) / freedom * correlation_time(series)
-        parts.append(np.full(len(series), variance))
+            variance[:] = float(np.sum(np.square(series))) / freedom * correlation_time(series)
+        elif m.heteroscedastic:
+            variance = np.square(series / np.maximum(1.0 - leverage[where], 1e-6))
+        parts.append(variance)
     return np.concatenate(parts)
 
 

@@ -235,6 +235,8 @@ class Measurement:
         scale: Expected error, by which residuals are divided before tests are put together.
         correlated: Whether errors of neighbouring values are correlated (samples over time), which
             widens the intervals.
+        heteroscedastic: Whether each value has an error of its own size, for example a part of the
+            value. Large values then do not count for more than their errors allow.
     """
 
     name: str
@@ -242,6 +244,7 @@ class Measurement:
     baseline: FloatArray | None = None
     scale: float = 1.0
     correlated: bool = False
+    heteroscedastic: bool = False
 
     @property
     def largest(self) -> float:

@@ -26,7 +26,7 @@ from wm_drake.parameters.units import Share, Unit
 from wm_drake.parameters.variation import number_at, range_of
 from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.cases import Case
-from wm_drake.studies.executor import RunCases
+from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.fitting.fit import Fit
 from wm_drake.studies.fitting.methods import least_squares
 from wm_drake.studies.fitting.problem import FitProblem, Measurement, Progress, Unknown
@@ -180,11 +180,11 @@ def planted_values(sought: Sequence[Sought], seed: int) -> FloatArray:
 class SpinModel:
     """RMS displacements of unbalance cases as a function of the unknowns."""
 
+    experiment: Experiment
     parameters: MachineParameters
     profile: SpinProfile
     cases: tuple[UnbalanceCase, ...]
     sought: tuple[Sought, ...]
-    regions: RunCases
 
     def displacements(self, points: FloatArray) -> FloatArray:
         """Compute the RMS displacements at points.
@@ -195,11 +195,9 @@ class SpinModel:
         Returns:
             (k, case, region, accelerometer, axis); NaN where a run diverged. [m]
         """
-        labels = labels_of(self.parameters, self.cases, self.profile)
-        table = self.regions(self._runs(points))
-        return table.region_displacement.values.reshape(
-            len(points), *(len(labels[dim]) for dim in DIMS)
-        )
+        labels = {"point": range(len(points)), "case": [case.name for case in self.cases]}
+        runs = self.experiment.over(labels, self._runs(points))
+        return np.asarray(runs.region_displacement.values)
 
     def _runs(self, points: FloatArray) -> Iterator[Case]:
         for point in points:
@@ -326,7 +324,8 @@ def identified_machine(model: SpinModel, fit: Fit, *, is_virtual: bool) -> Machi
 def _problem(model: SpinModel, measured: xr.DataArray) -> FitProblem:
     """Return the fit problem, whose residuals are those of [A] Eq. (9).
 
-    Each value is divided by the norm of the measured values in its case and region.
+    Each value is divided by the norm of the measured values in its case and region. Its error is a
+    part of the value, so each has a variance of its own.
     """
     is_measured = np.isfinite(measured.values)
     data = np.where(is_measured, measured.values, 0.0)
@@ -343,7 +342,7 @@ def _problem(model: SpinModel, measured: xr.DataArray) -> FitProblem:
         return [(values[..., k, :, :, :] * weights[k])[..., is_measured[k]] for k in with_data]
 
     tests = tuple(
-        Measurement(f"case {model.cases[k].name}", numbers)
+        Measurement(f"case {model.cases[k].name}", numbers, heteroscedastic=True)
         for k, numbers in zip(with_data, scaled(data), strict=True)
     )
     unknowns = tuple(s.unknown for s in model.sought)
