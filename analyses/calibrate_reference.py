@@ -204,7 +204,7 @@ def _study_table(predictions: list[Prediction]) -> pd.DataFrame:
         for fit, solution in fits.items() if loads else ():
             machine = solved_machine(solution)
             screening = screening_of(machine, loads=loads)
-            published = published_for(published_results(machine.published), screening.tables)
+            published = published_for(published_results(machine.published), screening)
             row = {"held_out": " ".join(loads), "fit": fit}
             rows.append(row | agreement(screening, published).row())
     return pd.DataFrame(rows)

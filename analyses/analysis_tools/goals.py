@@ -51,9 +51,7 @@ def goals_of(machine: MachineParameters, reference: MachineParameters) -> dict[s
     without = errors[~has_gasket][targets.amplitude[~has_gasket] > TINY]
     signs = (changes_of(targets, amplitude) * printed_changes(reference, targets) > 0.0).sum()
     screening = screening_of(machine)
-    study = agreement(
-        screening, published_for(published_results(reference.published), screening.tables)
-    )
+    study = agreement(screening, published_for(published_results(reference.published), screening))
     reached = [
         f"{study.leaders} of {study.responses}",
         f"{EFFECTS - study.other_signs} of {EFFECTS}",

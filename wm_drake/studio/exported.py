@@ -8,6 +8,7 @@ import base64
 import hashlib
 import html
 import json
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ from typing import Any
 
 from wm_drake.compiler.kept import kept
 from wm_drake.engines.compiled.multistep import STEPS_BEFORE
+from wm_drake.engines.compiled.stepping import LARGEST_TURN
 from wm_drake.errors import check_known, input_error, reason_of
 from wm_drake.export.page_kernel import page_kernel
 from wm_drake.export.page_model import (
@@ -35,8 +37,9 @@ from wm_drake.parameters.spin import SAMPLES_OF_TURN
 from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import shape_name
 from wm_drake.report.provenance import program
+from wm_drake.simulation.band import PADDING_PERIODS
 from wm_drake.simulation.cases import notice_jumping_friction
-from wm_drake.simulation.displacements import REPLAY_SPAN, padding_of
+from wm_drake.simulation.displacements import LEAST_PADDING, REPLAY_SPAN
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.mounts import mount_names
 from wm_drake.studies.spin.figures import LONGEST_ORBIT, ORBIT_REVOLUTIONS, have_one_orbit
@@ -96,12 +99,14 @@ def export_page(
     out: str | Path,
     loads: Sequence[str] = (),
     given: str = "",
+    sets: Sequence[str] = (),
 ) -> ExportedPage:
     """Write a machine as one HTML file that runs it.
 
     Args:
         given: Name or path of the machine at the command line, for the commands that the page
             writes; its name if empty.
+        sets: Changes of that machine in these parameters, as `--set` has them.
         out: File to write; it is replaced if it exists.
         loads: Names of the loads that run; all if empty.
 
@@ -120,7 +125,7 @@ def export_page(
     path = Path(out)
     _check_place(path)
     notice_jumping_friction(parameters)
-    data = page_data(parameters) | {"given": given or parameters.name}
+    data = page_data(parameters) | {"given": given or parameters.name, "sets": [*sets]}
     text = _page(data)
     _write(path, text)
     numbers = data["machine"]["numbers"]
@@ -157,7 +162,6 @@ def _page_data(parameters: MachineParameters) -> dict[str, Any]:
     model = without_wrong(model, functions["wm_set_up"].ctypes, contents, candidates)
     code = {name: function.inspect_llvm() for name, function in functions.items()}
     elements, count = model.plan.elements, model.plan.count
-    rows = round(profile.duration / contents.period) + 1
     return {
         "program": program(),
         "tree": machine_tree(parameters),
@@ -169,14 +173,16 @@ def _page_data(parameters: MachineParameters) -> dict[str, Any]:
             "constants": _finite(model.constants.tolist()),
             "places": model.places,
             "sample": elements.begins.size + elements.begins.rates,
-            "padding": padding_of(rows, contents.period, contents.band),
+            "padding": round(PADDING_PERIODS / contents.band[0] / contents.period),
+            "leastPadding": LEAST_PADDING,
+            "fastest": (1.0 + 1e-9) * 2.0 * math.pi / (SAMPLES_OF_TURN * contents.period),
             "stepping": {
                 "integrator": model.stepping.integrator,
                 "step": model.stepping.step,
-                "outputPeriod": parameters.output_period,
+                "period": contents.period,
+                "largestTurn": LARGEST_TURN,
                 "control": contents.layout.control_period,
                 "stepsBefore": STEPS_BEFORE,
-                "samplesOfTurn": SAMPLES_OF_TURN,
             },
         },
         "wasm": base64.b64encode(wasm_module(code)).decode(),
@@ -210,7 +216,7 @@ def _candidates(opened: OpenMachine) -> Candidates:
 def _machine(
     opened: OpenMachine, places: Mapping[str, int], refused: Mapping[str, str]
 ) -> dict[str, Any]:
-    """Return the machine as the page of the studio gets it; each number with its units and limits."""
+    """Return the machine as the studio has it; each number also with its units and limits."""
     machine = opened.for_page()
     numbers: Any = machine["numbers"]
     labels: dict[str, dict[str, float]] = {}
@@ -226,7 +232,9 @@ def _machine(
             "table" if slider.number.is_table else "entry" if slider.is_entry else "number"
         )
         number["least"], number["most"] = _limits(slider)
-        runs = key in places or re.fullmatch(r"loads\..*\.unbalances\.\d+\.\w+|profile\.(time|speed)\.\d+", key)
+        runs = key in places or re.fullmatch(
+            r"loads\..*\.unbalances\.\d+\.\w+|profile\.(time|speed)\.\d+", key
+        )
         if not runs and not number["needs"]:
             number["needs"], number["fixed"] = refused.get(key, AS_EXPORTED), True
         if number["needs"]:
@@ -322,7 +330,9 @@ def bundled(first: str, replaced: Mapping[str, str]) -> str:
         for _, imported in _IMPORT.findall(text):
             add(imported)
         names = _EXPORT.findall(text)
-        text = _IMPORT.sub(lambda m: f"const {{{m[1].replace(' as ', ': ')}}} = modules.{m[2]};", text)
+        text = _IMPORT.sub(
+            lambda m: f"const {{{m[1].replace(' as ', ': ')}}} = modules.{m[2]};", text
+        )
         order[name] = f"{{\n{_EXPORT.sub('', text)}\nmodules.{name} = {{{', '.join(names)}}};\n}}\n"
 
     add(first)
@@ -338,11 +348,9 @@ def _page(data: Mapping[str, Any]) -> str:
     script = "\n" + bundled("main", {"server": "page_engine"})
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     policy = html.escape(POLICY.format(hash=f"sha256-{digest}"))
-    head = (
-        f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n<style>{style}</style>'
-    )
+    head = f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n<style>{style}</style>'
     text = re.sub(r'<link rel="stylesheet".*?>', lambda _: head, template)
-    text = re.sub(r'<(\w+)[^>]* data-of="server".*?</\1 data-end>', "", text, flags=re.DOTALL)
+    text = text.replace("<h1>wm-drake studio</h1>", "<h1>wm-drake</h1>")
     text = re.sub(r"<script type=\"module\".*?</script>\n", "", text)
     body = (
         f'<script type="application/json" id="machine-data">{_in_html(content)}</script>\n'
