@@ -35,8 +35,8 @@ from wm_drake.studies.identify.options import (
     IdentifyOptions,
 )
 from wm_drake.studies.identify.page import fit_answer
-from wm_drake.studies.identify.static_task import IdentifyStaticTask
 from wm_drake.studies.identify.problem import motion_sentences
+from wm_drake.studies.identify.static_task import IdentifyStaticTask
 from wm_drake.studies.inputs import pairs_of, quantities_of
 from wm_drake.studies.rig.study import DRIVEN_MASS, SPONGE_MASS
 from wm_drake.studies.study import Task
