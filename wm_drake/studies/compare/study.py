@@ -72,9 +72,13 @@ def in_pieces(signals: FloatArray, change: Signals) -> FloatArray:
     return changed
 
 
-def band_passed(pair: Pair) -> FloatArray:
-    """Return measured and predicted signals within the pass band of the run. (2, n, k)"""
-    return np.stack([in_pieces(s, partial(_passed, pair=pair)) for s in pair.both])
+def band_passed(pair: Pair, sides: slice = slice(None)) -> FloatArray:
+    """Return measured and predicted signals within the pass band of the run. (2, n, k)
+
+    Args:
+        sides: Which of both.
+    """
+    return np.stack([in_pieces(s, partial(_passed, pair=pair)) for s in pair.both[sides]])
 
 
 def envelopes_of(signals: FloatArray, time: FloatArray) -> FloatArray:
