@@ -5,7 +5,7 @@ variable (page, terminal, file, axis, sentence) takes words, unit and digits fro
 nothing else converts a number or spells a unit.
 """
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +24,10 @@ if TYPE_CHECKING:  # slow to import, and not needed for declarations
 NO_UNIT = PureNumber()
 HIDDEN = "is_hidden"
 """Attribute of a variable that files and JSON have, and page and terminal leave out."""
+
+ALONG, EACH = "along", "each"
+"""Attributes of a variable with several quantities: the coordinate that tells which, and the
+quantity of each of its labels."""
 
 
 @dataclass(frozen=True)
@@ -106,6 +110,25 @@ class Quantity:
         variable.attrs[HIDDEN] = True
         return variable
 
+    def of_each(
+        self,
+        along: str,
+        each: Mapping[str, "Quantity"],
+        dims: str | Sequence[str],
+        values: Any,
+    ) -> "xr.Variable":
+        """Return values in SI as a variable whose unit differs along a coordinate.
+
+        Args:
+            along: The coordinate, such as that of the responses of a study.
+            each: Quantity of each of its labels.
+            dims: Dimensions of the values.
+            values: The values. [SI]
+        """
+        variable = self.variable(dims, values)
+        variable.attrs |= {ALONG: along, EACH: each}
+        return variable
+
     def attributes(self) -> dict[Hashable, Any]:
         """Return the attributes of a variable that carries this quantity.
 
@@ -123,9 +146,13 @@ class Quantity:
 def quantity_of(array: "xr.DataArray") -> Quantity:
     """Return the quantity that a variable carries.
 
-    A variable of a table of runs has that of its measure; any other is a pure number with the words
-    of its name.
+    A variable with several quantities has that of its label, once one is selected. A variable of a
+    table of runs has that of its measure; any other is a pure number with the words of its name.
     """
+    label = array.coords.get(array.attrs.get(ALONG, ""))
+    if label is not None and not label.ndim:
+        of_label: Quantity = array.attrs[EACH][str(label.item())]
+        return of_label
     if "quantity" in array.attrs:
         quantity: Quantity = array.attrs["quantity"]
         return quantity
@@ -140,9 +167,33 @@ def _of_measures() -> dict[str, Quantity]:
     return {v.name: Quantity(v.kind, v.unit, v.studio) for v in variables}
 
 
+def named(array: "xr.DataArray", words: str) -> "xr.DataArray":
+    """Return a variable with other words."""
+    quantity: Quantity = array.attrs["quantity"]
+    return array.assign_attrs(quantity.named(words).attributes())
+
+
 def shown(array: "xr.DataArray") -> FloatArray:
     """Return the values of a variable in its unit for reading, for a mark of a figure."""
-    return quantity_of(array).values(array.values)
+    each = units_of(array)
+    if each is None:
+        return quantity_of(array).values(array.values)
+    dim, quantities = each
+    factors = [float(quantity.values(1.0)) for quantity in quantities]
+    place = array.dims.index(dim)
+    at_end = np.moveaxis(np.asarray(array.values, dtype=float), place, -1)
+    return np.moveaxis(at_end * factors, -1, place)
+
+
+def units_of(array: "xr.DataArray") -> "tuple[Hashable, list[Quantity]] | None":
+    """Return the dimension along which the unit of a variable differs, and the quantities there.
+
+    It is None if the variable has one unit.
+    """
+    labels = array.coords.get(array.attrs.get(ALONG, ""))
+    if labels is None or not labels.ndim:
+        return None
+    return labels.dims[0], [array.attrs[EACH][str(label)] for label in labels.values]
 
 
 def text_of(array: "xr.DataArray") -> str:

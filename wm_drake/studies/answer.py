@@ -128,7 +128,7 @@ class Answer(Result):
         chosen = [table for table in self.labelled().values() if table.is_in_terminal]
         facts = self.short.facts if self.short else ()
         with read_in(self.units):
-            shown = [table.table().terminal(table.heading) for table in chosen]
+            shown = [table.terminal() for table in chosen]
         return [
             *shown,
             self.answer,

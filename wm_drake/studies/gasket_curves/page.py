@@ -29,9 +29,9 @@ from wm_drake.studies.gasket_curves.study import (
     curves_data,
     values_data,
 )
-from wm_drake.studies.rig.units import LINEAR, units_of
+from wm_drake.studies.rig.quantities import LINEAR, loop_quantities
 
-PLACE = LINEAR.displacement
+PLACE = LINEAR["displacement"]
 LARGEST_STRETCH = Quantity("largest stretch", decimals=2)
 PREFIXES = {False: "", True: "rotational_"}
 """Beginning of the names of tables, by whether their curves are about an axis."""
@@ -118,7 +118,7 @@ def curves_answer(
 
 def _warnings_of(checked: Checked, has_contact: bool) -> Iterable[str]:
     name, rotates = checked.curve.motion.name, checked.curve.motion.rotates
-    motion = units_of(rotates).displacement
+    motion = loop_quantities(rotates)["displacement"]
 
     def listed(values: FloatArray) -> str:
         numbers = [motion.number(value) for value in values if np.isfinite(value)]
@@ -182,7 +182,7 @@ def summary(curves: dict[str, Checked], numbers: xr.Dataset) -> str:
     """Return the result in a few sentences."""
     slopes = []
     for motion in (RADIAL, AXIAL, TWIST, TILT):
-        stiffness = units_of(motion.rotates).stiffness.unit
+        stiffness = loop_quantities(motion.rotates)["stiffness"].unit
         slope = curves[motion.name].curve.table.nominal_stiffness
         slopes.append(f"{motion.name} {reading_unit(stiffness).reading(slope, 3)}")
     largest = max(max(c.begin.stretch, c.end.stretch) for c in curves.values())
@@ -259,8 +259,8 @@ def curves_figure(curves: dict[str, Curve]) -> fig.Figure:
     """Draw force over displacement and moment over angle, with the slope of the first 20 %."""
     panels = []
     for name, curve in curves.items():
-        units, table = units_of(curve.motion.rotates), curve.table
-        motion = units.displacement
+        quantities, table = loop_quantities(curve.motion.rotates), curve.table
+        motion = quantities["displacement"]
         finer = np.linspace(curve.values[0], curve.values[-1], 121)
         slope = fig.Line(
             motion.values(finer),
@@ -275,7 +275,7 @@ def curves_figure(curves: dict[str, Curve]) -> fig.Figure:
         x, y = motion.values(curve.values), curve.wrench()
         points = fig.Line(x, y, width=0.0, symbol="circle", key="equilibria")
         marks: tuple[fig.Mark, ...] = (fig.Rule(0.0, color=fig.QUIET), slope, between, points)
-        x_axis, y_axis = fig.Axis(label=motion.label), fig.Axis(label=units.load.label)
+        x_axis, y_axis = fig.Axis(label=motion.label), fig.Axis(label=quantities["load"].label)
         panels.append(fig.Panel(title=TITLES[name], marks=marks, x=x_axis, y=y_axis))
     return fig.Figure(panels=fig.in_grid(panels, 2), height=230.0)
 
@@ -336,7 +336,7 @@ def rings_figure(curves: dict[str, Curve]) -> fig.Figure:
     """Draw half of the ring from the side at both ends of each curve, by lines of its mesh."""
     panels = []
     for name, curve in curves.items():
-        motion = units_of(curve.motion.rotates).displacement
+        motion = loop_quantities(curve.motion.rotates)["displacement"]
         for point in (curve.points[0], curve.points[-1]):
             lines = np.concatenate(list(_mesh_lines(_surface(curve.ring, point.u))))
             mark = fig.Line(*PLACE.values(lines).T, color=fig.OURS, width=0.7)
