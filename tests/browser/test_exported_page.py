@@ -9,9 +9,8 @@ import pytest
 
 import wm_drake as wm
 from wm_drake.parameters import shipped_machines
-from wm_drake.parameters.variation import number_at
 from wm_drake.simulation.displacements import amplitudes, filtered_displacement
-from wm_drake.studio.exported import bundled, export_page
+from wm_drake.studio.exported import export_page
 from wm_drake.studio.machines import OpenMachine
 
 pytestmark = [pytest.mark.browser]
@@ -77,7 +76,9 @@ def of_page(browser, data, load, changes):
     job = {"changes": [*changes, *changes_of_load(data, load)]}
     found = browser.driver.execute_async_script(ANSWER, job)
     assert "failed" not in found, found
-    moved = np.frombuffer(base64.b64decode(found["moved"])).reshape(data["model"]["count"]["points"], -1)
+    moved = np.frombuffer(base64.b64decode(found["moved"])).reshape(
+        data["model"]["count"]["points"], -1
+    )
     sensors = data["model"]["count"]["sensors"]
     gap = found["gap"] and found["gap"]["distance"]
     return moved[:sensors].T, np.array(found["sizes"], dtype=float), gap
@@ -92,7 +93,9 @@ def check_equal(browser, data, machine, scene, load, changes=(), parameters=None
     assert moved.shape == expected.shape
     largest = np.abs(expected).max(axis=0)
     assert (np.abs(moved - expected).max(axis=0) <= DISPLACEMENT * largest).all()
-    np.testing.assert_allclose(sizes, amplitudes(filtered_displacement(record).values)[0], AMPLITUDE)
+    np.testing.assert_allclose(
+        sizes, amplitudes(filtered_displacement(record).values)[0], AMPLITUDE
+    )
     smallest = wm.measure(record, scene).smallest_gap
     assert (gap is None) == (smallest is None)
     if gap is not None:

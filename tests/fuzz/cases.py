@@ -205,7 +205,6 @@ OPTIONS = [
     ("study spin-identify --out out", ["--seed", "--noise", "--workers", "--unknown", "--case"]),
     ("study gasket-damping", ["--workers", "--load"]),
     ("identify damper LOOP", ["--seed", "--knots", "--method", "--units", "--law", "--bounds", "--fix", "--name", "--cutoff"]),
-    ("identify table2", ["--units", "--friction-force"]),
     ("studio --no-browser", ["--machine", "--port"]),
     ("rig damper", ["--frequency", "--amplitude", "--matrix", "--sponge-mass", "--name", "--component"]),
     ("rig gasket --axis x -f 1Hz", ["--amplitude", "--arm", "--axis"]),

@@ -14,7 +14,7 @@ from numba import carray, cfunc, njit, types
 
 from wm_drake.compiler.compilation import for_one_run, law
 from wm_drake.compiler.elementary import sine_cosine, sqrt
-from wm_drake.compiler.matrices import times
+from wm_drake.compiler.matrices import plus, scaled, six
 from wm_drake.compiler.vectors import (
     add,
     cross,
@@ -22,19 +22,21 @@ from wm_drake.compiler.vectors import (
     rotate,
     rotate_back,
     rotation_from_rpy,
-    rotation_from_sines,
     scale,
     subtract,
 )
+from wm_drake.elements.cabinet import FEET_COUNT, FOOT, FULL_DAMPING, PADS, read_pads
+from wm_drake.elements.feet import FEET, load_on_feet, read_feet
 from wm_drake.elements.friction_damper import FRICTION_DAMPER
 from wm_drake.elements.motion import tub_motion
 from wm_drake.elements.mount import WRENCH_SIZE, write_mount_wrenches
 from wm_drake.elements.rubber import bushing_wrench
-from wm_drake.elements.sensor import MEASURED_POINT, POINT_SIZE, displacement_at
+from wm_drake.elements.sensor import POINT_SIZE, displacement_at
 from wm_drake.elements.spring import SPRING, read_spring, taut_tension
+from wm_drake.engines.compiled.cabinet import FEET_BEGIN
 from wm_drake.engines.compiled.integration import Work, integrate_lanes
 from wm_drake.engines.compiled.mechanics import BODIES, DRUM_RATE, mass_properties, read_bodies
-from wm_drake.engines.compiled.midpoint import MidpointWork, TUBES, integrate_midpoint_lanes
+from wm_drake.engines.compiled.midpoint import MidpointWork, integrate_midpoint_lanes
 from wm_drake.engines.compiled.multistep import PAST_INPUTS, PAST_RATES
 from wm_drake.engines.trajectory import LARGEST_ANGLE, LARGEST_DISPLACEMENT
 from wm_drake.export.kernel import (
@@ -52,6 +54,7 @@ from wm_drake.export.kernel import (
     pointer_at,
     row_writer,
 )
+from wm_drake.laws.feet import normal_loads
 from wm_drake.laws.table import stiffness_force
 from wm_drake.model.outline import lowest_point
 from wm_drake.model.tub_statics import MOST_STEPS, POSE_STEP
@@ -63,6 +66,8 @@ from wm_drake.simulation.mount_histories import (
 )
 from wm_drake.simulation.signals import filter_both_ways, largest_peaks
 
+REMAINING = 1e-10
+"""Largest force [N] or moment [N m] that remains on the tub at rest."""
 BODY_SIZE = 4
 """Numbers of a body that may change: mass, centre of mass in its frame. [kg, m]"""
 BODY_CONSTANTS = 24
@@ -90,36 +95,37 @@ Places = namedtuple(
 """Indices in the array of an instance.
 
 parameters: numbers of the machine file by straight lines; bodies: `BODY_SIZE` each; unbalances:
-those of the load, the residual imbalance of the drum last; of_load: what else the load adds to the harmonics of the drum; speed: of the drum
-at the start [rad/s]; packed: packed numbers, then the free length of each spring, then the measured
-points; rest: pose of the tub at rest; extremes, sums: what `measure_samples_lanes` and
-`measure_mounts_lanes` write; answer: the gap (`GAP_SIZE`), then the peak force of each mount; the
-others are arrays to work in.
+those of the load, the residual imbalance of the drum last; of_load: what else the load adds to the
+harmonics of the drum; speed: of the drum at the start [rad/s]; packed: packed numbers, then the
+free length of each spring, the measured points and the numbers of the feet; rest: pose of the tub
+at rest; extremes, sums: what `measure_samples_lanes` and `measure_mounts_lanes` write; answer: the
+gap (`GAP_SIZE`), then the peak force of each mount; the others are arrays to work in.
 """
 Constants = namedtuple(
     "Constants",
-    "packed start entries harmonics drum bodies springs initial relaxation sections settled pairs "
-    "size",
+    "packed start entries harmonics drum bodies initial relaxation sections settled pairs size",
 )
 """Indices in the array of constants.
 
 packed, start, entries, harmonics, drum: as in `wm_drake.export.kernel`; bodies: `BODY_CONSTANTS`
-each; springs: what gives the preload of each, and whether it pushes; initial: state before a run;
-relaxation: of the midpoint rule; sections, settled: of the filter; pairs: shapes, `PAIR_SIZE` each,
-then the distance of each pair at the initial pose.
+each; initial: state before a run; relaxation: of the midpoint rule; sections, settled: of the
+filter; pairs: shapes, `PAIR_SIZE` each, then the distance of each pair at the initial pose.
 """
 Counts = namedtuple(
     "Counts",
     "packed numbers parameters entries bodies unbalances springs points sensors mounts pairs",
 )
-"""How many of each there are; packed: packed numbers, free lengths and points; numbers: packed
-numbers alone."""
+"""How many of each there are; packed: packed numbers, free lengths, points and feet; numbers:
+packed numbers alone."""
 Plan = namedtuple(
-    "Plan", "at of count elements resting gasket integrator limits reach settles"
+    "Plan", "at of count elements resting springs gasket integrator limits reach settles"
 )
-"""What the functions are compiled for; resting: `Mounts` that act at rest; limits: largest angle
-and displacement of the rest pose [rad, m]; reach: largest distance of a point of the tub group from
-To [m]; settles: whether the equilibrium is found in the page."""
+"""What the functions are compiled for.
+
+resting: `Mounts` that act at rest; springs: what gives the preload of each, and whether it pushes;
+limits: largest angle and displacement of the rest pose [rad, m]; reach: largest distance of a point
+of the tub group from To [m]; settles: whether the equilibrium is found in the page.
+"""
 GAP_SIZE = 10
 """Smallest gap, its sample, number of the pair, nearest points of both shapes, number of good
 samples."""
@@ -176,6 +182,7 @@ def _set_up(plan: Any) -> Any:
     settles, size = plan.settles, plan.elements.begins.size
     write_rows, add_load = row_writer(plan), load_adder(plan)
     add_bodies, place_struts, settle = _bodies(plan), _struts(plan), _settle(plan)
+    load_feet, stands = _feet(plan), settles and plan.elements.cabinet is not None
 
     @cfunc(types.float64(POINTER, POINTER), **OPTIONS)
     def wm_set_up(v, c):
@@ -183,18 +190,20 @@ def _set_up(plan: Any) -> Any:
         state, rest = numbers_at(v, at.state), numbers_at(v, at.rest)
         write_rows(v, c)
         add_bodies(v, c)
-        place_struts(v, c)
+        place_struts(v)
         for k in range(size):
             state[k] = constants[of.initial + k]
         for k in range(6):
             rest[k] = state[k]
         status = 0.0
         if settles:
-            status = settle(v, c)
+            status = settle(v)
         for k in range(6):
             state[k] = rest[k]
         state[DRUM_RATE] = 0.0
         motion = tub_motion(state)
+        if stands:
+            load_feet(v, motion)
         for k in range(count.points):
             point = count.numbers + count.springs + POINT_SIZE * k
             p[point + POINT_SIZE - 1] = 0.0
@@ -251,90 +260,86 @@ def _bodies(plan: Any) -> Any:
 
 
 def _struts(plan: Any) -> Any:
-    """Return the function (v, c) that computes what follows from the ends of struts.
+    """Return the function (v) that computes what follows from the ends of struts.
 
     These are drawn lengths and given preloads of springs, and the axes of dampers.
     """
-    at, of, count, mounts = plan.at, plan.of, plan.count, plan.elements.mounts
+    at, first, mounts, settles = plan.at, plan.count.numbers, plan.elements.mounts, plan.settles
     axis, length = FRICTION_DAMPER.offsets["axis"], SPRING.offsets["rest_length"]
-    preload = SPRING.offsets["preload"]
+    preload, kinds = SPRING.offsets["preload"], np.array([k % PUSHES for k in (*plan.springs, 0)])
+    set_taut = taut_setter(plan)
 
     @njit(**OPTIONS)
-    def place_struts(v, c):
-        p, constants = numbers_at(v, at.packed), numbers_at(c, 0)
+    def place_struts(v):
+        p = numbers_at(v, at.packed)
         for begin in mounts.dampers:
             line, size = strut(p, begin)
             for k in range(3):
                 p[begin + axis + k] = line[k] / size
-        for k in range(count.springs):
+        for k in range(len(mounts.springs)):
             begin = mounts.springs[k]
             _, p[begin + length] = strut(p, begin)
-            kind = int(constants[of.springs + k]) % PUSHES
-            if kind == FREE_LENGTH:
-                short = p[count.numbers + k] - p[begin + length]
+            if kinds[k] == FREE_LENGTH:
+                short = p[first + k] - p[begin + length]
                 p[begin + preload] = -stiffness_force(short, *read_spring(p, begin).stiffness)
-            if kind == SOLVED:
+            if kinds[k] == SOLVED and settles:
                 p[begin + preload] = 0.0
-            set_taut(v, c, k)
+            set_taut(v, k)
 
-    @njit(**OPTIONS)
-    def strut(p, begin):
-        ends = read_spring_ends(p, begin)
-        line = subtract(ends[0], ends[1])
-        return line, sqrt(dot(line, line))
-
-    set_taut = taut_setter(plan)
     return place_struts
 
 
 @law
+def strut(p, at):
+    """Return line and length of a strut as drawn, from the housing end to the tub end. [m]"""
+    tub, housing = read_spring_ends(p, at)
+    line = subtract(tub, housing)
+    return line, sqrt(dot(line, line))
+
+
+@law
 def read_spring_ends(p, at):
-    """Return tub end (T) and housing end (W) of a strut, which its packed numbers begin with. [m]"""
+    """Return tub end (T) and housing end (W) of a strut, with which its numbers begin. [m]"""
     return (p[at], p[at + 1], p[at + 2]), (p[at + 3], p[at + 4], p[at + 5])
 
 
 def taut_setter(plan: Any) -> Any:
-    """Return the function (v, c, k) that sets the tension from which spring k is taut."""
-    at, of, mounts = plan.at, plan.of, plan.elements.mounts
-    taut = SPRING.offsets["taut_from"]
+    """Return the function (v, k) that sets the tension from which spring k is taut."""
+    at, mounts, taut = plan.at, plan.elements.mounts, SPRING.offsets["taut_from"]
+    pushes = np.array([kind >= PUSHES for kind in (*plan.springs, 0)])
 
     @njit(**OPTIONS)
-    def set_taut(v, c, k):
+    def set_taut(v, k):
         p, begin = numbers_at(v, at.packed), mounts.springs[k]
         spring = read_spring(p, begin)
         p[begin + taut] = -np.inf
-        if numbers_at(c, of.springs)[k] < PUSHES:
+        if not pushes[k]:
             p[begin + taut] = taut_tension(spring.preload, *spring.stiffness)
 
     return set_taut
 
 
 def _settle(plan: Any) -> Any:
-    """Return the function (v, c) that finds preloads and rest pose of the empty machine.
+    """Return the function (v) that finds preloads and rest pose of the empty machine.
 
     It does what `wm_drake.model.equilibrium` does: preloads that balance the tub as drawn as well
-    as they can, then the pose at which nothing remains, by Newton's method.
+    as they can, then the pose at which nothing remains, by Newton's method. It returns 0, or why
+    there is no such pose.
     """
-    at, of, count, mounts = plan.at, plan.of, plan.count, plan.elements.mounts
-    size, resting, limits = plan.elements.begins.size, plan.resting, plan.limits
-    preload = SPRING.offsets["preload"]
-    set_taut, on_tub = taut_setter(plan), _on_tub(plan)
+    at, size, limits = plan.at, plan.elements.begins.size, plan.limits
+    preload_springs, newton_step = _preloads(plan), _newton_step(plan)
 
     @njit(**OPTIONS)
-    def settle(v, c):
-        p, constants, rest = numbers_at(v, at.packed), numbers_at(c, 0), numbers_at(v, at.rest)
-        trial, state = numbers_at(v, at.trial), numbers_at(v, at.state)
+    def settle(v):
+        rest, trial = numbers_at(v, at.rest), numbers_at(v, at.trial)
+        state = numbers_at(v, at.state)
         for k in range(size):
             trial[k] = state[k]
         for k in range(6):
             rest[k] = trial[k] = 0.0
-        solved = 0
-        for k in range(count.springs):
-            solved += int(int(constants[of.springs + k]) % PUSHES == SOLVED)
-        if solved > 0:
-            status = preload_springs(v, c, solved)
-            if status < 0.0:
-                return status
+        status = preload_springs(v)
+        if status < 0.0:
+            return status
         for _ in range(MOST_STEPS):
             status = newton_step(v)
             if status != 1.0:
@@ -342,21 +347,30 @@ def _settle(plan: Any) -> Any:
         if status != 0.0:
             return NOT_BALANCED
         for k in range(6):
-            if not abs(rest[k]) <= limits[0 if k < 3 else 1]:
+            if not abs(rest[k]) <= limits[k // 3]:
                 return FAR
         return 0.0
 
+    return settle
+
+
+def _newton_step(plan: Any) -> Any:
+    """Return the function (v) that moves the rest pose by a step.
+
+    It returns 0 if the pose is one of rest, 1 after a step, -1 if there is none.
+    """
+    at, on_tub = plan.at, _on_tub(plan)
+
     @njit(**OPTIONS)
     def newton_step(v):
-        rest, trial, slopes = numbers_at(v, at.rest), numbers_at(v, at.trial), numbers_at(v, at.slopes)
-        step = numbers_at(v, at.step)
+        rest, trial = numbers_at(v, at.rest), numbers_at(v, at.trial)
+        slopes, step = numbers_at(v, at.slopes), numbers_at(v, at.step)
         for k in range(6):
             trial[k] = rest[k]
-        now = on_tub(v)
-        largest = 0.0
+        now, largest = on_tub(v), 0.0
         for k in range(6):
-            largest = max(largest, abs(now[k]))
-        if largest <= 1e-10:
+            step[k], largest = now[k], max(largest, abs(now[k]))
+        if largest <= REMAINING:
             return 0.0
         for k in range(6):
             trial[k] = rest[k] + POSE_STEP
@@ -364,47 +378,53 @@ def _settle(plan: Any) -> Any:
             trial[k] = rest[k]
             for i in range(6):
                 slopes[6 * i + k] = (moved[i] - now[i]) / POSE_STEP
-        for k in range(6):
-            step[k] = now[k]
         if not solve(slopes, step, 6):
             return -1.0
         for k in range(6):
             rest[k] = rest[k] - step[k]
         return 1.0
 
+    return newton_step
+
+
+def _preloads(plan: Any) -> Any:
+    """Return the function (v) that finds the preloads which balance the machine as drawn.
+
+    They solve the normal equations of the least squares of force and moment.
+    """
+    at, preload = plan.at, SPRING.offsets["preload"]
+    solved = [k for k, kind in enumerate(plan.springs) if kind % PUSHES == SOLVED]
+    count, numbers = len(solved), np.array([*solved, 0])
+    begins = np.array([*plan.elements.mounts.springs[solved], 0], dtype=np.int64)
+    pushes = np.array([*(plan.springs[k] >= PUSHES for k in solved), False])
+    set_taut, on_tub = taut_setter(plan), _on_tub(plan)
+
     @njit(**OPTIONS)
-    def preload_springs(v, c, solved):
-        p, constants = numbers_at(v, at.packed), numbers_at(c, 0)
-        normal, right, now = numbers_at(v, at.slopes), numbers_at(v, at.step), on_tub(v)
-        i = 0
-        for k in range(count.springs):
-            if int(constants[of.springs + k]) % PUSHES == SOLVED:
-                pull = pull_of(p, mounts.springs[k])
-                right[i] = 0.0
-                for n in range(6):
-                    right[i] = right[i] - pull[n] * now[n]
-                j = 0
-                for m in range(count.springs):
-                    if int(constants[of.springs + m]) % PUSHES == SOLVED:
-                        other = pull_of(p, mounts.springs[m])
-                        normal[solved * i + j] = 0.0
-                        for n in range(6):
-                            normal[solved * i + j] = normal[solved * i + j] + pull[n] * other[n]
-                        j += 1
-                i += 1
-        if not solve(normal, right, solved):
+    def preload_springs(v):
+        p, normal = numbers_at(v, at.packed), numbers_at(v, at.slopes)
+        right = numbers_at(v, at.step)
+        now = on_tub(v)
+        for i in range(count):
+            pull = pull_of(p, begins[i])
+            right[i] = -product(pull, now)
+            for j in range(count):
+                normal[count * i + j] = product(pull, pull_of(p, begins[j]))
+        if not solve(normal, right, count):
             return NOT_BALANCED
-        i = 0
-        for k in range(count.springs):
-            if int(constants[of.springs + k]) % PUSHES == SOLVED:
-                p[mounts.springs[k] + preload] = right[i]
-                set_taut(v, c, k)
-                if not (right[i] > 0.0 or constants[of.springs + k] >= PUSHES):
-                    return SLACK
-                i += 1
+        for i in range(count):
+            p[begins[i] + preload] = right[i]
+            set_taut(v, numbers[i])
+            if not (right[i] > 0.0 or pushes[i]):
+                return SLACK
         return 0.0
 
-    return settle
+    return preload_springs
+
+
+@law
+def product(a, b):
+    """Return the scalar product of two tuples of six numbers."""
+    return dot((a[0], a[1], a[2]), (b[0], b[1], b[2])) + dot((a[3], a[4], a[5]), (b[3], b[4], b[5]))
 
 
 @law
@@ -423,40 +443,68 @@ def _on_tub(plan: Any) -> Any:
     They are those of gravity and all mounts at the state `at.trial`.
     """
     at, resting = plan.at, plan.resting
-    count = sum(len(part) for part in resting[:3]) + (len(resting.others.at) if resting.others else 0)
+    others = len(resting.others.at) if resting.others else 0
+    count = sum(len(part) for part in resting[:3]) + others
 
     @njit(**OPTIONS)
     def on_tub(v):
-        p, x, wrenches = (
-            numbers_at(v, at.packed),
-            numbers_at(v, at.trial),
-            numbers_at(v, at.wrenches),
-        )
+        p, x = numbers_at(v, at.packed), numbers_at(v, at.trial)
+        wrenches = numbers_at(v, at.wrenches)
         write_mount_wrenches(x, p, resting, wrenches)
-        bodies, masses = read_bodies(p, 0), mass_properties(p, 1.0, 0.0)
-        mass, motion = 1.0 / bodies.inverse_mass, tub_motion(x)
-        about_To = add(masses.moment, scale(mass, bodies.origin))
-        moment = cross(add(rotate(motion.rotation, about_To), scale(mass, motion.position)), bodies.gravity)
-        force = scale(mass, bodies.gravity)
-        total = (moment[0], moment[1], moment[2], force[0], force[1], force[2])
+        total = weight_at(tub_motion(x), p)
         for i in range(count):
-            w = WRENCH_SIZE * i
-            total = (
-                total[0] - wrenches[w],
-                total[1] - wrenches[w + 1],
-                total[2] - wrenches[w + 2],
-                total[3] - wrenches[w + 3],
-                total[4] - wrenches[w + 4],
-                total[5] - wrenches[w + 5],
-            )
+            total = plus(total, scaled(-1.0, six(wrenches, WRENCH_SIZE * i)))
         return total
 
     return on_tub
 
 
-INT32S, BYTES, INT64S = (
-    types.CPointer(kind) for kind in (types.int32, types.uint8, types.int64)
-)
+@law
+def weight_at(motion, p):
+    """Return moment about the origin of W and force of the weight of tub and empty drum. [N m, N]
+
+    Args:
+        motion: `TubMotion`.
+        p: Packed numbers of the bodies, the drum at angle 0.
+    """
+    bodies, masses = read_bodies(p, 0), mass_properties(p, 1.0, 0.0)
+    mass = 1.0 / bodies.inverse_mass
+    about_To = add(masses.moment, scale(mass, bodies.origin))
+    about_Wo = add(rotate(motion.rotation, about_To), scale(mass, motion.position))
+    m, f = cross(about_Wo, bodies.gravity), scale(mass, bodies.gravity)
+    return (m[0], m[1], m[2], f[0], f[1], f[2])
+
+
+def _feet(plan: Any) -> Any:
+    """Return the function (v) that puts the weight on the feet of a cabinet that moves.
+
+    It does what `wm_drake.model.cabinet.cabinet_at_rest` does.
+    """
+    at, numbers, cabinet = plan.at, plan.count.packed - FEET.fixed_size, plan.elements.cabinet
+    first = 0 if cabinet is None else cabinet + FEET_BEGIN
+    growth, sag = PADS.offsets["damping_growth"], PADS.fixed_size + FOOT.offsets["at_rest"]
+
+    @njit(**OPTIONS)
+    def load_feet(v, motion):
+        p = numbers_at(v, at.packed)
+        feet, pads = read_feet(p, numbers), read_pads(p, first)
+        load = load_on_feet(weight_at(motion, p), feet)
+        normal = normal_loads(load[0], load[3], load[4], feet.x, feet.y)
+        mean = 0.25 * (normal[0] + normal[1] + normal[2] + normal[3])
+        p[first + growth] = pads.vertical_stiffness / (FULL_DAMPING * mean)
+        for i in range(FEET_COUNT):
+            p[first + sag + FOOT.fixed_size * i] = normal[i] / pads.vertical_stiffness
+
+    return load_feet
+
+
+INT32S, BYTES, INT64S = (types.CPointer(kind) for kind in (types.int32, types.uint8, types.int64))
+
+
+@njit(**OPTIONS)
+def part(v, begin, count):
+    """Return some of the numbers behind a pointer as an array."""
+    return carray(pointer_at(v, begin), (count,))
 
 
 def _integrate(plan: Any) -> Any:
@@ -466,39 +514,9 @@ def _integrate(plan: Any) -> Any:
     a controller acts, whether a step takes one derivative; number of steps; samples to write, their
     number.
     """
-    at, of, elements, size = plan.at, plan.of, plan.elements, plan.elements.begins.size
-    inputs, sample, count = max(elements.begins.inputs, 1), size + elements.begins.rates, plan.count
-    midpoint = plan.integrator == "midpoint"
-    tubes = TUBES * TUBES * (len(elements.tubes) if midpoint else 0)
-    run = for_one_run(integrate_midpoint_lanes if midpoint else integrate_lanes)
-
-    @njit(**OPTIONS)
-    def part(v, begin, count):
-        return carray(pointer_at(v, begin), (count,))
-
-    if midpoint:
-
-        @njit(**OPTIONS)
-        def advance(steps, n, v, c, history):
-            work = MidpointWork(
-                part(v, at.rate, size), part(v, at.inputs, inputs), part(v, at.stage, size),
-                part(v, at.sum, size), part(v, at.past_rates, size)
-            )  # fmt: skip
-            p, x = part(v, at.packed, count.numbers), part(v, at.state, size)
-            run(steps[:4], 0, n, p, elements, part(c, of.relaxation, tubes), x, work, history)
-
-    else:
-
-        @njit(**OPTIONS)
-        def advance(steps, n, v, c, history):
-            work = Work(
-                part(v, at.rate, size), part(v, at.inputs, inputs), part(v, at.stage, size),
-                part(v, at.sum, size), part(v, at.past_rates, PAST_RATES * size),
-                part(v, at.past_inputs, PAST_INPUTS * inputs)
-            )  # fmt: skip
-            p, x = part(v, at.packed, count.numbers), part(v, at.state, size)
-            run(steps, 0, n, p, elements, x, work, history)
-
+    elements = plan.elements
+    sample = elements.begins.size + elements.begins.rates
+    advance = _midpoint(plan) if plan.integrator == "midpoint" else _advance(plan)
     signature = types.void(
         POINTER, POINTER, POINTER, POINTER, POINTER, INT32S, BYTES, BYTES, types.int32, POINTER,
         types.int32
@@ -510,9 +528,52 @@ def _integrate(plan: Any) -> Any:
             carray(length, (n,)), carray(rate, (n,)), carray(drum, (2 * n + 1, 4)),
             carray(row, (n,)), carray(controls, (n,)), carray(one, (n,))
         )  # fmt: skip
-        advance(steps, n, v, c, carray(history, (rows * sample,)))
+        advance(steps, n, v, c, part(history, 0, rows * sample))
 
     return wm_integrate
+
+
+def _advance(plan: Any) -> Any:
+    """Return the function (steps, n, v, c, history) of steps with one derivative or four."""
+    at, elements, count = plan.at, plan.elements, plan.count.numbers
+    size, inputs, run = elements.begins.size, at.stage - at.inputs, for_one_run(integrate_lanes)
+
+    @njit(**OPTIONS)
+    def advance(steps, n, v, c, history):  # noqa: ARG001
+        work = Work(
+            part(v, at.rate, size),
+            part(v, at.inputs, inputs),
+            part(v, at.stage, size),
+            part(v, at.sum, size),
+            part(v, at.past_rates, PAST_RATES * size),
+            part(v, at.past_inputs, PAST_INPUTS * inputs),
+        )
+        p, x = part(v, at.packed, count), part(v, at.state, size)
+        run(steps, 0, n, p, elements, x, work, history)
+
+    return advance
+
+
+def _midpoint(plan: Any) -> Any:
+    """Return the function (steps, n, v, c, history) of steps of the midpoint rule."""
+    at, of, elements, count = plan.at, plan.of, plan.elements, plan.count.numbers
+    size, inputs, matrices = elements.begins.size, at.stage - at.inputs, of.sections - of.relaxation
+    run = for_one_run(integrate_midpoint_lanes)
+
+    @njit(**OPTIONS)
+    def advance(steps, n, v, c, history):
+        work = MidpointWork(
+            part(v, at.rate, size),
+            part(v, at.inputs, inputs),
+            part(v, at.stage, size),
+            part(v, at.past_rates, size),
+            part(v, at.sum, size),
+        )
+        p, x = part(v, at.packed, count), part(v, at.state, size)
+        relaxation = part(c, of.relaxation, matrices)
+        run(steps[:4], 0, n, p, elements, relaxation, x, work, history)
+
+    return advance
 
 
 def _measure(plan: Any) -> Any:
@@ -524,25 +585,23 @@ def _measure(plan: Any) -> Any:
     sample = elements.begins.size + elements.begins.rates
     bounds, none, gasket = (LARGEST_ANGLE, LARGEST_DISPLACEMENT), np.empty(0, np.int64), plan.gasket
     samples_of, mounts_of = for_one_run(measure_samples_lanes), for_one_run(measure_mounts_lanes)
-    sums = at.answer - at.sums
-    largest, point = VECTOR_SUMS.offsets["largest"], count.numbers + count.springs
+    sums, points = at.answer - at.sums, count.points
+    largest, first = VECTOR_SUMS.offsets["largest"], at.packed + count.numbers + count.springs
 
     @cfunc(types.void(POINTER, POINTER, types.int32, POINTER), **OPTIONS)
     def wm_measure(v, history, rows, moved):
-        numbers = numbers_at(v, 0)
-        samples, p = carray(history, (rows * sample,)), carray(pointer_at(v, at.packed), (count.packed,))
-        extremes, total = carray(pointer_at(v, at.extremes), (count.points + 7,)), carray(
-            pointer_at(v, at.sums), (sums,)
-        )
-        unused = carray(pointer_at(v, at.step), (0,))
+        numbers, unused = numbers_at(v, 0), part(v, at.step, 0)
+        samples, p = part(history, 0, rows * sample), part(v, at.packed, count.numbers)
+        extremes, total = part(v, at.extremes, points + 7), part(v, at.sums, sums)
         samples_of(
-            samples, rows, sample, bounds, p, gasket, elements.mounts.branches, p[point:],
-            count.points, none, carray(moved, (rows * count.points,)), extremes, unused
+            samples, rows, sample, bounds, p, gasket, elements.mounts.branches,
+            part(v, first, POINT_SIZE * points), points, none, part(moved, 0, rows * points),
+            extremes, unused
         )  # fmt: skip
         mounts_of(samples, rows, sample, bounds, p, elements.mounts, count.mounts, unused, total)
         for i in range(count.mounts):
             numbers[at.answer + GAP_SIZE + i] = sqrt(total[VECTOR_SIZE * i + largest])
-        numbers[at.answer + GAP_SIZE - 1] = extremes[count.points + 6]
+        numbers[at.answer + GAP_SIZE - 1] = extremes[points + 6]
 
     return wm_measure
 
@@ -556,24 +615,20 @@ def _smooth(plan: Any) -> Any:
     of, run, peaks = plan.of, for_one_run(filter_both_ways), for_one_run(largest_peaks)
     sections, settled = of.settled - of.sections, of.pairs - of.settled
 
-    @cfunc(
-        types.void(
-            POINTER, POINTER, types.int32, types.int32, types.int32, POINTER, POINTER, POINTER, INT64S
-        ),
-        **OPTIONS,
-    )
+    counts = types.int32, types.int32, types.int32
+
+    @cfunc(types.void(POINTER, POINTER, *counts, POINTER, POINTER, POINTER, INT64S), **OPTIONS)
     def wm_smooth(c, moved, rows, signals, padding, work, filtered, sizes, places):
         if padding > 0:
             run(
-                carray(moved, (rows * signals,)), (rows, signals),
-                carray(pointer_at(c, of.sections), (sections,)),
-                carray(pointer_at(c, of.settled), (settled,)), padding,
-                carray(work, (rows + 2 * padding,)), carray(filtered, (rows * signals,))
+                part(moved, 0, rows * signals), (rows, signals), part(c, of.sections, sections),
+                part(c, of.settled, settled), padding, part(work, 0, rows + 2 * padding),
+                part(filtered, 0, rows * signals)
             )  # fmt: skip
+        at = carray(places, (signals,))
         for k in range(signals):
             column = carray(pointer_at(filtered, k * rows), (rows, 1))
-            at = carray(places, (signals,))
-            peaks(column, carray(pointer_at(sizes, k), (1,)), at[k : k + 1])
+            peaks(column, part(sizes, k, 1), at[k : k + 1])
 
     return wm_smooth
 
@@ -595,7 +650,11 @@ def _bin_forces(plan: Any) -> Any:
 
     @cfunc(types.void(POINTER, POINTER, types.int32, types.int32, POINTER), **OPTIONS)
     def wm_bin_forces(v, history, rows, parts, bands):
-        p, wrenches, bins = numbers_at(v, at.packed), numbers_at(v, at.wrenches), numbers_at(bands, 0)
+        p, wrenches, bins = (
+            numbers_at(v, at.packed),
+            numbers_at(v, at.wrenches),
+            numbers_at(bands, 0),
+        )
         for k in range(parts * signals):
             bins[2 * k], bins[2 * k + 1] = np.inf, -np.inf
         for row in range(rows):
@@ -698,19 +757,15 @@ def distance_of(motion, moving, fixed, rounds, d):
     return best, d, x, y
 
 
-def _find_gap(plan: Any) -> Any:
-    """Return the function that finds the smallest gap of a run, as `Scene.smallest_gap`.
+@law
+def pose_of(x):
+    """Return rotation and position of the tub from a sample."""
+    return rotation_from_rpy(x[0], x[1], x[2]), (x[3], x[4], x[5])
 
-    Arguments: v, c; samples and their number; array of bounds, a number for each sample.
-    """
-    at, of, count, reach = plan.at, plan.of, plan.count, plan.reach
-    sample = plan.elements.begins.size + plan.elements.begins.rates
-    distances = of.pairs + PAIR_SIZE * count.pairs
 
-    @njit(**OPTIONS)
-    def motion_at_sample(history, row):
-        x = numbers_at(history, sample * row)
-        return rotation_from_rpy(x[0], x[1], x[2]), (x[3], x[4], x[5])
+def _pair_reader(plan: Any) -> Any:
+    """Return the function (c, pair) of both shapes, whether each is round, and a direction."""
+    of = plan.of
 
     @njit(**OPTIONS)
     def pair_at(c, pair):
@@ -720,32 +775,40 @@ def _find_gap(plan: Any) -> Any:
         moving, fixed = numbers_at(c, begin), numbers_at(c, begin + SHAPE_SIZE)
         return moving, fixed, rounds, (constants[d], constants[d + 1], constants[d + 2])
 
-    @njit(**OPTIONS)
-    def farthest_of(history, c, rows):
-        constants, farthest, moved = numbers_at(c, of.initial), 0, -1.0
-        for row in range(rows):
-            x = numbers_at(history, sample * row)
-            turned = abs(x[0] - constants[0]) + abs(x[1] - constants[1]) + abs(x[2] - constants[2])
-            line = (x[3] - constants[3], x[4] - constants[4], x[5] - constants[5])
-            shift = sqrt(dot(line, line)) + turned * reach
-            if shift > moved:
-                farthest, moved = row, shift
-        return farthest, moved
+    return pair_at
+
+
+def _measure_pair(plan: Any) -> Any:
+    """Return the function that measures a pair in a sample; it returns what separates the pair.
+
+    Arguments: v, c; number of the pair; the sample and its number; the direction to begin with.
+    """
+    at, pair_at = plan.at, _pair_reader(plan)
 
     @njit(**OPTIONS)
-    def measure_pair(v, c, history, row, pair, d):
+    def measure_pair(v, c, pair, x, row, d):
         moving, fixed, rounds, _ = pair_at(c, pair)
         answer = numbers_at(v, at.answer)
-        motion = motion_at_sample(history, row)
-        gap, d, x, y = distance_of(motion, moving, fixed, rounds, d)
+        gap, d, nearest, other = distance_of(pose_of(x), moving, fixed, rounds, d)
         if gap < answer[0]:
             answer[0], answer[1], answer[2] = gap, row, pair
             for k in range(3):
-                answer[3 + k], answer[6 + k] = x[k], y[k]
+                answer[3 + k], answer[6 + k] = nearest[k], other[k]
         return d
 
+    return measure_pair
+
+
+def _smallest_of_pair(plan: Any) -> Any:
+    """Return the function that finds the smallest gap of a pair, if it is the smallest so far.
+
+    Arguments: v, c; number of the pair; samples and their number; array of bounds.
+    """
+    at, pair_at, measure_pair = plan.at, _pair_reader(plan), _measure_pair(plan)
+    sample = plan.elements.begins.size + plan.elements.begins.rates
+
     @njit(**OPTIONS)
-    def smallest_of_pair(v, c, history, rows, bounds, pair):
+    def smallest_of_pair(v, c, pair, history, rows, bounds):
         moving, fixed, rounds, d = pair_at(c, pair)
         answer = numbers_at(v, at.answer)
         for row in range(rows):
@@ -754,30 +817,58 @@ def _find_gap(plan: Any) -> Any:
             least = 0
             for row in range(rows):
                 if bounds[row] < answer[0]:
-                    bound = separation(motion_at_sample(history, row), moving, fixed, rounds, d)
-                    bounds[row] = max(bounds[row], bound)
+                    pose = pose_of(numbers_at(history, sample * row))
+                    bounds[row] = max(bounds[row], separation(pose, moving, fixed, rounds, d))
                 if bounds[row] < bounds[least]:
                     least = row
             if not bounds[least] < answer[0]:
                 return
-            d = measure_pair(v, c, history, least, pair, d)
+            d = measure_pair(v, c, pair, numbers_at(history, sample * least), least, d)
             bounds[least] = np.inf
+
+    return smallest_of_pair
+
+
+def _find_gap(plan: Any) -> Any:
+    """Return the function that finds the smallest gap of a run, as `Scene.smallest_gap`.
+
+    Arguments: v, c; samples and their number; array of bounds, a number for each sample.
+    """
+    at, of, count, reach = plan.at, plan.of, plan.count, plan.reach
+    sample = plan.elements.begins.size + plan.elements.begins.rates
+    distances = of.pairs + PAIR_SIZE * count.pairs
+    pair_at, measure_pair = _pair_reader(plan), _measure_pair(plan)
+    smallest_of_pair = _smallest_of_pair(plan)
+
+    @njit(**OPTIONS)
+    def farthest_of(history, c, rows):
+        drawn, farthest, moved = numbers_at(c, of.initial), 0, -1.0
+        for row in range(rows):
+            x = numbers_at(history, sample * row)
+            turned = abs(x[0] - drawn[0]) + abs(x[1] - drawn[1]) + abs(x[2] - drawn[2])
+            line = (x[3] - drawn[3], x[4] - drawn[4], x[5] - drawn[5])
+            shift = sqrt(dot(line, line)) + turned * reach
+            if shift > moved:
+                farthest, moved = row, shift
+        return farthest, moved
 
     @cfunc(types.void(POINTER, POINTER, POINTER, types.int32, POINTER), **OPTIONS)
     def wm_find_gap(v, c, history, rows, work):
-        constants, bounds = numbers_at(c, 0), numbers_at(work, 0)
+        at_rest, bounds = numbers_at(c, distances), numbers_at(work, 0)
         answer = numbers_at(v, at.answer)
         answer[0] = np.inf
-        if rows > 0 and count.pairs > 0:
-            row, shift = farthest_of(history, c, rows)
-            nearest = 0
-            for pair in range(count.pairs):
-                if constants[distances + pair] < constants[distances + nearest]:
-                    nearest = pair
-            measure_pair(v, c, history, row, nearest, pair_at(c, nearest)[3])
-            smallest_of_pair(v, c, history, rows, bounds, nearest)
-            for pair in range(count.pairs):
-                if pair != nearest and constants[distances + pair] - shift < answer[0]:
-                    smallest_of_pair(v, c, history, rows, bounds, pair)
+        if rows == 0 or count.pairs == 0:
+            return
+        row, shift = farthest_of(history, c, rows)
+        first = 0
+        for pair in range(count.pairs):
+            if at_rest[pair] < at_rest[first]:
+                first = pair
+        x = numbers_at(history, sample * row)
+        measure_pair(v, c, first, x, row, pair_at(c, first)[3])
+        smallest_of_pair(v, c, first, history, rows, bounds)
+        for pair in range(count.pairs):
+            if pair != first and at_rest[pair] - shift < answer[0]:
+                smallest_of_pair(v, c, pair, history, rows, bounds)
 
     return wm_find_gap

@@ -12,10 +12,13 @@ from typing import Any
 
 import numpy as np
 
+from wm_drake.elements.cabinet import FEET_SIZE, FOOT, PADS
+from wm_drake.elements.feet import packed_feet
 from wm_drake.elements.friction_damper import FRICTION_DAMPER
 from wm_drake.elements.mount import WRENCH_SIZE
 from wm_drake.elements.sensor import MEASURED_POINT, POINT_SIZE
 from wm_drake.elements.spring import SPRING
+from wm_drake.engines.compiled.cabinet import FEET_BEGIN
 from wm_drake.engines.compiled.mechanics import BODIES
 from wm_drake.engines.compiled.midpoint import TUBES
 from wm_drake.engines.compiled.multistep import PAST_INPUTS, PAST_RATES
@@ -133,18 +136,16 @@ class Contents:
         Without a load it has no residual imbalance either.
         """
         parameters = self.move(values) if values else self.machine.parameters
-        return self.machine.set_up(
-            load, context=self.context, parameters=parameters, gasket=gasket
-        )
+        return self.machine.set_up(load, context=self.context, parameters=parameters, gasket=gasket)
 
     def rows(self, setup: Setup) -> FloatArray:
-        """Return packed numbers, free lengths and measured points, without what follows from them."""
+        """Return `full_rows` without what the functions compute from the others."""
         rows = self.full_rows(setup)
         rows[self.derived] = 0.0
         return rows
 
     def full_rows(self, setup: Setup) -> FloatArray:
-        """Return packed numbers, free length of each spring, and measured points."""
+        """Return packed numbers, free length of each spring, measured points, numbers of feet."""
         parameters = setup.parameters
         types = (parameters.spring_types[s.type] for s in parameters.springs.values())
         lengths = [t.free_length or 0.0 for t in types]
@@ -153,7 +154,9 @@ class Contents:
             for y in self.depths
             for axis in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
         ]
-        return np.concatenate([pack(setup)[0], lengths, setup.measured_points.ravel(), *orbits])
+        feet = packed_feet(parameters.cabinet, parameters.gravity) if setup.cabinet else []
+        points = setup.measured_points.ravel(), *orbits
+        return np.concatenate([pack(setup)[0], lengths, *points, feet])
 
     def _derived(self) -> np.ndarray:
         """Return the rows that the functions compute from others."""
@@ -163,7 +166,13 @@ class Contents:
             names = ["rest_length", "taut_from"] + ["preload"] * (kind % PUSHES != GIVEN)
             rows += [at + SPRING.offsets[name] for name in names]
         for at in mounts.dampers:
-            rows += range(at + FRICTION_DAMPER.offsets["axis"], at + FRICTION_DAMPER.offsets["axis"] + 3)
+            rows += range(
+                at + FRICTION_DAMPER.offsets["axis"], at + FRICTION_DAMPER.offsets["axis"] + 3
+            )
+        if mounts.cabinet >= 0:
+            first = mounts.cabinet + FEET_BEGIN
+            sags = range(PADS.fixed_size + FOOT.offsets["at_rest"], FEET_SIZE, FOOT.fixed_size)
+            rows += [first + at for at in (PADS.offsets["damping_growth"], *sags)]
         first = len(self.packed) + len(parameters.springs)
         count = len(self.setup.measured_points) + 2 * len(self.depths)
         rows += [first + POINT_SIZE * (k + 1) - 1 for k in range(count)]
@@ -174,7 +183,9 @@ class Contents:
         parameters, kinds = self.setup.parameters, []
         for name, spring in parameters.springs.items():
             free = parameters.spring_types[spring.type].free_length
-            kind = FREE_LENGTH if free is not None else GIVEN if spring.preload is not None else SOLVED
+            kind = (
+                FREE_LENGTH if free is not None else GIVEN if spring.preload is not None else SOLVED
+            )
             kinds.append(kind + PUSHES * self.setup.springs[name].pushes)
         return kinds
 
@@ -278,7 +289,9 @@ class _Chosen:
         for key in moved:
             if np.any(wrong & (self.slopes[key] != 0.0)):
                 del self.slopes[key]
-                self.refused[key] = "changes together with others in a way that is not computed here"
+                self.refused[key] = (
+                    "changes together with others in a way that is not computed here"
+                )
 
 
 def page_model(contents: Contents, candidates: Candidates) -> PageModel:
@@ -334,7 +347,6 @@ def _constants(contents: Contents, chosen: _Chosen) -> dict[str, FloatArray]:
         "harmonics": harmonics.ravel(),
         "drum": np.concatenate([rotation.ravel(), origin]),
         "bodies": np.array(list(chosen.bodies.values())).ravel(),
-        "springs": np.array(contents.spring_kinds(), dtype=float),
         "initial": initial_state(contents.setup, contents.profile),
         "relaxation": contents.stepping.relaxation,
         "sections": sections,
@@ -416,6 +428,7 @@ def _plan(contents: Contents, at: Any, of: Any, count: Any) -> Any:
         count,
         layout.elements,
         resting,
+        tuple(contents.spring_kinds()),
         layout.gasket,
         contents.stepping.integrator,
         largest_rest(sags=sags),
@@ -487,8 +500,7 @@ def is_packed_alike(
     setup = contents.set_up(values, load=Load(unbalances=()))
     expected = contents.full_rows(setup)
     packed = v[at.packed : at.packed + count.packed]
-    of_orbits = 2 * POINT_SIZE * len(contents.depths)
-    compared = slice(count.packed - of_orbits)
+    compared = slice(count.numbers + count.springs + POINT_SIZE * (count.sensors + 3))
     with np.errstate(invalid="ignore"):
         near = np.abs(packed - expected) <= ACCURACY * np.abs(expected) + SMALL
     equal = (packed == expected) | near

@@ -17,7 +17,9 @@ FEATURES = "+bulk-memory,+sign-ext,+nontrapping-fptoint,+simd128,+mutable-global
 """What Chromium 91, Firefox 89 and Safari 16.4 have, and later ones."""
 CUSTOM, EXPORT = 0, 7
 """Numbers of sections of a module."""
-_COUNTER = re.compile(r"^(define [^\n]*@NRT_(?:in|de)cref\([^\n]*\{)\n.*?^\}", re.MULTILINE | re.DOTALL)
+_COUNTER = re.compile(
+    r"^(define [^\n]*@NRT_(?:in|de)cref\([^\n]*\{)\n.*?^\}", re.MULTILINE | re.DOTALL
+)
 """Functions that count references to memory of Python, which these functions do not have."""
 FUNCTION_TABLE = 8
 """Number of the table of symbols in the section "linking"."""
@@ -76,7 +78,7 @@ def _name(body: bytes) -> str:
 
 
 def _function_symbols(linking: bytes) -> dict[str, int]:
-    """Return the number of each function that the object file defines, by the name of its symbol."""
+    """Return the number of each function of an object file, by the name of its symbol."""
     _, at = _read(linking, 1 + linking[0])  # behind the name: the version
     while True:
         kind, (size, at) = linking[at], _read(linking, at + 1)

@@ -210,7 +210,7 @@ def _candidates(opened: OpenMachine) -> Candidates:
 def _machine(
     opened: OpenMachine, places: Mapping[str, int], refused: Mapping[str, str]
 ) -> dict[str, Any]:
-    """Return the machine as the page of the studio gets it; each number with its units and limits."""
+    """Return the machine as the studio has it; each number also with its units and limits."""
     machine = opened.for_page()
     numbers: Any = machine["numbers"]
     labels: dict[str, dict[str, float]] = {}
@@ -226,7 +226,9 @@ def _machine(
             "table" if slider.number.is_table else "entry" if slider.is_entry else "number"
         )
         number["least"], number["most"] = _limits(slider)
-        runs = key in places or re.fullmatch(r"loads\..*\.unbalances\.\d+\.\w+|profile\.(time|speed)\.\d+", key)
+        runs = key in places or re.fullmatch(
+            r"loads\..*\.unbalances\.\d+\.\w+|profile\.(time|speed)\.\d+", key
+        )
         if not runs and not number["needs"]:
             number["needs"], number["fixed"] = refused.get(key, AS_EXPORTED), True
         if number["needs"]:
@@ -322,7 +324,9 @@ def bundled(first: str, replaced: Mapping[str, str]) -> str:
         for _, imported in _IMPORT.findall(text):
             add(imported)
         names = _EXPORT.findall(text)
-        text = _IMPORT.sub(lambda m: f"const {{{m[1].replace(' as ', ': ')}}} = modules.{m[2]};", text)
+        text = _IMPORT.sub(
+            lambda m: f"const {{{m[1].replace(' as ', ': ')}}} = modules.{m[2]};", text
+        )
         order[name] = f"{{\n{_EXPORT.sub('', text)}\nmodules.{name} = {{{', '.join(names)}}};\n}}\n"
 
     add(first)
@@ -338,11 +342,9 @@ def _page(data: Mapping[str, Any]) -> str:
     script = "\n" + bundled("main", {"server": "page_engine"})
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     policy = html.escape(POLICY.format(hash=f"sha256-{digest}"))
-    head = (
-        f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n<style>{style}</style>'
-    )
+    head = f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n<style>{style}</style>'
     text = re.sub(r'<link rel="stylesheet".*?>', lambda _: head, template)
-    text = re.sub(r'<(\w+)[^>]* data-of="server".*?</\1 data-end>', "", text, flags=re.DOTALL)
+    text = text.replace("<h1>wm-drake studio</h1>", "<h1>wm-drake</h1>")
     text = re.sub(r"<script type=\"module\".*?</script>\n", "", text)
     body = (
         f'<script type="application/json" id="machine-data">{_in_html(content)}</script>\n'
