@@ -68,32 +68,29 @@ def proposal_text(proposal: xr.Dataset, machine: str = "the machine") -> str:
     changes = [f"{name} to {value}" for name, value in values]
     if not changes:
         return (
-            f"Keep {machine}: no change is clearly better without raising another response by "
-            f"more than {SHARE.text(MOST_LOSS)}."
+            "No change is proposed: none is clearly better without making another response worse "
+            f"by more than {SHARE.text(MOST_LOSS)}."
         )
-    if not proposal.is_confirmed:
-        return (
-            f"Keep {machine}: the best change that was found, {listed(changes)}, does not reach "
-            f"more in its runs{_gap_text(proposal, ': ')}."
-        )
-    return f"Set {listed(changes)}{_gap_text(proposal, '; ')}."
+    text = listed(changes)
+    if GAP in proposal.response.values:
+        text += f"; {_gap_text(proposal.sel(response=GAP), machine)}"
+    if proposal.is_confirmed:
+        return f"Set {text}."
+    return f"No change is proposed: runs do not confirm the best one that was found, {text}."
 
 
-def _gap_text(proposal: xr.Dataset, opening: str) -> str:
-    """Return the smallest gap after and before in words; "" without a gap."""
-    if GAP not in proposal.response.values:
-        return ""
-    gap = proposal.sel(response=GAP)
-    after = (
-        f"{text_of(gap[AFTER])} (load {gap.load_after.item()})"
-        if "load_after" in gap
-        else text_of(gap[AFTER])
-    )
-    is_touching = bool(gap[AFTER] <= 0.0)
-    touches = ", so the tub still touches the housing" if is_touching else ""
+def _gap_text(gap: xr.Dataset, machine: str) -> str:
+    """Return the smallest gap after and before in words.
+
+    Args:
+        gap: The part of a proposal that is about the gap.
+        machine: What has the gap before.
+    """
+    load = f" (load {gap.load_after.item()})" if "load_after" in gap else ""
+    touches = ", so the tub still touches the housing" if gap[AFTER] <= 0.0 else ""
     return (
-        f"{opening}the smallest gap becomes {after} in place of {text_of(gap[BEFORE])}, by runs"
-        f"{touches}"
+        f"the smallest gap becomes {text_of(gap[AFTER])}{load} in place of {text_of(gap[BEFORE])} "
+        f"of {machine}, by runs{touches}"
     )
 
 

@@ -117,9 +117,10 @@ def summary(agreement: xr.Dataset, count: int) -> str:
     begin = agreement.from_place.item()
     worst = _worst_text(agreement)
     if np.isnan(begin):
-        return f"Outside {within} from {first} to {last}; most of all {worst}."
+        most = f"; most of all, {worst}" if worst else ""
+        return f"Outside {within} from {first} to {last}{most}."
     if not worst:
-        return f"Within {within} from {first} to {last}."
+        return f"Within {within} from {text_of(agreement.from_place)} to {last}."
     above, below = ("above", "below") if is_speed else ("after", "before")
     return f"Within {within} {above} {text_of(agreement.from_place)}; {below}, {worst}."
 

@@ -178,8 +178,8 @@ def signals_of(pair: Pair, places: xr.DataArray) -> xr.Dataset:
     return xr.Dataset(
         {
             "envelope": (dims, at_places),
-            "rms": (("source", "region", "sensor"), _rms(passed, masks)),
-            "integrated": (("source", "region", "sensor"), _rms(twice, masks)),
+            "rms": (("source", "region", "sensor"), rms_of(passed, masks)),
+            "integrated": (("source", "region", "sensor"), rms_of(twice, masks)),
             "order_one": (("source", "place", "sensor"), means_at(sizes, at_window, count)),
             "orders": (("source", "order", "sensor"), orders),
             "phase": (("place", "sensor"), phase),
@@ -202,7 +202,7 @@ def _passed(signal: FloatArray, pair: Pair) -> FloatArray:
     return filtered(signal[:, None], period, pass_band(profile_of(pair.run), period))[:, 0]
 
 
-def _rms(signals: FloatArray, masks: Sequence[np.ndarray]) -> FloatArray:
+def rms_of(signals: FloatArray, masks: Sequence[np.ndarray]) -> FloatArray:
     """Return the RMS of signals (2, n, k) in regions; NaN if less than half is there. (2, r, k)"""
     rows = []
     for mask in masks:
@@ -222,6 +222,27 @@ def _largest_orders(signals: FloatArray, run: Record) -> FloatArray:
         return np.full(sizes.shape[1:], np.nan)
     largest = np.max(np.where(np.isfinite(sizes), sizes, -1.0), axis=0)
     return np.where(largest >= 0.0, largest, np.nan)
+
+
+def envelope_sizes(passed: FloatArray, run: Record, places: xr.DataArray) -> FloatArray:
+    """Return half the distances between the envelopes of signals at places. (2, places, k)
+
+    Args:
+        passed: As of `band_passed`.
+    """
+    time = run.time.values
+    sides = np.stack([envelopes_of(signals, time) for signals in passed])
+    halves = 0.5 * (sides[:, 0] - sides[:, 1])
+    return means_at(halves, _place_numbers(run, places), places.size)
+
+
+def order_one_sizes(pair: Pair, places: xr.DataArray) -> FloatArray:
+    """Return the sizes of order 1, measured and predicted, at places. (2, places, k)"""
+    one = order_one(pair)
+    time = pair.run.time.values
+    window = np.searchsorted(time, one.time.values).clip(0, len(time) - 1)
+    sizes = np.stack([np.abs(one.measured.values), np.abs(one.predicted.values)])
+    return means_at(sizes, _place_numbers(pair.run, places)[window], places.size)
 
 
 def repeats_of(pairs: Sequence[Pair], places: xr.DataArray) -> xr.Dataset:
@@ -252,12 +273,7 @@ def amplitudes_of(
     measured = sizes.sel(source="measured", drop=True)
     mean, computed = measured.mean("repeat"), sizes.sel(source="computed", drop=True).mean("repeat")
     largest = mean.max("place")
-    count = measured.sizes["repeat"]
-    scatter = SINGLE_TOLERANCE * mean
-    if count > 1:
-        factor = student.ppf(0.5 + 0.5 * CONFIDENCE, count - 1) * np.sqrt(1.0 + 1.0 / count)
-        scatter = factor * measured.std("repeat", ddof=1)
-    tolerance = np.maximum(scatter, LEAST_TOLERANCE * largest)
+    tolerance = np.maximum(_scatter(measured), LEAST_TOLERANCE * largest)
     difference = computed - mean
     unit = QUANTITIES[quantity]
     shown: dict[str, Any] = {
@@ -288,6 +304,16 @@ def amplitudes_of(
     data["agrees"] = xr.Variable(("place", "sensor"), agrees.transpose("place", "sensor"))
     coords = {"place": repeats.place.variable, "sensor": names, "side": ["upper", "lower"]}
     return xr.Dataset(data, coords)
+
+
+def _scatter(measured: xr.DataArray) -> xr.DataArray:
+    """Return half of the range in which a further repeat lies, of those that reach a place."""
+    mean, count = measured.mean("repeat"), measured.notnull().sum("repeat")
+    several = count > 1
+    safe = count.where(several, 2)
+    factor = student.ppf(0.5 + 0.5 * CONFIDENCE, safe - 1) * np.sqrt(1.0 + 1.0 / safe)
+    deviation = np.sqrt(((measured - mean) ** 2).sum("repeat") / (safe - 1))
+    return (factor * deviation).where(several, SINGLE_TOLERANCE * mean)
 
 
 def sensors_of(repeats: xr.Dataset, amplitudes: xr.Dataset, quantity: str) -> xr.Dataset:
@@ -452,9 +478,10 @@ def agreement_of(amplitudes: Sequence[xr.Dataset], place: xr.DataArray) -> xr.Da
 
     Returns:
         `from_place`, the lowest place above which `MOST_AGREE` of all amplitudes agree, NaN if
-        there is none, and `last_place`; of the largest difference below it, by the largest
-        amplitude of its sensor: the `sensor`, `at`, the `difference` by the amplitude measured
-        there, and whether that is a maximum over the places (`is_peak`). NaN and "" if all agree.
+        there is none, and `first_place` and `last_place`; of the largest difference below it, by
+        the largest amplitude of its sensor: the `sensor`, `at`, the `difference` by the amplitude
+        measured there, and whether that is a maximum over the places (`is_peak`). NaN and "" if
+        all agree; small amplitudes are left out, below `LEAST_SHOWN`.
     """
     agrees = np.hstack([a.agrees.values for a in amplitudes])
     known = np.hstack([a.measured.notnull().values for a in amplitudes])
@@ -471,7 +498,8 @@ def agreement_of(amplitudes: Sequence[xr.Dataset], place: xr.DataArray) -> xr.Da
         if good_above[row] >= MOST_AGREE * count_above[row] and good[row] == count[row]
     ]
     first = reached[0] if reached else rows[-1] + 1
-    below = np.where(known & ~agrees, np.abs(difference), -1.0)[:first]
+    is_large = measured >= LEAST_SHOWN * np.nanmax(measured, axis=0)
+    below = np.where(known & ~agrees & is_large, np.abs(difference), -1.0)[:first]
     worst = np.unravel_index(np.argmax(below), below.shape) if below.size else None
     quantity: Quantity = place.attrs["quantity"]
     values = {"from_place": np.nan, "at": np.nan, "difference": np.nan}
@@ -497,6 +525,9 @@ def agreement_of(amplitudes: Sequence[xr.Dataset], place: xr.DataArray) -> xr.Da
         }
     )
 
+
+LEAST_SHOWN = 0.1
+"""Smallest amplitude, by the largest one of the sensor, whose difference is named in percent."""
 
 MOST_AGREE = 0.95
 """Part of amplitudes that agree where a range of speeds is called within the scatter."""

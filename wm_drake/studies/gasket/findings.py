@@ -1,7 +1,6 @@
 """Findings of a screening study as sentences, made from its numbers."""
 
 from collections import Counter
-from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
@@ -89,22 +88,25 @@ def contact_text(screening: xr.Dataset) -> str:
     )
 
 
-def why_text(screening: xr.Dataset, factors: Sequence[str], words: Words) -> str:
+def why_text(screening: xr.Dataset, proposal: xr.Dataset, words: Words) -> str:
     """Return why factors are changed, in a sentence: their shares, where it matters most.
 
-    This is the smallest gap, or without a gap the response of which they have most.
+    This is the gap with the load with which it is smallest as it is, or without a gap the response
+    of which they have most.
 
     Args:
         screening: As of `screening.run_screening`.
-        factors: Changed factors; empty if nothing is proposed.
+        proposal: As of `page.Comparisons`.
         words: Words of the study.
     """
+    factors, label = proposal.factors, nearest(screening)
     if not factors:
         return ""
-    of_factors = screening.share.sel(term=list(factors))
-    label = nearest(screening) or max(
-        labels_of(screening), key=lambda label: at(of_factors, label).sum().item()
-    )
+    of_factors = screening.share.sel(term=factors)
+    if label is None:
+        label = max(labels_of(screening), key=lambda label: at(of_factors, label).sum().item())
+    elif (load := proposal.load_before.sel(response=GAP).item()) in screening["load"].values:
+        label = load, GAP
     shares = at(of_factors, label).sortby(-at(of_factors, label))
     large = [share for share in shares if share >= LEAST_REASON]
     small = [share.term.item() for share in shares if not share >= LEAST_REASON]
@@ -115,8 +117,8 @@ def why_text(screening: xr.Dataset, factors: Sequence[str], words: Words) -> str
             f"{listed([f'{one.term.item()} has {WHOLE.text(one)}' for one in large])} {of_what}"
         )
     if small:
-        verb = "keeps" if len(small) == 1 else "keep"
-        texts.append(f"{listed(small)} {verb} the rise of other responses within the limit")
+        verb = "helps" if len(small) == 1 else "help"
+        texts.append(f"{listed(small)} {verb} to keep other responses within the limit")
     return f"{'; '.join(texts)}."
 
 

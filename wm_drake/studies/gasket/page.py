@@ -132,7 +132,7 @@ def _short(screening: xr.Dataset, compared: Comparisons, words: Words) -> Part:
         text = f"{listed(studied)}; in the runs of the proposal also {listed(left_out)}"
     return proposal_part(
         proposal,
-        why_text(screening, proposal.factors, words),
+        why_text(screening, proposal, words),
         words.labels(),
         [*facts, ("Loads", text)],
         machine="the machine" if proposal.is_machine else "level 0",
