@@ -69,7 +69,6 @@ KINDS = {
         "damper", "*", "--law", "mstv,stv,coulomb",
     ),
     "identify_static": _one("sections.html", "identify", "gasket", "--static", "radial=r.csv", "axial=a.csv"),
-    "identify_table2": _one("sections.html", "identify", "table2"),
     "calibration": _one(
         "sections.html", "calibrate", "--machine", "short.yaml", "--free", "free.yaml",
         "--targets", "measured.csv", "--starts", "1", "--iterations", "3",
@@ -112,6 +111,16 @@ KINDS = {
         (
             ("spin", "--load", "middle", "--profile", "short_cycle.yaml", "--out", "bench"),
             ("record", "compare", "recording", "--load", "middle", "--profile", "short_cycle.yaml"),
+        ),
+    ),
+    "record_calibrate": Kind(
+        "sections.html",
+        (
+            ("spin", "--load", "middle", "--profile", "short_cycle.yaml", "--out", "bench"),
+            (
+                "record", "calibrate", "recording", "--load", "middle", "--profile", "short_cycle.yaml",
+                "--unknown", "damper_types.friction.friction_force",
+            ),
         ),
     ),
     "tolerance": _one(

@@ -116,7 +116,6 @@ wm-drake rig bushing --machine free_stroke --axis axial -f '1,5 Hz' -a '0.4 mm' 
 wm-drake identify bushing bushing/loop_*.csv --machine free_stroke --axis axial --law voigt --out bushing_fit
 wm-drake rig gasket --axis axial -f '1,5 Hz' -a '1 mm' --out ring
 wm-drake identify gasket ring/loop_*.csv --axis axial --law voigt --out ring_fit
-wm-drake identify table2 --quick --out table2
 wm-drake gasket curves folded --points 2 --elements 6 --around 3 --axial '1 mm' --radial '1 mm' --tilt '1 deg' --twist '1 deg' --out curves
 wm-drake spin --load middle --out spin
 wm-drake record channels spin/record_middle.nc

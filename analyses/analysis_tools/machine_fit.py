@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from calibrate_reference import ADAMS_PLAN, REFERENCE, adams_targets
+from calibrate_reference import PLAN, REFERENCE, adams_targets
 
 from analysis_tools.goals import changes_of, printed_changes
 from wm_drake.batch.ledger import open_ledger
@@ -16,9 +16,8 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.calibrate.computed import Evaluation, PointRunner
 from wm_drake.studies.calibrate.parameter_map import ParameterMap, parameter_map_of
 from wm_drake.studies.calibrate.study import calibration_problem, identity_of
-from wm_drake.studies.fitting.kinks import least_squares_search
 from wm_drake.studies.fitting.problem import PriorProblem, Residuals
-from wm_drake.studies.fitting.search import Search
+from wm_drake.studies.fitting.search import Search, descended
 
 CHANGE_DEVIATION = 0.06
 """Standard deviation of a change by the gasket, of the logarithm of its ratio."""
@@ -39,14 +38,14 @@ def fitted_point(
     reference = load_machine(REFERENCE)
     targets = adams_targets(reference)
     parameter_map = parameter_map_of(machine, free)
-    identity = identity_of(machine, free, targets, ADAMS_PLAN)
+    identity = identity_of(machine, free, targets, PLAN)
     with open_ledger(ledger_path, identity, resume=True) as ledger:
         values = PointRunner(machine, ledger, workers=1).values(parameter_map, targets)
         problem = _with_changes(
-            calibration_problem(values, ADAMS_PLAN), values, printed_changes(reference, targets)
+            calibration_problem(values, PLAN), values, printed_changes(reference, targets)
         )
         search = Search(problem, _report)
-        end = least_squares_search(search, problem.coordinates_of(start), iterations)
+        end = descended(search, problem.coordinates_of(start), iterations)
         return problem.points_at(end.point)
 
 
@@ -80,4 +79,5 @@ def quantities_of(parameter_map: ParameterMap, point: FloatArray) -> pd.DataFram
     m = parameter_map
     columns = {"value": point, "lower": m.lower, "upper": m.upper, "expected": m.expected}
     in_units = {name: m.in_units(column) for name, column in columns.items()}
-    return pd.DataFrame({"quantity": m.names, **in_units, "unit": m.units})
+    units = [unknown.unit.shown for unknown in m.unknowns]
+    return pd.DataFrame({"quantity": m.names, **in_units, "unit": units})

@@ -330,6 +330,14 @@ def test_the_fastest_motion_of_two_bodies_on_a_spring_is_the_closed_form(balls):
     assert fastest_motion(balls.set_up()).rate == pytest.approx(axial, rel=1e-4)
 
 
+def test_the_fastest_motion_counts_the_contact_though_the_drum_hangs_within_its_clearance():
+    numbers = LOOSE | {"contact_stiffness": 1e8, "clearance": 1e-3}
+    parameters = MachineParameters.model_validate(isotropic_machine().model_dump())
+    floating = build_machine(with_bearing(parameters, step=2.5e-5, **numbers))  # no gravity
+    radial = np.sqrt((1e8 + SOFT) * (1.0 / DRUM + 1.0 / TUB))  # rad/s
+    assert fastest_motion(floating.set_up()).rate == pytest.approx(radial, rel=0.02)
+
+
 @pytest.mark.parametrize(("pieces", "allowed"), [(5, "1 ms"), (7, "0.7143 ms, such as 0.625 ms")])
 def test_a_step_too_long_for_the_bearing_is_refused_with_the_longest_one(
     whirling, reference, pieces, allowed

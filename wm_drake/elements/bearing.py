@@ -58,6 +58,9 @@ FORCE_SIZE = 12
 """Own numbers: displacement and rotation vector of the drum's carrier against the tub, force and
 moment on the tub."""
 
+PRESSED = 1.2
+"""Displacement by the clearance at which the damping of the contact is full."""
+
 
 @dataclass(frozen=True)
 class DrumBearingParameters(SixComponentBushingParameters):
@@ -93,6 +96,26 @@ class DrumBearingParameters(SixComponentBushingParameters):
             return np.zeros(3)
         pressed = (load - soft * self.clearance) / (soft + self.contact_stiffness)
         return (self.clearance + pressed) / load * across
+
+    def into_contact(self, displaced: FloatArray) -> FloatArray:
+        """Return the change of the shaft's place with which it presses on its bearing.
+
+        Args:
+            displaced: Displacement of the shaft, in the frame of the body on the ground side.
+                (3,) [m]
+
+        Returns:
+            Change across the axis, outwards, in the same frame, (3,) [m]; 0 without a clearance, or
+            if it presses already.
+        """
+        rotation = self.ground_side_rotation
+        x, _, z = rotation.T @ displaced
+        size = float(np.hypot(x, z))
+        needed = PRESSED * self.clearance - size
+        if needed <= 0.0:
+            return np.zeros(3)
+        outwards = np.array([x, 0.0, z]) / size if size > 0.0 else np.array([0.0, 0.0, -1.0])
+        return np.asarray(rotation @ (needed * outwards))
 
     @packed_once
     def packed(self) -> FloatArray:

@@ -10,7 +10,7 @@ from wm_drake.parameters.types import FloatArray, IndexArray
 from wm_drake.studies.fitting.fit import Direction, Estimate, Fit, SearchLog, TestError
 from wm_drake.studies.fitting.problem import FitProblem, rmse
 from wm_drake.studies.fitting.profile import Profile
-from wm_drake.studies.fitting.search import descended
+from wm_drake.studies.fitting.search import Search, descended
 
 CONFIDENCE = 0.95
 
@@ -364,7 +364,7 @@ def left_out_errors(fit: Fit, part: Callable[[Sequence[int]], FitProblem]) -> Fl
         moved[free] -= inverse @ (slope - rows.T @ residuals[where])
         if np.max(np.abs(moved - point)) > FAR:
             rest = part([k for k in range(count) if k != index])
-            moved = descended(rest.residuals, point, most=MOST_STEPS).point
+            moved = descended(Search(rest), point, MOST_STEPS).point
         left_out = part([index])
         error = rmse(left_out.residuals(np.clip(moved, 0.0, 1.0)[None])[0])
         errors[index] = float(error) * left_out.measurements[0].scale

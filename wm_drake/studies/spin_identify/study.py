@@ -28,7 +28,7 @@ from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.fitting.fit import Fit
-from wm_drake.studies.fitting.methods import least_squares
+from wm_drake.studies.fitting.methods import identify
 from wm_drake.studies.fitting.problem import FitProblem, Measurement, Progress, Unknown
 from wm_drake.studies.spin_cycle.measured import DIMS
 from wm_drake.studies.spin_cycle.study import average_errors, labels_of, region_errors, runs_of
@@ -258,7 +258,7 @@ def identify_from_spin(
         InputError: nothing was measured in the cases of the study.
     """
     problem = _problem(model, measured)
-    fit = least_squares(problem, seed=seed, starts=1, screened=8, progress=progress)
+    fit = identify(problem, seed=seed, starts=1, screened=8, progress=progress)
     start = np.array([s.guess for s in model.sought])
     computed = [
         measured.copy(data=values) for values in model.displacements(np.stack([start, fit.values]))
