@@ -38,6 +38,18 @@ from wm_drake.studies.spin_identify.study import Sought, at_point
 EDGE = 2.0
 """Time at both ends of a recording that is left out: filters have not settled there. [s]"""
 
+SENSOR_SD = 0.015
+"""Deviation of all amplitudes of a sensor, by gain and tilt: an assumption.
+
+A gain is known to about 1 %; a tilt of 2 degrees mixes in up to 3.5 % of another axis.
+"""
+
+JACOBIAN_STEP = 1e-3
+"""Step of finite differences, by the value."""
+
+Z = 1.96
+"""Half width of a 95 % interval, in standard deviations."""
+
 MISFIT = Quantity("misfit in standard deviations", decimals=2)
 
 RunRecords = Callable[[Sequence[Case]], Sequence[Record]]
@@ -69,7 +81,7 @@ class RecordModel:
 
     def measured(self) -> FloatArray:
         """Return the amplitudes of the recordings (repeat, place, sensor). [SI]"""
-        return np.stack([self._amplitudes(pair)[0] for pair in self.pairs])
+        return np.stack([self._amplitudes(pair, slice(0, 1)) for pair in self.pairs])
 
     def computed(self, machines: Sequence[MachineParameters]) -> FloatArray:
         """Return the amplitudes that machines predict (machine, place, sensor). [SI]"""
@@ -96,23 +108,29 @@ class RecordModel:
                 continue
             predicted = [predicted_signals(run, self.sensors, self.points) for run in runs]
             each = [
-                self._amplitudes(replace(pair, predicted=predicted[k if len(used) > 1 else 0]))[1]
+                self._amplitudes(
+                    replace(pair, predicted=predicted[k if len(used) > 1 else 0]), slice(1, 2)
+                )
                 for k, pair in enumerate(self.pairs)
             ]
             rows.append(mean_of(np.stack(each)))
-        failed = np.full_like(self._amplitudes(self.pairs[0])[0], np.nan)
+        failed = np.full((len(self.labels()), len(self.sensors)), np.nan)
         return np.stack([failed if row is None else row for row in rows])
 
-    def _amplitudes(self, pair: Pair) -> FloatArray:
-        """Return measured and predicted amplitudes of a recording. (2, place, sensor) [SI]"""
+    def _amplitudes(self, pair: Pair, side: slice) -> FloatArray:
+        """Return measured or predicted amplitudes of a recording. (place, sensor) [SI]
+
+        Args:
+            side: The first one, measured, or the second one.
+        """
         places = places_of([one.run for one in self.pairs])
         if self.by == "order":
-            return order_one_sizes(pair, places)
-        passed = band_passed(pair)
+            return order_one_sizes(pair, places)[side][0]
+        passed = band_passed(pair, side)
         if self.by == "envelope":
-            return envelope_sizes(passed, pair.run, places)
+            return envelope_sizes(passed, pair.run, places)[0]
         masks = [part.samples for part in speed_ranges(pair.run, profile_of(pair.run))]
-        return rms_of(passed, masks)
+        return rms_of(passed, masks)[0]
 
     def labels(self) -> list[str]:
         """Return the names of the places."""
@@ -199,6 +217,7 @@ def calibrated(
 
     problem = FitProblem(tuple(one.unknown for one in model.sought), tests, evaluate)
     fit = least_squares(problem, seed=seed, starts=2, screened=8, progress=progress)
+    fit = with_sensor_errors(fit, problem)
     after = model.computed([at_point(model.parameters, model.sought, fit.values)])[0]
     dims = ("place", "sensor")
     masked = np.where(valid, 1.0, np.nan)
@@ -214,6 +233,35 @@ def calibrated(
         size = np.nansum((masked * mean) ** 2, axis=0)
         data[f"error_{name}"] = ("sensor", np.sqrt(missed / np.where(size > 0.0, size, np.nan)))
     return fit, xr.Dataset(data, {"place": model.labels(), "sensor": names})
+
+
+def with_sensor_errors(fit: Fit, problem: FitProblem) -> Fit:
+    """Return a fit whose intervals include errors of whole sensors, which no residual shows.
+
+    A sensor that shows all amplitudes larger by a part e changes the estimates by
+    e (J' J)^-1 J_s' y_s, with the Jacobian J and the data y_s of the sensor. Its deviation is
+    `SENSOR_SD`, independent of that of other sensors.
+    """
+    values = fit.values
+    steps = JACOBIAN_STEP * np.maximum(np.abs(values), 1e-9)
+    computed = problem.evaluate(np.vstack([values, values + np.diag(steps)]))
+    jacobian = (computed[1:] - computed[0]).T / steps
+    if not np.isfinite(jacobian).all():
+        return fit
+    inverse = np.linalg.pinv(jacobian.T @ jacobian)
+    turns = [
+        inverse @ jacobian[part].T @ test.values
+        for part, test in zip(problem.slices, problem.measurements, strict=True)
+    ]
+    added = SENSOR_SD**2 * np.einsum("si,sj->ij", turns, turns)
+    widened = []
+    for k, estimate in enumerate(fit.estimates):
+        lower, upper = (
+            estimate.value + sign * np.hypot(end - estimate.value, Z * np.sqrt(added[k, k]))
+            for sign, end in ((-1.0, estimate.lower), (1.0, estimate.upper))
+        )
+        widened.append(replace(estimate, lower=float(lower), upper=float(upper)))
+    return replace(fit, estimates=tuple(widened), covariance=fit.covariance + added)
 
 
 def calibrated_machine(
