@@ -14,8 +14,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from analysis_tools import validation_page as page
+from analysis_tools.goals import sizes_text
 from calibrate_reference import PLAN, REFERENCE, adams_targets
 
 from wm_drake.batch.ledger import open_ledger
@@ -26,7 +26,7 @@ from wm_drake.parameters.files import read_yaml, yaml_text
 from wm_drake.parameters.free import FreeFile
 from wm_drake.report.progress import progress_bar
 from wm_drake.studies.calibrate.computed import PointRunner
-from wm_drake.studies.calibrate.solutions import DIFFERENCE, Solution, sizes_of
+from wm_drake.studies.calibrate.solutions import Solution
 from wm_drake.studies.calibrate.study import calibrate, identity_of
 
 FREE = Path(__file__).with_name(f"{REFERENCE}_free.yaml")
@@ -135,10 +135,10 @@ def row_of(law: str, best: Solution) -> dict[str, Any]:
     targets = best.targets.responses
     errors = best.response_errors
     row: dict[str, Any] = {"law": law, "cost": round(best.cost)}
-    row["amplitudes, %"] = _sizes(best.errors)
+    row["amplitudes, %"] = sizes_text(best.errors)
     for kind, unit in (("means", "%"), ("effects", "%"), ("contributions", "points")):
         chosen = [target.kind_of_value == kind for target in targets]
-        row[f"{kind}, {unit}"] = _sizes(errors[chosen])
+        row[f"{kind}, {unit}"] = sizes_text(errors[chosen])
     names = best.parameter_map.names
     values = dict(zip(names, best.parameter_map.in_units(best.point), strict=True))
     row["friction, N"] = f"{values['damper_friction']:.1f}"
@@ -146,12 +146,6 @@ def row_of(law: str, best: Solution) -> dict[str, Any]:
     row["others"] = ", ".join(f"{name} {values[name]:.3g}" for name in others)
     row["at bounds"] = best.verdicts().count("bound")
     return row
-
-
-def _sizes(errors: np.ndarray) -> str:
-    """Return mean and largest absolute value of errors in percent."""
-    mean, largest = DIFFERENCE.values(sizes_of(errors))
-    return f"{mean:.1f} / {largest:.0f}"
 
 
 def main() -> None:

@@ -113,6 +113,16 @@ KINDS = {
             ("record", "compare", "recording", "--load", "middle", "--profile", "short_cycle.yaml"),
         ),
     ),
+    "record_calibrate": Kind(
+        "sections.html",
+        (
+            ("spin", "--load", "middle", "--profile", "short_cycle.yaml", "--out", "bench"),
+            (
+                "record", "calibrate", "recording", "--load", "middle", "--profile", "short_cycle.yaml",
+                "--unknown", "damper_types.friction.friction_force",
+            ),
+        ),
+    ),
     "tolerance": _one(
         "sections.html", "study", "tolerance", "laundry", "--samples", "64",
         "--sensitivity", "16", "--subset", "100", "--limits", "limits.yaml",

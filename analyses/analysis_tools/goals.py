@@ -11,7 +11,7 @@ from wm_drake.parameters.measured import measured_changes
 from wm_drake.parameters.published import published_results
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
-from wm_drake.studies.calibrate.solutions import percents_of
+from wm_drake.studies.calibrate.solutions import DIFFERENCE, sizes_of
 from wm_drake.studies.calibrate.targets import Targets
 from wm_drake.studies.gasket.screening import published_for
 
@@ -51,20 +51,23 @@ def goals_of(machine: MachineParameters, reference: MachineParameters) -> dict[s
     without = errors[~has_gasket][targets.amplitude[~has_gasket] > TINY]
     signs = (changes_of(targets, amplitude) * printed_changes(reference, targets) > 0.0).sum()
     screening = screening_of(machine)
-    study = agreement(
-        screening, published_for(published_results(reference.published), screening.tables)
-    )
-    with_gasket, bare = percents_of(errors[has_gasket]), percents_of(without)
+    study = agreement(screening, published_for(published_results(reference.published), screening))
     reached = [
         f"{study.leaders} of {study.responses}",
         f"{EFFECTS - study.other_signs} of {EFFECTS}",
         f"{study.points.mean():.1f} / {study.points.max():.0f}",
         f"{study.means.mean():.1f} / {study.means.max():.0f}",
-        f"{with_gasket.mean:.1f} / {with_gasket.largest:.0f}",
-        f"{bare.mean:.1f} / {bare.largest:.0f}",
+        sizes_text(errors[has_gasket]),
+        sizes_text(without),
         f"{signs} of 12",
     ]
     return dict(zip(GOALS, reached, strict=True))
+
+
+def sizes_text(errors: FloatArray) -> str:
+    """Return mean and largest absolute value of errors in percent."""
+    mean, largest = DIFFERENCE.values(sizes_of(errors))
+    return f"{mean:.1f} / {largest:.0f}"
 
 
 def changes_of(targets: Targets, amplitude: FloatArray) -> FloatArray:

@@ -79,4 +79,5 @@ def quantities_of(parameter_map: ParameterMap, point: FloatArray) -> pd.DataFram
     m = parameter_map
     columns = {"value": point, "lower": m.lower, "upper": m.upper, "expected": m.expected}
     in_units = {name: m.in_units(column) for name, column in columns.items()}
-    return pd.DataFrame({"quantity": m.names, **in_units, "unit": m.units})
+    units = [unknown.unit.shown for unknown in m.unknowns]
+    return pd.DataFrame({"quantity": m.names, **in_units, "unit": units})

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from analysis_tools.machine_net import LAWS, PRIORS, Net, Scored
+from analysis_tools.machine_net import LAWS, Net, Scored, free_of_net
 from wm_drake.batch.ledger import Ledger, LedgerEntry, key_of
 from wm_drake.parameters.types import FloatArray
 
@@ -18,7 +18,7 @@ def identity_of(seed: int) -> dict[str, str]:
     return {
         "study": "net",
         "seed": str(seed),
-        "priors": key_of(text=PRIORS.read_text(encoding="utf-8"), laws=LAWS, block=BLOCK)[:8],
+        "priors": key_of(free={law: free_of_net(law) for law in LAWS}, block=BLOCK)[:8],
     }
 
 

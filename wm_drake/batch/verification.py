@@ -65,8 +65,8 @@ class StepError:
                 f"amplitudes of '{self.case}' differ by {PERCENT.from_si(self.difference):.2g} %"
             )
         step, period = map(MS.from_si, (self.step, self.period))
-        halves = f"half the step of {step:g} ms and half the {period:g} ms between samples"
-        return f"with {halves}, {differ}"
+        halved = f"half the step of {step:g} ms and half the {period:g} ms between samples"
+        return f"with {halved}, {differ}"
 
     @property
     def warning(self) -> str:

@@ -67,7 +67,7 @@ def page(
     for text in machine_warnings(parameters):
         say(f"warning: {text}", err=True)
     with located_in(machine):
-        written = export_page(parameters, out, load or (), machine)
+        written = export_page(parameters, out, load or (), machine, sets or ())
     say(
         f"{out}: {written.movable} numbers to move, {written.fixed} fixed; "
         f"{written.size / 1e3:.0f} kB"

@@ -23,6 +23,8 @@ from wm_drake.simulation.outputs import point_positions
 from wm_drake.simulation.records import Record, profile_of, sample_period
 from wm_drake.simulation.signals import filter_both_ways, largest_peaks
 
+LEAST_PADDING = 6 * FILTER_ORDER + 3
+"""Samples that the filter needs at both ends: the padding that sosfiltfilt chooses by default."""
 REPLAY_SPAN = 8.0
 """Length of a replay. [s]"""
 
@@ -74,25 +76,13 @@ def filtered_lanes(
             filters often can use the same memory again.
     """
     groups, rows, _ = signals.shape
-    padding = padding_of(rows, period, band)
-    if not padding:
+    padding = min(round(PADDING_PERIODS / band[0] / period), rows - 1)
+    if padding <= LEAST_PADDING:
         return np.full(signals.shape, np.nan)
     answer, work = array("filtered", rows * groups), array("filter", rows + 2 * padding)
     sections = band_pass(period, band)
     filter_both_ways(signals.ravel(), (rows, groups), *sections, padding, work, answer)
     return answer.reshape(signals.shape)
-
-
-def padding_of(rows: int, period: float, band: tuple[float, float]) -> int:
-    """Return by how many samples signals are mirrored at both ends; 0 if too few to be filtered.
-
-    Args:
-        rows: Number of samples.
-        period, band: As for `filtered`.
-    """
-    padding = min(round(PADDING_PERIODS / band[0] / period), rows - 1)
-    # the padding that sosfiltfilt chooses by default
-    return padding if padding > 6 * FILTER_ORDER + 3 else 0
 
 
 @functools.cache

@@ -8,6 +8,7 @@ import base64
 import hashlib
 import html
 import json
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ from typing import Any
 
 from wm_drake.compiler.kept import kept
 from wm_drake.engines.compiled.multistep import STEPS_BEFORE
+from wm_drake.engines.compiled.stepping import LARGEST_TURN
 from wm_drake.errors import check_known, input_error, reason_of
 from wm_drake.export.page_kernel import page_kernel
 from wm_drake.export.page_model import (
@@ -35,8 +37,9 @@ from wm_drake.parameters.spin import SAMPLES_OF_TURN
 from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import shape_name
 from wm_drake.report.provenance import program
+from wm_drake.simulation.band import PADDING_PERIODS
 from wm_drake.simulation.cases import notice_jumping_friction
-from wm_drake.simulation.displacements import REPLAY_SPAN, padding_of
+from wm_drake.simulation.displacements import LEAST_PADDING, REPLAY_SPAN
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.mounts import mount_names
 from wm_drake.studies.spin.figures import LONGEST_ORBIT, ORBIT_REVOLUTIONS, have_one_orbit
@@ -96,12 +99,14 @@ def export_page(
     out: str | Path,
     loads: Sequence[str] = (),
     given: str = "",
+    sets: Sequence[str] = (),
 ) -> ExportedPage:
     """Write a machine as one HTML file that runs it.
 
     Args:
         given: Name or path of the machine at the command line, for the commands that the page
             writes; its name if empty.
+        sets: Changes of that machine in these parameters, as `--set` has them.
         out: File to write; it is replaced if it exists.
         loads: Names of the loads that run; all if empty.
 
@@ -120,7 +125,7 @@ def export_page(
     path = Path(out)
     _check_place(path)
     notice_jumping_friction(parameters)
-    data = page_data(parameters) | {"given": given or parameters.name}
+    data = page_data(parameters) | {"given": given or parameters.name, "sets": [*sets]}
     text = _page(data)
     _write(path, text)
     numbers = data["machine"]["numbers"]
@@ -157,7 +162,6 @@ def _page_data(parameters: MachineParameters) -> dict[str, Any]:
     model = without_wrong(model, functions["wm_set_up"].ctypes, contents, candidates)
     code = {name: function.inspect_llvm() for name, function in functions.items()}
     elements, count = model.plan.elements, model.plan.count
-    rows = round(profile.duration / contents.period) + 1
     return {
         "program": program(),
         "tree": machine_tree(parameters),
@@ -169,14 +173,16 @@ def _page_data(parameters: MachineParameters) -> dict[str, Any]:
             "constants": _finite(model.constants.tolist()),
             "places": model.places,
             "sample": elements.begins.size + elements.begins.rates,
-            "padding": padding_of(rows, contents.period, contents.band),
+            "padding": round(PADDING_PERIODS / contents.band[0] / contents.period),
+            "leastPadding": LEAST_PADDING,
+            "fastest": (1.0 + 1e-9) * 2.0 * math.pi / (SAMPLES_OF_TURN * contents.period),
             "stepping": {
                 "integrator": model.stepping.integrator,
                 "step": model.stepping.step,
-                "outputPeriod": parameters.output_period,
+                "period": contents.period,
+                "largestTurn": LARGEST_TURN,
                 "control": contents.layout.control_period,
                 "stepsBefore": STEPS_BEFORE,
-                "samplesOfTurn": SAMPLES_OF_TURN,
             },
         },
         "wasm": base64.b64encode(wasm_module(code)).decode(),

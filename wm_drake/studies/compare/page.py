@@ -112,16 +112,22 @@ def tolerance_text(count: int) -> str:
 
 def summary(agreement: xr.Dataset, count: int) -> str:
     """Return one sentence on where all sensors agree, and on the largest difference elsewhere."""
-    within, is_speed = within_text(count), quantity_of(agreement.at) is SPEED
-    first, last = (text_of(agreement[name]) for name in ("first_place", "last_place"))
-    begin = agreement.from_place.item()
-    worst = _worst_text(agreement)
+    within, worst = within_text(count), _worst_text(agreement)
+    names = ("first_place", "from_place", "to_place", "last_place")
+    first, begin, end, last = (agreement[name].item() for name in names)
+    words = {name: text_of(agreement[name]) for name in names}
     if np.isnan(begin):
-        return f"Outside {within} from {first} to {last}; most of all {worst}."
-    if not worst:
-        return f"Within {within} from {first} to {last}."
-    above, below = ("above", "below") if is_speed else ("after", "before")
-    return f"Within {within} {above} {text_of(agreement.from_place)}; {below}, {worst}."
+        most = f"; most of all, {worst}" if worst else ""
+        return f"Outside {within} from {words['first_place']} to {words['last_place']}{most}."
+    above, below = ("above", "below")
+    if quantity_of(agreement.at) is not SPEED:
+        above, below = "after", "before"
+    where, rest = f"from {words['from_place']} to {words['to_place']}", "elsewhere"
+    if end == last and begin > first:
+        where, rest = f"{above} {words['from_place']}", below
+    elif begin == first and end < last:
+        where, rest = f"{below} {words['to_place']}", above
+    return f"Within {within} {where}{f'; {rest}, {worst}' if worst else ''}."
 
 
 def _worst_text(agreement: xr.Dataset) -> str:
@@ -223,7 +229,8 @@ def _panels(data: xr.Dataset, marks: Callable[[xr.Dataset], list[fig.Mark]], y: 
         )
         for name in data.sensor.values.tolist()
     ]
-    return fig.Figure(panels=fig.in_grid(panels, 3, share="x"), height=210.0)
+    columns = 2 if len(panels) in (2, 4) else 3
+    return fig.Figure(panels=fig.in_grid(panels, columns, share="x"), height=210.0)
 
 
 def _envelopes(amplitudes: xr.Dataset, count: int) -> Plot:
@@ -240,6 +247,8 @@ def _envelopes(amplitudes: xr.Dataset, count: int) -> Plot:
                     x[known], low[known], high[known], color=color, opacity=0.35, key=RECORDED
                 )
                 drawn.append(band)
+                middle = 0.5 * (low + high)
+                drawn.append(fig.Line(x, middle, color=color, width=1.2, key=RECORDED))
             else:
                 drawn.append(fig.Line(x, high, color=color, width=2.4, key=RECORDED))
             drawn.append(fig.Line(x, shown(one.envelope_computed), color=fig.OURS, key=COMPUTED))

@@ -72,9 +72,13 @@ def in_pieces(signals: FloatArray, change: Signals) -> FloatArray:
     return changed
 
 
-def band_passed(pair: Pair) -> FloatArray:
-    """Return measured and predicted signals within the pass band of the run. (2, n, k)"""
-    return np.stack([in_pieces(s, partial(_passed, pair=pair)) for s in pair.both])
+def band_passed(pair: Pair, sides: slice = slice(None)) -> FloatArray:
+    """Return measured and predicted signals within the pass band of the run. (2, n, k)
+
+    Args:
+        sides: Which of both.
+    """
+    return np.stack([in_pieces(s, partial(_passed, pair=pair)) for s in pair.both[sides]])
 
 
 def envelopes_of(signals: FloatArray, time: FloatArray) -> FloatArray:
@@ -178,8 +182,8 @@ def signals_of(pair: Pair, places: xr.DataArray) -> xr.Dataset:
     return xr.Dataset(
         {
             "envelope": (dims, at_places),
-            "rms": (("source", "region", "sensor"), _rms(passed, masks)),
-            "integrated": (("source", "region", "sensor"), _rms(twice, masks)),
+            "rms": (("source", "region", "sensor"), rms_of(passed, masks)),
+            "integrated": (("source", "region", "sensor"), rms_of(twice, masks)),
             "order_one": (("source", "place", "sensor"), means_at(sizes, at_window, count)),
             "orders": (("source", "order", "sensor"), orders),
             "phase": (("place", "sensor"), phase),
@@ -202,7 +206,7 @@ def _passed(signal: FloatArray, pair: Pair) -> FloatArray:
     return filtered(signal[:, None], period, pass_band(profile_of(pair.run), period))[:, 0]
 
 
-def _rms(signals: FloatArray, masks: Sequence[np.ndarray]) -> FloatArray:
+def rms_of(signals: FloatArray, masks: Sequence[np.ndarray]) -> FloatArray:
     """Return the RMS of signals (2, n, k) in regions; NaN if less than half is there. (2, r, k)"""
     rows = []
     for mask in masks:
@@ -222,6 +226,27 @@ def _largest_orders(signals: FloatArray, run: Record) -> FloatArray:
         return np.full(sizes.shape[1:], np.nan)
     largest = np.max(np.where(np.isfinite(sizes), sizes, -1.0), axis=0)
     return np.where(largest >= 0.0, largest, np.nan)
+
+
+def envelope_sizes(passed: FloatArray, run: Record, places: xr.DataArray) -> FloatArray:
+    """Return half the distances between the envelopes of signals at places. (2, places, k)
+
+    Args:
+        passed: As of `band_passed`.
+    """
+    time = run.time.values
+    sides = np.stack([envelopes_of(signals, time) for signals in passed])
+    halves = 0.5 * (sides[:, 0] - sides[:, 1])
+    return means_at(halves, _place_numbers(run, places), places.size)
+
+
+def order_one_sizes(pair: Pair, places: xr.DataArray) -> FloatArray:
+    """Return the sizes of order 1, measured and predicted, at places. (2, places, k)"""
+    one = order_one(pair)
+    time = pair.run.time.values
+    window = np.searchsorted(time, one.time.values).clip(0, len(time) - 1)
+    sizes = np.stack([np.abs(one.measured.values), np.abs(one.predicted.values)])
+    return means_at(sizes, _place_numbers(pair.run, places)[window], places.size)
 
 
 def repeats_of(pairs: Sequence[Pair], places: xr.DataArray) -> xr.Dataset:
@@ -252,12 +277,7 @@ def amplitudes_of(
     measured = sizes.sel(source="measured", drop=True)
     mean, computed = measured.mean("repeat"), sizes.sel(source="computed", drop=True).mean("repeat")
     largest = mean.max("place")
-    count = measured.sizes["repeat"]
-    scatter = SINGLE_TOLERANCE * mean
-    if count > 1:
-        factor = student.ppf(0.5 + 0.5 * CONFIDENCE, count - 1) * np.sqrt(1.0 + 1.0 / count)
-        scatter = factor * measured.std("repeat", ddof=1)
-    tolerance = np.maximum(scatter, LEAST_TOLERANCE * largest)
+    tolerance = np.maximum(_scatter(measured), LEAST_TOLERANCE * largest)
     difference = computed - mean
     unit = QUANTITIES[quantity]
     shown: dict[str, Any] = {
@@ -288,6 +308,16 @@ def amplitudes_of(
     data["agrees"] = xr.Variable(("place", "sensor"), agrees.transpose("place", "sensor"))
     coords = {"place": repeats.place.variable, "sensor": names, "side": ["upper", "lower"]}
     return xr.Dataset(data, coords)
+
+
+def _scatter(measured: xr.DataArray) -> xr.DataArray:
+    """Return half of the range in which a further repeat lies, of those that reach a place."""
+    mean, count = measured.mean("repeat"), measured.notnull().sum("repeat")
+    several = count > 1
+    safe = count.where(several, 2)
+    factor = student.ppf(0.5 + 0.5 * CONFIDENCE, safe - 1) * np.sqrt(1.0 + 1.0 / safe)
+    deviation = np.sqrt(((measured - mean) ** 2).sum("repeat") / (safe - 1))
+    return (factor * deviation).where(several, SINGLE_TOLERANCE * mean)
 
 
 def sensors_of(repeats: xr.Dataset, amplitudes: xr.Dataset, quantity: str) -> xr.Dataset:
@@ -445,58 +475,77 @@ SOURCES = {
 
 
 def agreement_of(amplitudes: Sequence[xr.Dataset], place: xr.DataArray) -> xr.Dataset:
-    """Return from which place on all sensors agree, and the largest difference below it.
+    """Return the longest range of places in which all sensors agree, and what differs elsewhere.
+
+    A single place that differs between places that agree, two on each side, counts as agreeing.
 
     Args:
         amplitudes: As of `amplitudes_of`, of each quantity.
 
     Returns:
-        `from_place`, the lowest place above which `MOST_AGREE` of all amplitudes agree, NaN if
-        there is none, and `last_place`; of the largest difference below it, by the largest
-        amplitude of its sensor: the `sensor`, `at`, the `difference` by the amplitude measured
-        there, and whether that is a maximum over the places (`is_peak`). NaN and "" if all agree.
+        `from_place` and `to_place`, NaN if there is no range of `LEAST_RANGE` of the places;
+        `first_place` and `last_place` of all. Of the largest difference outside of the range, by
+        the largest amplitude of its sensor: the `sensor`, `at`, the `difference` by the amplitude
+        measured there, and whether that is a maximum over the places (`is_peak`); NaN and "" if
+        all agree. Amplitudes below `LEAST_SHOWN` of the largest one of the sensor are left out.
     """
-    agrees = np.hstack([a.agrees.values for a in amplitudes])
-    known = np.hstack([a.measured.notnull().values for a in amplitudes])
-    difference = np.hstack([a.difference.values for a in amplitudes])
-    measured = np.hstack([a.measured.values for a in amplitudes])
-    computed = np.hstack([a.computed.values for a in amplitudes])
+    agrees, known, difference, measured, computed = (
+        np.hstack([values.values for values in part])
+        for part in zip(
+            *(
+                (a.agrees, a.measured.notnull(), a.difference, a.measured, a.computed)
+                for a in amplitudes
+            ),
+            strict=True,
+        )
+    )
     names = [name for a in amplitudes for name in a.sensor.values.tolist()]
     rows = np.flatnonzero(known.any(axis=1))
-    good, count = (agrees & known).sum(axis=1), known.sum(axis=1)
-    good_above, count_above = np.cumsum(good[::-1])[::-1], np.cumsum(count[::-1])[::-1]
-    reached = [
-        row
-        for row in rows
-        if good_above[row] >= MOST_AGREE * count_above[row] and good[row] == count[row]
-    ]
-    first = reached[0] if reached else rows[-1] + 1
-    below = np.where(known & ~agrees, np.abs(difference), -1.0)[:first]
-    worst = np.unravel_index(np.argmax(below), below.shape) if below.size else None
+    begin, end = _longest(np.all(agrees | ~known, axis=1)[rows])
+    has_range = end - begin >= LEAST_RANGE * len(rows)
+    inside = rows[begin:end] if has_range else rows[:0]
+    is_large = measured >= LEAST_SHOWN * np.nanmax(measured, axis=0)
+    outside = np.where(known & ~agrees & is_large, np.abs(difference), -1.0)
+    outside[inside] = -1.0
+    at, k = np.unravel_index(np.argmax(outside), outside.shape)
+    differs = bool(outside[at, k] > 0.0)
+    near = measured[max(0, at - 2) : at + 3, k]
     quantity: Quantity = place.attrs["quantity"]
-    values = {"from_place": np.nan, "at": np.nan, "difference": np.nan}
-    sensor, is_peak = "", False
-    if reached:
-        values["from_place"] = place.values[first]
-    if worst is not None and below[worst] > 0.0:
-        at, k = worst
-        values["at"] = place.values[at]
-        values["difference"] = computed[at, k] / measured[at, k] - 1.0
-        sensor = names[k]
-        near = measured[max(0, at - 2) : at + 3, k]
-        is_peak = bool(measured[at, k] == np.nanmax(near) and 0 < at < len(measured) - 1)
+    values = place.values
+    places = {
+        "from_place": values[inside[0]] if has_range else np.nan,
+        "to_place": values[inside[-1]] if has_range else np.nan,
+        "first_place": values[rows[0]],
+        "last_place": values[rows[-1]],
+        "at": values[at] if differs else np.nan,
+    }
+    part = computed[at, k] / measured[at, k] - 1.0 if differs else np.nan
+    is_peak = differs and bool(measured[at, k] == np.nanmax(near)) and 0 < at < len(measured) - 1
     return xr.Dataset(
-        {
-            "from_place": quantity.variable((), values["from_place"]),
-            "first_place": quantity.variable((), place.values[rows[0]]),
-            "last_place": quantity.variable((), place.values[rows[-1]]),
-            "at": quantity.variable((), values["at"]),
-            "difference": DIFFERENCE.variable((), values["difference"]),
-            "sensor": ((), sensor),
+        {name: quantity.variable((), value) for name, value in places.items()}
+        | {
+            "difference": DIFFERENCE.variable((), part),
+            "sensor": ((), names[k] if differs else ""),
             "is_peak": ((), is_peak),
         }
     )
 
 
-MOST_AGREE = 0.95
-"""Part of amplitudes that agree where a range of speeds is called within the scatter."""
+def _longest(agrees: np.ndarray) -> tuple[int, int]:
+    """Return begin and end of the longest row of places that agree, single others among them."""
+    padded = np.concatenate([[False] * 2, agrees, [False] * 2])
+    filled = padded.copy()
+    filled[2:-2] |= padded[:-4] & padded[1:-3] & padded[3:-1] & padded[4:]
+    changes = np.flatnonzero(np.diff(filled[1:-1].astype(int)))
+    if not len(changes):
+        return 0, 0
+    begins, ends = changes[::2], changes[1::2]
+    best = int(np.argmax(ends - begins))
+    return int(begins[best]), int(ends[best])
+
+
+LEAST_SHOWN = 0.1
+"""Smallest amplitude, by the largest one of the sensor, whose difference is named in percent."""
+
+LEAST_RANGE = 0.1
+"""Smallest part of the places that is called a range in which all sensors agree."""

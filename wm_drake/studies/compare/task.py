@@ -83,7 +83,7 @@ class CompareTask(Task):
 
     def run(self, executor: Executor) -> Answer:
         """Run the machine, align the recordings, and compare."""
-        pairs = self._pairs(executor)
+        pairs = self.pairs(executor)
         for pair in pairs:
             check_signs(pair, self.sensors)
         gaps = gaps_of(pairs, self.sensors, self.points, Scene(self.machine.parameters))
@@ -91,7 +91,8 @@ class CompareTask(Task):
         details = (("Load", self.case.name), ("Drum speed of the model", driven))
         return compare_answer(self.machine.parameters, pairs, self.sensors, gaps, details)
 
-    def _pairs(self, executor: Executor) -> list[Pair]:
+    def pairs(self, executor: Executor) -> list[Pair]:
+        """Run the machine, and return the recordings on the times of the runs."""
         speeds = [recorded_speed(recording, self.test) for recording in self.recordings]
         pairs: list[Pair] = []
         if self.options.speed == "profile" or any(speed is None for speed in speeds):

@@ -3,7 +3,6 @@
 
 const PAGE = 65536;
 const TOP = 2 << 20;      // where the stack begins, downwards to the constants of the module
-const TURN = 0.2;         // rad, largest turn of the drum in a step with one derivative
 
 /** Return lengths, accelerations and drum motion of the steps through a profile, and their samples. */
 export function scheduleOf({time: corners, speed}, {step, period, control, stepsBefore}) {
@@ -56,15 +55,12 @@ export function scheduleOf({time: corners, speed}, {step, period, control, steps
   return schedule;
 }
 
-/** Return how a profile is stepped and sampled, from the settings of the machine as exported. */
-export function steppingOf(profile, {step, outputPeriod, integrator, control, stepsBefore, samplesOfTurn}) {
-  const fastest = Math.max(...profile.speed.map(Math.abs));
-  const inTurn = (samplesOfTurn * fastest * outputPeriod) / (2 * Math.PI);
-  const period = outputPeriod / 2 ** Math.ceil(Math.log2(Math.max(1, inTurn)) - 1e-9);
-  const longest = integrator === 'multistep' ? TURN / fastest : Infinity;
-  let length = Math.min(step, period / Math.ceil((period / step) * (1 - 1e-9)));
-  while (length > longest) length *= 0.5;
-  return {step: length, period, control, stepsBefore: integrator === 'multistep' ? stepsBefore : -1};
+/** Return how a profile is stepped: as exported, with shorter steps for a faster drum. */
+export function steppingOf({speed}, {step, largestTurn, integrator, ...rest}) {
+  const fastest = Math.max(...speed.map(Math.abs));
+  let length = step;
+  while (integrator === 'multistep' && fastest * length > largestTurn) length *= 0.5;
+  return {...rest, step: length, stepsBefore: integrator === 'multistep' ? rest.stepsBefore : -1};
 }
 
 /** A machine in WebAssembly. `model` has the places of its numbers. */
@@ -159,7 +155,9 @@ export class Machine {
 
   /** Return the filtered displacements of the sensors, one after the other, and their largest peaks. */
   amplitudes() {
-    const {rows, model: {padding, count: {sensors}}} = this;
+    const {rows, model: {count: {sensors}}} = this;
+    const most = Math.min(this.model.padding, rows - 1);
+    const padding = most > this.model.leastPadding ? most : 0;
     const filtered = this.floats(rows * sensors);
     const sizes = this.floats(sensors);
     const places = this.allocate(8 * sensors);

@@ -58,6 +58,8 @@ function chosen(state) {
   if (problems.length) throw new Problems(problems);
   if (profile.time.some((t, k) => k > 0 && !(t > profile.time[k - 1]))) throw wrong('profile.time', 'the times must rise');
   if (profile.time.at(-1) / model.stepping.step > MOST_STEPS) throw wrong('profile.time', `the run is too long for this page; allowed are ${MOST_STEPS} steps`);
+  const fastest = Math.max(...profile.speed.map(Math.abs));
+  if (fastest > model.fastest) throw wrong('profile.speed', `samples and filter of this page are for up to ${Math.floor(RPM * model.fastest)} rpm; export the machine with a faster profile`);
   if (!state.gasket && 'gasket' in model.places) changes.push([model.places.gasket, 0]);
   changes.push([model.at.speed, profile.speed[0]]);
   return {changes, loads, profile, values};
@@ -174,7 +176,7 @@ async function run({state}) {
     loads: names.map((load, k) => ({load, ...gapOf(found[k], profile)})),
     measured: own ? [] : data.measured[state.load][state.gasket ? 'yes' : 'no'] ?? [],
     warnings: [], band: data.band,
-    stepping: {integrator: model.stepping.integrator, step_ms: 1e3 * model.stepping.step},
+    stepping: {integrator: model.stepping.integrator, step: `${Number((1e3 * model.stepping.step).toPrecision(4))} ms`},
   };
 }
 
@@ -242,7 +244,7 @@ export async function post(path, body) {
 /** Return the changes of a state as texts by key path, as `--set` takes them. */
 function changedTexts(state) {
   const {values, profile} = chosen(state);
-  const texts = new Map();
+  const texts = new Map((data.sets ?? []).map((set) => [set.slice(0, set.indexOf('=')).trim(), set.slice(set.indexOf('=') + 1).trim()]));
   for (const [key, value] of Object.entries(values)) {
     const {unit, kind, value: original} = numberOf.get(key);
     const whole = key.slice(0, key.lastIndexOf('.'));
@@ -283,10 +285,10 @@ export function take(state) {
     const path = key.split('.');
     const last = path.pop();
     const node = nodeAt(tree, data.tree, path);
-    if (!text.endsWith(' %')) node[last] = text;
+    if (!text.endsWith('%')) node[last] = text === 'null' ? null : text;
     else {
       const table = nodeAt(node, nodeIn(data.tree, path), [last]);
-      for (const name of ['force', 'torque']) if (name in table) table[name] = scaled(table[name], Number(text.slice(0, -2)) / 100);
+      for (const name of ['force', 'torque']) if (name in table) table[name] = scaled(table[name], parseFloat(text) / 100);
     }
   }
   if (state.masses.length) tree.loads = {described: {unbalances: state.masses}};
