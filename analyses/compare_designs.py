@@ -101,7 +101,9 @@ def main() -> None:
             | errors
         )
     text = pd.DataFrame(rows).round(2).to_string(index=False)
-    print(f"contributions above {SMALLEST_SHARE:.0%}, largest error in percentage points\n{text}")
+    print(
+        f"contributions above {100.0 * SMALLEST_SHARE:g} %, largest error in percentage points\n{text}"
+    )
     if arguments.out:
         arguments.out.write_text(text + "\n")
 

@@ -165,10 +165,12 @@ def _dims_of(data: xr.Dataset) -> list[Hashable]:
 
 
 def _in_reading_unit(array: xr.DataArray) -> xr.DataArray:
-    unit = quantity_of(array).reading
-    if array.dtype.kind not in NUMBERS or (unit.si == unit.shown and units_of(array) is None):
+    if array.dtype.kind not in NUMBERS:
         return array
-    return array.copy(data=shown(array))
+    unit = quantity_of(array).reading
+    if unit.si == unit.shown and units_of(array) is None:
+        return array
+    return array.copy(deep=False, data=shown(array))
 
 
 def _name_in_files(name: str, array: xr.DataArray) -> str:
