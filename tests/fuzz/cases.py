@@ -204,7 +204,7 @@ OPTIONS = [
     ("study spin-cycle", ["--workers", "--engine", "--profile", "--case"]),
     ("study spin-identify --out out", ["--seed", "--noise", "--workers", "--unknown", "--case"]),
     ("study gasket-damping", ["--workers", "--load"]),
-    ("identify damper LOOP", ["--seed", "--knots", "--method", "--units", "--law", "--bounds", "--fix", "--name", "--cutoff"]),
+    ("identify damper LOOP", ["--seed", "--knots", "--method", "--file-units", "--law", "--bounds", "--fix", "--name", "--cutoff"]),
     ("studio --no-browser", ["--machine", "--port"]),
     ("rig damper", ["--frequency", "--amplitude", "--matrix", "--sponge-mass", "--name", "--component"]),
     ("rig gasket --axis x -f 1Hz", ["--amplitude", "--arm", "--axis"]),

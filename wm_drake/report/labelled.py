@@ -108,7 +108,7 @@ def _with_unit(data: xr.Dataset) -> xr.Dataset:
     """Return data with a column of units, if the unit of a variable differs from row to row."""
     numbers = (variable for variable in data.values() if variable.dtype.kind in NUMBERS)
     for dim, quantities in filter(None, map(units_of, numbers)):
-        return data.assign_coords(unit=(dim, [quantity.unit.label for quantity in quantities]))
+        return data.assign_coords(unit=(dim, [quantity.reading.label for quantity in quantities]))
     return data
 
 

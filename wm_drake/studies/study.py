@@ -345,7 +345,7 @@ SI_ONLY = (
     *("study gasket-damping", "study gasket-geometry", "study response"),
     *("rig bushing", "rig damper", "rig gasket"),
     *("study design", "study gasket", "study spin-cycle", "study spin-identify", "study tolerance"),
-    *("identify bushing", "identify damper", "identify gasket", "identify table2"),
+    *("identify bushing", "identify damper", "identify gasket"),
 )
 """Commands whose numbers do not all carry a quantity: their units cannot be chosen."""
 

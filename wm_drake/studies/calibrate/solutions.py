@@ -90,7 +90,7 @@ class Solution:
 
     def verdicts(self) -> list[str]:
         """Return what determines each quantity: "data", "prior", "data and prior" or "bound"."""
-        at_bound = [bool(estimate.at_bound) for estimate in self.posterior.estimates]
+        at_bound = np.array([estimate.at_bound != "" for estimate in self.posterior.estimates])
         spread = self.posterior.spread()
         cases = [at_bound, spread < DETERMINED, spread > UNDETERMINED]
         return list(map(str, np.select(cases, ["bound", "data", "prior"], "data and prior")))

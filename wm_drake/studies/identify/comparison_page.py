@@ -134,29 +134,23 @@ def _errors(comparison: LawComparison) -> LabelledTable:
         [r.left_out[one.index] if one.kind == "fitted" else np.nan for r in comparison.results]
         for one in tested
     ]
+    dims = ("test", "law")
+    normalised = LACK.named("RMSE by the largest value")
     columns = {
-        "rmse": (load.named("RMSE"), [[e.rmse for e in row] for row in errors]),
-        "rmse_normalised": (
-            LACK.named("RMSE by the largest value"),
-            [[e.normalised for e in row] for row in errors],
+        "rmse": load.named("RMSE").variable(dims, [[e.rmse for e in row] for row in errors]),
+        "rmse_normalised": normalised.variable(
+            dims, [[e.normalised for e in row] for row in errors]
         ),
-        "rmse_left_out": (load.named("RMSE left out"), left_out),
+        "rmse_left_out": load.named("RMSE left out").hidden(dims, left_out),
     }
-    of_tests = motions_of_tests([one.measured for one in tested])
+    labels = {
+        "test": [one.measured.loop.name for one in tested],
+        "kind": ("test", [one.kind for one in tested]),
+        "law": [r.law for r in comparison.results],
+    }
     return LabelledTable(
         "errors",
-        xr.Dataset(
-            of_tests
-            | {
-                name: quantity.variable(("test", "law"), values)
-                for name, (quantity, values) in columns.items()
-            },
-            {
-                "test": [one.measured.loop.name for one in tested],
-                "kind": ("test", [one.kind for one in tested]),
-                "law": [r.law for r in comparison.results],
-            },
-        ),
+        xr.Dataset(motions_of_tests([one.measured for one in tested]) | columns, labels),
         "Errors",
         "Root mean square error of each test and law, absolute and by the largest measured.",
         across="law",

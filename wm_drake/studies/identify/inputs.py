@@ -26,7 +26,7 @@ def loops_of(files: Sequence[Path], options: IdentifyOptions) -> list[MeasuredLo
     names, default = channel_names(options, LOOP_WORDS)
     if default:
         raise input_error(f"'{default}' is not NAME=UNIT", where="--unit")
-    units = units_of(options.units)
+    units = units_of(options.file_units)
     return read_loops(existing_files(files), replace(names, units={**units, **names.units}))
 
 
@@ -75,13 +75,13 @@ def motions_of(
 
 
 def units_of(text: str | None) -> dict[str, str]:
-    """Return the units of time, displacement and force of the option `--units`, by word."""
+    """Return the units of time, displacement and force of the option `--file-units`, by word."""
     if text is None:
         return {}
     parts = [part.strip() for part in text.split(",")]
     if len(parts) != 3:
         raise input_error(
-            f"'{text}' is not three units; write for example 's,mm,N'", where="--units"
+            f"'{text}' is not three units; write for example 's,mm,N'", where="--file-units"
         )
     return dict(zip(LOOP_WORDS, (parts[0], parts[1], parts[1], parts[2], parts[2]), strict=True))
 

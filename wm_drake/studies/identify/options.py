@@ -29,7 +29,7 @@ class IdentifyOptions(ComponentOptions):
     fix: tuple[str, ...] = option(
         (), "A number that is known: slider_damping='0.4 N s/mm'. Repeatable.", "KEY=VALUE"
     )
-    units: str | None = option(
+    file_units: str | None = option(
         None, "Of time, displacement, force, where files do not say: 's,mm,N'.", "UNITS"
     )
     cutoff: str | None = option(
