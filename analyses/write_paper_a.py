@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from analysis_tools import validation_page as page
 from analysis_tools.validation_page import NOT_COMPARABLE, listed, verdict
 from analysis_tools.validation_rows import spin_cycle_rows
@@ -34,12 +35,7 @@ from wm_drake.rigs import (
     measures_of,
 )
 from wm_drake.studies.rig.study import printed_table
-from wm_drake.studies.spin_cycle.study import (
-    SpinCycleRuns,
-    average_errors,
-    compiled_runs,
-    run_spin_cycle,
-)
+from wm_drake.studies.spin_cycle.study import average_errors, compiled_runs, run_spin_cycle
 
 MM = 1e-3
 FIG_16 = 5.0, 0.8
@@ -399,7 +395,7 @@ def table_9_lines(cases: list[UnbalanceCase]) -> list[list[str]]:
     ]
 
 
-def cycle_lines(result: SpinCycleRuns) -> list[list[str]]:
+def cycle_lines(size: xr.DataArray) -> list[list[str]]:
     """Return lines for section 4.2: what it says in words of cases 2, 5 and 29."""
     words = {"met": verdict(True), "missed": verdict(False)}
     return [
@@ -410,15 +406,15 @@ def cycle_lines(result: SpinCycleRuns) -> list[list[str]]:
             words.get(row.verdict.strip("*"), NOT_COMPARABLE),
             f"{CYCLE[:-1]} --case 2 --case 5 --case 29`",
         ]
-        for row in spin_cycle_rows(result)
+        for row in spin_cycle_rows(size)
     ]
 
 
 def displacements(
     machine: MachineParameters, cases: list[UnbalanceCase], profile: SpinProfile
-) -> SpinCycleRuns:
-    """Return the spin cycle of a machine."""
-    return run_spin_cycle(machine, cases, profile, compiled_runs(build_machine(machine)))
+) -> xr.DataArray:
+    """Return the RMS displacements of a machine in a spin cycle."""
+    return run_spin_cycle(machine, cases, profile, compiled_runs(build_machine(machine))).rms
 
 
 def begin_of(profile: SpinProfile) -> SpinProfile:
@@ -429,22 +425,25 @@ def begin_of(profile: SpinProfile) -> SpinProfile:
     )
 
 
-def cause_lines(machine: MachineParameters, perfect: SpinCycleRuns) -> list[list[str]]:
+def cause_lines(
+    machine: MachineParameters,
+    cases: list[UnbalanceCase],
+    profile: SpinProfile,
+    perfect: xr.DataArray,
+) -> list[list[str]]:
     """Return lines for the three causes of error: mean change of the RMS displacements by group.
 
     Args:
         machine: The machine without these causes.
-        perfect: Its spin cycle.
+        perfect: Its RMS displacements.
     """
-    cases = list(perfect.cases)
     published = {case.name: case.published_error_percent for case in cases}
     changes = {}
     for name, imperfections in CAUSES.items():
         imperfect = machine.model_copy(
             update={"imperfections": Imperfections.model_validate(imperfections)}
         )
-        found = displacements(imperfect, cases, perfect.profile)
-        changes[name] = average_errors(found.displacement, perfect.displacement)
+        changes[name] = average_errors(displacements(imperfect, cases, profile), perfect)
     lines = []
     for group, belongs in GROUPS.items():
         names = [case.name for case in cases if belongs(case)]
@@ -467,7 +466,8 @@ def main() -> None:
     cases = [case for case in every if case.name in CASES or not arguments.quick]
     cycle = load_profile("spin_cycle")
     perfect = displacements(machine, cases, cycle)
-    begun = displacements(machine, cases, begin_of(cycle)) if arguments.quick else perfect
+    part = begin_of(cycle) if arguments.quick else cycle
+    begun = displacements(machine, cases, part) if arguments.quick else perfect
     text = page.origin("python analyses/write_paper_a.py --page docs/paper-a.md", [])
     text += page.table_text("Component tests: section 2", HEADS, test_lines(machine))
     text += page.table_text("Errors of the models: section 3", HEADS, model_lines())
@@ -477,7 +477,7 @@ def main() -> None:
     text += page.table_text(
         "Three causes of error: section 4.2",
         ["cases", "[A]: error of its model", *CAUSES],
-        cause_lines(machine, begun),
+        cause_lines(machine, cases, part, begun),
     )
     print(text)
     page.write(text, arguments.out, arguments.page)

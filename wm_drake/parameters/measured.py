@@ -213,7 +213,12 @@ def _check_entries(table: "pd.DataFrame", column: str, allowed: tuple[str, ...],
 
 
 def _read(path: str, sensors: list[str]) -> "pd.DataFrame":
-    table = read_csv(path, _KEYS + sensors, key="measured", optional=BAND)
+    head, written = read_header(Path(path), key="measured"), [f"{name}_mm" for name in sensors]
+    if set(head) == {*_KEYS, BAND, *written}:  # as `wm-drake spin` writes it
+        table, columns = read_csv(path, head, key="measured"), written
+    else:
+        table = read_csv(path, _KEYS + sensors, key="measured", optional=BAND)
+        columns = sensors
     _check_entries(table, "gasket", ("yes", "no", CHANGE), path)
-    values = finite_numbers(table[sensors], path, key="measured")
+    values = finite_numbers(table[columns], path, key="measured")
     return table[_KEYS].assign(**dict(zip(sensors, values.T, strict=True)))

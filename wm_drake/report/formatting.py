@@ -48,11 +48,6 @@ def percent(value: float) -> str:
     return f"+{text} %" if round(value) > 0 else f"{text} %"
 
 
-def gap_size(distance: float) -> str:
-    """Return a gap with its unit, and that the parts touch where it is not positive. [m]"""
-    return f"{number(MM_PER_M * distance)} mm{' (they touch)' if distance <= 0.0 else ''}"
-
-
 def listed(words: Sequence[str]) -> str:
     """Return words as a list in a sentence: a, b and c."""
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

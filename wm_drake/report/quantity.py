@@ -121,6 +121,11 @@ def quantity_of(array: "xr.DataArray") -> Quantity:
     return _of_measures().get(str(array.name)) or Quantity(str(array.name).replace("_", " "))
 
 
+def of_measure(name: str) -> Quantity:
+    """Return the quantity of a variable of a measure by its name."""
+    return _of_measures()[name]
+
+
 def _of_measures() -> dict[str, Quantity]:
     """Return the quantities of all measures by the names of their variables."""
     from wm_drake.simulation.measures import MEASURES  # registered ones too, so at each call

@@ -7,12 +7,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import machine_yaml
 from wm_drake.parameters.measured import EXPERIMENT
 from wm_drake.report.formatting import MM_PER_M, number, percent
 from wm_drake.report.page import Picture, Section, SectionedPage, picture, versions_of
+from wm_drake.report.quantity import shown
 from wm_drake.report.table import Column, Group, Row, Table, line
 from wm_drake.report.terminal import Printed
 from wm_drake.simulation.cases import case_of
@@ -30,9 +32,16 @@ from wm_drake.studies.calibrate.tables import (
     responses_shown,
 )
 from wm_drake.studies.machine_show.description import Modes, natural_modes
-from wm_drake.studies.spin import tables
+from wm_drake.studies.spin.data import OURS, amplitudes_of, differences_of, experiment_of, gaps_of
 from wm_drake.studies.spin.figures import envelopes_figure
-from wm_drake.studies.spin.study import ComparedCases, SpinRuns, band_text, run_spin
+from wm_drake.studies.spin.page import amplitude_tables, gaps_table, sensors_table
+from wm_drake.studies.spin.study import (
+    CaseResult,
+    ComparedCases,
+    SpinRuns,
+    band_text,
+    run_spin,
+)
 from wm_drake.studies.study import Facts, Result
 
 
@@ -137,11 +146,14 @@ def drawn_page(
         facts: How the result was computed.
     """
     best = replace(best, comparison=ComparedCases.ALL)  # the targets were named
-    table = tables.amplitude_table(best)
+    amplitudes = amplitudes_of(best)
     return SectionedPage(
         f"Calibration of machine {best.parameters.name}",
         summary(result.calibration, result.predictions),
-        [*_picture_sections(result, best, modes, table), *_table_sections(result, best, table)],
+        [
+            *_picture_sections(result, best, modes, amplitudes),
+            *_table_sections(result, best, amplitudes),
+        ],
         _facts(result.calibration, best, facts),
         best.parameters,
         [*facts.warnings, *warnings_of(best)],
@@ -153,11 +165,11 @@ def _picture_sections(
     result: CalibrateResult,
     best: SpinRuns,
     modes: Sequence[tuple[str, Modes]],
-    table: pd.DataFrame,
+    amplitudes: xr.Dataset,
 ) -> list[Section]:
     calibration = result.calibration
-    errors = _errors_picture(best, table)
-    envelopes = tuple(_envelopes_picture(best, table, i) for i in range(len(best.results)))
+    errors = _errors_picture(best, amplitudes)
+    envelopes = tuple(_envelopes_picture(case, amplitudes) for case in best.results)
     return [
         Section("errors", "Errors of the amplitudes", (errors,)),
         Section(
@@ -175,16 +187,19 @@ def _picture_sections(
     ]
 
 
-def _table_sections(result: CalibrateResult, best: SpinRuns, table: pd.DataFrame) -> list[Section]:
+def _table_sections(
+    result: CalibrateResult, best: SpinRuns, amplitudes: xr.Dataset
+) -> list[Section]:
     calibration, predictions = result.calibration, result.predictions
     effects, relations = effects_table(calibration), relations_table(calibration)
     responses = [responses_shown(calibration)] if calibration.targets.responses else []
     predicted = [predictions_shown(predictions)] if predictions else []
     predicted += [intervals_table(calibration, prediction) for prediction in predictions]
     quantities = [quantities_shown(calibration), *filter(None, [relations])]
-    speeds = tables.critical_speeds(best), tables.smallest_gaps(best)
+    speeds = sensors_table(best).table(), gaps_table(gaps_of(best)).table()
+    compared = [table.table() for table in amplitude_tables(best, amplitudes)]
     return [
-        Section("amplitudes", "Amplitudes", tables=[tables.comparison(best, table)]),
+        Section("amplitudes", "Amplitudes", tables=compared),
         Section("responses", "Other responses", tables=responses),
         Section("gasket", "Effect of the gasket", tables=[effects] if effects else []),
         Section(
@@ -417,17 +432,18 @@ def searches_table(calibration: Calibration) -> Table:
     return Table(caption, columns, groups)
 
 
-def _errors_picture(best: SpinRuns, table: pd.DataFrame) -> Picture:
-    others = list(dict.fromkeys(table["source"]))
-    others = [source for source in others if source not in (EXPERIMENT, tables.OURS)]
+def _errors_picture(best: SpinRuns, amplitudes: xr.Dataset) -> Picture:
+    differences = differences_of(amplitudes)
+    others = [name for name in dict.fromkeys(differences.source.values.tolist()) if name != OURS]
 
-    def errors(case: object, source: str) -> np.ndarray | None:
-        changes = tables.differences(table, case, source)  # type: ignore[arg-type]
-        return np.array([change.percent for change in changes]) if changes else None
+    def errors(case: CaseResult, source: str) -> np.ndarray | None:
+        labels = {"load": case.case.name, "gasket": case.record.attrs["gasket"], "source": source}
+        found = np.logical_and.reduce([differences[n].values == of for n, of in labels.items()])
+        return shown(differences.difference[int(found.argmax())]) if found.any() else None
 
     rows = []
     for case in best.results:
-        ours = errors(case, tables.OURS)
+        ours = errors(case, OURS)
         if ours is not None:
             of_others = (errors(case, source) for source in others)
             rows.append((case.title, ours, next((e for e in of_others if e is not None), None)))
@@ -460,14 +476,13 @@ def _modes_picture(modes: Sequence[tuple[str, Modes]]) -> Picture:
     return picture(modes_figure(modes), f"Natural frequencies {alternative}.", caption)
 
 
-def _envelopes_picture(best: SpinRuns, table: pd.DataFrame, index: int) -> Picture:
-    case = best.results[index]
+def _envelopes_picture(case: CaseResult, amplitudes: xr.Dataset) -> Picture:
     caption = (
         f"Load {case.title}: displacement in the band {band_text(case)}. The shaded area "
         "extends from the lower to the upper envelope. Dashed lines: measured amplitude."
     )
     return picture(
-        envelopes_figure(case.record, tables.experiment_mm(table, case)),
+        envelopes_figure(case.record, experiment_of(amplitudes, case)),
         f"Envelopes, load {case.title}.",
         caption,
     )
