@@ -1,5 +1,7 @@
 """Parts of a spin page about the drive: its measures, and speed and torque over time."""
 
+from dataclasses import replace
+
 import numpy as np
 import xarray as xr
 
@@ -121,8 +123,8 @@ def drive_figure(runs: SpinRuns, case: CaseResult) -> fig.Figure:
     ]
     limit = _limit(runs, speed[starts])
     if np.abs(limit).min() < 4.0 * np.abs(torque).max():  # else it would hide the torque
-        at, y = time[starts], TORQUE.values(limit)
-        below.append(fig.Line(at, y, color=fig.QUIET, dash="dashed", key="limit"))
+        line = fig.Line(time[starts], TORQUE.values(limit), color=fig.QUIET, key="limit")
+        below.append(replace(line, dash="dashed"))
     x_axis = fig.Axis(label=TIME.label, range=(0.0, float(time[-1])))
     panels = [
         fig.Panel(name=q.words, marks=tuple(marks), x=x_axis, y=fig.Axis(label=q.label))

@@ -93,7 +93,7 @@ def margins_table(measures: xr.Dataset) -> LabelledTable:
         whole = measures[name].expand_dims(part=[WHOLE_RUN])
         regions = measures[f"region_{name}"].rename(region="part")
         joined = xr.concat([whole, regions], "part").transpose("load", "part")
-        of_parts[name] = of_measure(name).variable(joined.dims, joined)
+        of_parts[name] = of_measure(name).variable(("load", "part"), joined)
     data = xr.Dataset(
         of_parts, {"load": measures["load"], "part": [WHOLE_RUN, *measures.region.values]}
     )
@@ -257,8 +257,8 @@ def walk_figure(cases: list[CaseResult], farthest: CaseResult) -> fig.Figure:
         x = fig.Axis(label=TIME.label if row else "", range=(0.0, last), scale="time")
         x = replace(x, has_numbers=bool(row))
         y = fig.Axis(label=quantity.label)
-        at = {"row": row, "column": 1}
-        panels.append(fig.Panel(name=quantity.words, marks=tuple(marks), x=x, y=y, **at))
+        panel = fig.Panel(name=quantity.words, marks=tuple(marks), x=x, y=y)
+        panels.append(replace(panel, row=row, column=1))
     return fig.Figure(panels=tuple(panels), height=185.0)
 
 

@@ -21,8 +21,8 @@ from wm_drake.studies.answer import Answer, Part, Plot, diverged_runs
 from wm_drake.studies.spin.drive import drive_data
 from wm_drake.studies.spin.study import gap_size
 from wm_drake.studies.spin_cycle.figures import bars_figure, heat_map_figure, profile_figure
+from wm_drake.studies.spin_cycle.measured import DIMS
 from wm_drake.studies.spin_cycle.study import (
-    DIMS,
     ERROR,
     MASS,
     PHASE,
@@ -390,7 +390,9 @@ def _speeds_text(profile: SpinProfile, begin: float, end: float) -> str:
 
 def _named(array: xr.DataArray, words: str) -> xr.Variable:
     """Return the variable of an array with other words."""
-    return quantity_of(array).named(words).variable(array.dims, array)
+    variable = array.variable.copy()
+    variable.attrs = quantity_of(array).named(words).attributes()
+    return variable
 
 
 def rms_table(name: str, displacement: xr.DataArray) -> LabelledTable:

@@ -7,11 +7,10 @@ from wm_drake.errors import check_known
 from wm_drake.model.machine import Machine
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import runnable_profile
+from wm_drake.studies.spin_cycle.measured import DIMS, RMS
 from wm_drake.studies.spin_cycle.options import SpinCycleOptions
 from wm_drake.studies.spin_cycle.page import spin_cycle_answer
 from wm_drake.studies.spin_cycle.study import (
-    DIMS,
-    RMS,
     cases_of_table,
     drake_runs,
     measured_displacements,
