@@ -1,4 +1,4 @@
-"""Which machine moves like the Adams model of [B], and which like the one that was measured?
+"""Which machine moves like the Adams model of [B]?
 
 The script fits the free quantities of reference_free.yaml to half of the printed amplitudes of the
 Adams model, measured ones where it has none, and to all of [B] Table 5: means, effects and
@@ -6,14 +6,11 @@ contributions. With --predict it repeats the fit three times, without all tables
 load, without those of the middle load, and without the amplitudes of back and front, from machines
 drawn from the priors, and says what each fit predicts of what it has not seen. That takes
 about an hour of processor time.
-With `--machine reference_2026_11` it fits those of reference_2026_11_free.yaml to the 36 measured
-amplitudes of [B] Tables 1 and 3 and to the 18 means of Table 5, and predicts held-out loads.
 It prints the errors of the best machine and of the predictions.
 With --write, the best machine is written to its file in wm_drake/data/machines, and its masses and
 places to its SDF model, with the uncertainty beside each number. `wm-drake calibrate` makes a
 report page of such a fit. Tables of the predictions are written beside the result;
-write_validation.py reads them as reference_held_out.csv, reference_held_out_study.csv and
-reference_2026_11_held_out.csv.
+write_validation.py reads them as reference_held_out.csv and reference_held_out_study.csv.
 """
 
 import argparse
@@ -29,16 +26,9 @@ from wm_drake.model.bodies import sdf_path
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import MachineParameters, load_machine, machine_file_with, machine_path
 from wm_drake.parameters.free import FreeFile, load_free
-from wm_drake.parameters.measured import (
-    DESIGN,
-    EXPERIMENT,
-    NamedValue,
-    measured_amplitudes,
-    measured_responses,
-)
-from wm_drake.parameters.published import CONSTANT, published_results
+from wm_drake.parameters.measured import EXPERIMENT, measured_amplitudes, measured_responses
+from wm_drake.parameters.published import published_results
 from wm_drake.report.progress import progress_bar
-from wm_drake.simulation.measures.responses import known_responses
 from wm_drake.studies.calibrate.computed import PointRunner
 from wm_drake.studies.calibrate.prediction import Prediction, predict
 from wm_drake.studies.calibrate.response_targets import with_deviations
@@ -53,31 +43,15 @@ from wm_drake.studies.calibrate.tables import FITS, prediction_table
 from wm_drake.studies.calibrate.targets import Targets, targets_of
 from wm_drake.studies.gasket.screening import published_for
 
-REFERENCE, EARLIER = "reference", "reference_2026_11"
+REFERENCE = "reference"
 ADAMS_SOURCE = "Adams model of [B]"
-HELD_OUT = {
-    REFERENCE: (("counter",), ("middle",), ("back", "front")),
-    EARLIER: (("back", "front"), ("middle",), ("counter",), ("back",), ("front",)),
-}
+HELD_OUT = (("counter",), ("middle",), ("back", "front"))
 """Loads that are held out together, one group per prediction."""
-LIMITS = {"amplitudes": 0.1985, "displacement": 0.485, "force": 0.485, "moment": 0.485, "My": 0.245}
-"""Largest relative differences of the earlier machine.
 
-They lie a little within those that it must keep: 20 % of an amplitude, 50 % of a mean, 25 % of My.
-"""
+PLAN = SearchPlan(starts=1, iterations=1, deviation=0.04)
+"""The start of the free file is the end of a wide search; it is only evaluated."""
 
-PLAN = SearchPlan(starts=1, iterations=1, deviation=0.033)
-"""The start of the free file is the end of a wide search within the limits; it is only evaluated.
-
-With this deviation of the amplitudes and that of the means below, the mean difference is below
-7.8 % for the amplitudes, that of [B]'s own model, and below 15 % for the means.
-"""
-
-MEANS_DEVIATION = 0.09
-"""Relative standard deviation of the means."""
-
-ADAMS_PLAN = replace(PLAN, deviation=0.04)
-ADAMS_DEVIATIONS = {
+DEVIATIONS = {
     "effect": 0.03,
     "contribution": 0.1,
     "displacement": 0.05,
@@ -87,12 +61,9 @@ ADAMS_DEVIATIONS = {
 """Relative standard deviations of results of the Adams model, which have no noise: how far a model
 of the same class may miss them. Effects: fractions of the mean; contributions: of the variance."""
 
-PREDICTION = {
-    REFERENCE: replace(ADAMS_PLAN, starts=3, iterations=30, start_draws=500),
-    EARLIER: replace(PLAN, starts=2, iterations=25),
-}
-"""Plans of a prediction: searches from and near the expected values. The starting values of the
-free file are not used, because they come from a fit to all loads."""
+PREDICTION = replace(PLAN, starts=3, iterations=30, start_draws=500)
+"""Plan of a prediction: searches from and near the expected values. The starting values of the free
+file are not used, because they come from a fit to all loads."""
 
 QUICK_DRAWS = 8
 """Machines drawn for the intervals of a prediction with --quick."""
@@ -101,12 +72,10 @@ QUICK_DRAWS = 8
 def main() -> None:
     """Run the calibration and the predictions, print the errors, and write the machine."""
     arguments = _arguments()
-    machine = build_machine(load_machine(arguments.machine))
+    machine = build_machine(load_machine(REFERENCE))
     free, plan, held_out = _searched(arguments)
     targets = _targets_for(arguments, machine.parameters)
-    prediction_plan = PREDICTION[arguments.machine]
-    if arguments.quick:
-        prediction_plan = replace(plan, draws=QUICK_DRAWS)
+    prediction_plan = replace(plan, draws=QUICK_DRAWS) if arguments.quick else PREDICTION
     ledger_path = arguments.out.with_suffix(".sqlite")
     with open_ledger(ledger_path, identity_of(machine, free, targets, plan), resume=True) as ledger:
         runner = PointRunner(machine, ledger)
@@ -138,43 +107,17 @@ def _searched(
     arguments: argparse.Namespace,
 ) -> tuple[FreeFile, SearchPlan, tuple[tuple[str, ...], ...]]:
     """Return free quantities, plan of the search, and groups of loads that are held out."""
-    free = load_free(Path(__file__).with_name(f"{arguments.machine}_free.yaml"))
+    free = load_free(Path(__file__).with_name(f"{REFERENCE}_free.yaml"))
     if arguments.quick:
         few = dict(list(free.quantities.items())[:3])
         return FreeFile(quantities=few), SearchPlan(starts=1, iterations=1), (("back", "front"),)
-    if arguments.machine == REFERENCE:
-        return free, ADAMS_PLAN, HELD_OUT[REFERENCE] if arguments.predict else ()
-    return free, PLAN, HELD_OUT[EARLIER]
+    return free, PLAN, HELD_OUT if arguments.predict else ()
 
 
 def _targets_for(arguments: argparse.Namespace, parameters: MachineParameters) -> Targets:
-    if arguments.machine == REFERENCE and not arguments.quick:
-        return adams_targets(parameters)
-    targets = _targets(parameters, with_means=not arguments.quick)
-    return targets if arguments.quick else targets.limited(LIMITS)
-
-
-def _targets(parameters: MachineParameters, *, with_means: bool) -> Targets:
-    """Return the amplitudes of [B] and, if asked for, the means of its gasket study (Table 5)."""
-    if not with_means:
+    if arguments.quick:
         return targets_of(parameters, measured_amplitudes(parameters))
-    known = {r.name: r for r in known_responses(parameters, parameters.profile)}
-    means = [
-        NamedValue(
-            load,
-            True,
-            "Adams model of [B]",
-            DESIGN,
-            name,
-            terms[CONSTANT].effects[0],
-            known[name].unit.shown,
-            ", ".join(parameters.published),
-        )
-        for (load, name), terms in published_results(parameters.published).items()
-    ]
-    targets = targets_of(parameters, measured_amplitudes(parameters), responses=means)
-    responses = tuple(replace(target, deviation=MEANS_DEVIATION) for target in targets.responses)
-    return replace(targets, responses=responses)
+    return adams_targets(parameters)
 
 
 def adams_targets(parameters: MachineParameters) -> Targets:
@@ -184,7 +127,7 @@ def adams_targets(parameters: MachineParameters) -> Targets:
     table = table.drop_duplicates(["load", "gasket"]).assign(source=EXPERIMENT)
     of_study = parameters.model_copy(update={"measured": parameters.published})
     targets = targets_of(parameters, table, responses=measured_responses(of_study))
-    responses = with_deviations(targets.responses, ADAMS_DEVIATIONS)
+    responses = with_deviations(targets.responses, DEVIATIONS)
     return replace(targets, responses=responses)
 
 
@@ -192,7 +135,6 @@ def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--machine", choices=(REFERENCE, EARLIER), default=REFERENCE)
     parser.add_argument(
         "--quick",
         action="store_true",
@@ -207,14 +149,14 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument(
         "--predict",
         action="store_true",
-        help="predict tables that a fit has not seen; the earlier machine is always tested so",
+        help="predict tables that a fit has not seen",
     )
     parser.add_argument(
         "--write", action="store_true", help="write the best machine to the shipped files"
     )
     arguments = parser.parse_args()
-    if arguments.predict and (arguments.quick or arguments.machine != REFERENCE):
-        parser.error("--predict is for the machine reference, without --quick")
+    if arguments.predict and arguments.quick:
+        parser.error("--predict and --quick cannot be combined; leave out one of them")
     if arguments.quick and arguments.write:
         parser.error("--quick cannot be written to the shipped files; leave out --quick or --write")
     return arguments

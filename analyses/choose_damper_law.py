@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from analysis_tools import validation_page as page
-from calibrate_reference import ADAMS_PLAN, EARLIER, REFERENCE, adams_targets
+from calibrate_reference import PLAN, REFERENCE, adams_targets
 
 from wm_drake.batch.ledger import open_ledger
 from wm_drake.model.build import build_machine
@@ -28,21 +28,33 @@ from wm_drake.studies.calibrate.computed import PointRunner
 from wm_drake.studies.calibrate.solutions import Solution, percents_of
 from wm_drake.studies.calibrate.study import calibrate, identity_of
 
-FREE, EARLIER_FREE = (
-    Path(__file__).with_name(f"{name}_free.yaml") for name in (REFERENCE, EARLIER)
-)
+FREE = Path(__file__).with_name(f"{REFERENCE}_free.yaml")
 KEY = "damper_types.friction"
 ITERATIONS = 12
 FRICTION = "(5, 90) N"
 """Bounds of the friction."""
 
 VELOCITY = "full_friction_velocity"
-SPONGE_BOUNDS = {
-    "sponge_stiffness": "(5, 100) N/mm",
-    "sponge_damping": "(0.005, 0.3) N*s/mm",
-    "slider_damping": "(0.001, 0.3) N*s/mm",
+OF_SPONGE = {
+    "sponge_stiffness": {
+        "bounds": "(5, 100) N/mm",
+        "prior": "(30, 15) N/mm",
+        "source": "[C] measured 176 N/mm on another damper, which is stiff against friction; here "
+        "the frame and the bushings of the damper are part of it",
+    },
+    "sponge_damping": {
+        "bounds": "(0.005, 0.3) N*s/mm",
+        "prior": "(0.1, 0.04) N*s/mm",
+        "source": "[C] 0.09 N s/mm",
+    },
+    "slider_damping": {
+        "bounds": "(0.001, 0.3) N*s/mm",
+        "prior": "(0.05, 0.04) N*s/mm",
+        "source": "[C] 0.4 N s/mm on another damper; [B] counts dry friction only",
+    },
 }
-"""Bounds of the sponge; its priors are those of the earlier machine."""
+"""Numbers of a sponge in series."""
+
 
 OF_FREE_STROKE = {
     "friction_damping": {
@@ -62,8 +74,8 @@ NUMBERS: dict[str, tuple[str, ...]] = {
     "coulomb": (),
     "stv": ("transition_velocity",),
     "havsin": (VELOCITY,),
-    "mstv": tuple(SPONGE_BOUNDS),
-    "stv_sponge": ("transition_velocity", *SPONGE_BOUNDS),
+    "mstv": tuple(OF_SPONGE),
+    "stv_sponge": ("transition_velocity", *OF_SPONGE),
     "free_stroke": (*OF_FREE_STROKE, "basic_full_friction_velocity"),
 }
 """Free numbers of each law beside friction and dashpot."""
@@ -94,12 +106,8 @@ def prior_mean(prior: str) -> str:
 
 def quantity_of(name: str) -> dict[str, Any]:
     """Return bounds, prior and source of a number of a damper."""
-    if name in OF_FREE_STROKE:
-        entry = OF_FREE_STROKE[name]
-    elif name in SPONGE_BOUNDS:
-        entry = read_yaml(EARLIER_FREE)["quantities"][name] | {"bounds": SPONGE_BOUNDS[name]}
-    else:
-        entry = read_yaml(FREE)["quantities"][VELOCITY]
+    known = {**OF_SPONGE, **OF_FREE_STROKE}
+    entry = known.get(name) or read_yaml(FREE)["quantities"][VELOCITY]
     return {key: entry[key] for key in ("bounds", "prior", "source")}
 
 
@@ -144,7 +152,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, help="also write the result to this file")
     arguments = parser.parse_args()
     laws = list(NUMBERS)[:1] if arguments.quick else list(DAMPER_LAWS)
-    plan = replace(ADAMS_PLAN, iterations=1 if arguments.quick else ITERATIONS)
+    plan = replace(PLAN, iterations=1 if arguments.quick else ITERATIONS)
     rows = []
     with tempfile.TemporaryDirectory() as folder, progress_bar(len(laws), "laws") as done:
         for number, law in enumerate(laws, start=1):

@@ -39,7 +39,7 @@ BOUND_PERCENT = {True: 0.1, False: 0.3}
 SPONGE = {"sponge_stiffness": 176e3, "sponge_damping": 90.0, "slider_damping": 400.0}  # [C]
 DAMPERS: dict[str, dict[str, object] | None] = {
     "HAVSIN (reference)": None,
-    "MSTV": {  # the dampers of the machine reference_2026_11
+    "MSTV": {  # found by a fit to measured amplitudes of [B]
         "law": "mstv",
         "friction_force": 19.02,
         "friction_damping": 0.0,

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from wm_drake import build_machine, load_machine, progress_bar, simulate_many
+from wm_drake import build_machine, load_machine, progress_bar
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.designs import load_design
 from wm_drake.parameters.types import FloatArray
@@ -23,6 +23,7 @@ from wm_drake.simulation.cases import Case
 from wm_drake.studies.design.problem import MachineDesigns, machine_designs
 from wm_drake.studies.design.search import DesignProblem, SearchResult, SearchSettings
 from wm_drake.studies.design.study import SEARCHES
+from wm_drake.studies.experiment import Experiment
 
 
 def searched(
@@ -58,15 +59,15 @@ def main() -> None:
     if arguments.quick:
         profile, count, seeds = SpinProfile(time=(0.0, 2.0), speed=(0.0, 9.0)), 96, 1
     loads = [Case(name, parameters.loads[name], profile) for name in task.loads]
-    designs, machine = machine_designs(parameters, task, loads), build_machine(parameters)
+    designs = machine_designs(parameters, task, loads)
+    experiment = Experiment(build_machine(parameters), ("extremes", "gap"))
     rows = []
     with progress_bar(len(SEARCHES) * seeds * count) as progress:
         done = 0
 
         def costs(x: FloatArray) -> object:
             nonlocal done
-            measures = ("extremes", "gap")
-            result = designs.costs(x, lambda c: simulate_many(machine, c, measures=measures))
+            result = designs.costs(x, experiment)
             done += len(x)
             progress(done)
             return result

@@ -53,14 +53,21 @@ def linear_machine() -> Any:
     return reference.model_copy(update={"gasket": gasket})
 
 
-def gasket_cases(count: int, profile: Any = None) -> Iterator[Any]:
-    """Yield two loads for each of count/2 random gaskets, 0.5 to 1.5 times the shipped one."""
+def gasket_machines(count: int) -> Iterator[Any]:
+    """Yield machines with random gaskets, 0.5 to 1.5 times the shipped one."""
     import wm_drake as wm
 
     rng, reference = np.random.default_rng(0), linear_machine()
-    for _ in range(count // 2):
+    for _ in range(count):
         numbers = {f"gasket.{k}": value * rng.uniform(0.5, 1.5) for k, value in GASKET.items()}
-        changed = wm.with_values(reference, numbers)
+        yield wm.with_values(reference, numbers)
+
+
+def gasket_cases(count: int, profile: Any = None) -> Iterator[Any]:
+    """Yield two loads for each of count/2 random gaskets."""
+    import wm_drake as wm
+
+    for changed in gasket_machines(count // 2):
         for load in ("middle", "counter"):
             yield wm.Case(load, changed.loads[load], profile or changed.profile, parameters=changed)
 

@@ -1,9 +1,9 @@
-"""How do time and memory of a batch grow with the number of its runs, here and on a cluster?
+"""How do time and memory of an experiment grow with the number of its runs, here and on a cluster?
 
 Each size runs in a process of its own: gaskets of the reference machine with two loads each, with
-D, F and M, by `simulate_many`, and by `simulate_on_cluster` on a dask cluster of two processes with
-one thread each, with a ledger in a file. The memory is the largest of the process that asks for the
-runs, less what it has before.
+D, F and M, and a ledger in a file, on two threads, and on a dask cluster of two processes with one
+thread each, whose scheduler has a process of its own. The memory is the largest of the process that
+asks for the runs, less what it has before.
 
     python analyses/show_growth.py --picture docs/pictures/growth.png
 """
@@ -16,49 +16,62 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import Any
 
-from compare_speed import gasket_cases, linear_machine
+from compare_speed import gasket_machines, linear_machine
 
 import wm_drake as wm
-from wm_drake.batch.cluster import simulate_on_cluster
 from wm_drake.batch.ledger import open_ledger
-from wm_drake.model.machine import Machine
 from wm_drake.report.drawing import matplotlib_of
 from wm_drake.report.figure import OURS, QUIET, Axis, Figure, Line, Panel, in_grid
+from wm_drake.studies.executor import Executor
+from wm_drake.studies.experiment import Experiment
 
 SIZES = (1000, 10_000, 100_000)
 WARM = 200
 """Runs before the time begins, which load and compile everything that runs need."""
 
-PLACES = ("here, two threads", "cluster of two processes")
+LOADS = ("middle", "counter")
+HERE, CLUSTER = "here, two threads", "cluster of two processes"
+PLACES = (HERE, CLUSTER)
 
 
 @contextmanager
-def here(machine: Machine) -> Iterator[Callable[[int], object]]:
-    """Give a function that runs a batch in this process."""
-    yield lambda count: wm.simulate_many(
-        machine, gasket_cases(count), measures=("extremes",), histories=False
-    )
+def cluster() -> Iterator[Any]:
+    """Yield a client of a cluster of two processes of this computer."""
+    from dask.distributed import Client
+
+    with tempfile.TemporaryDirectory() as folder, ExitStack() as stack:
+        file = Path(folder) / "scheduler.json"
+        for words in (("scheduler", "--port", "0"), *[("worker", "--nthreads", "1")] * 2):
+            command = [sys.executable, "-m", "dask", words[0], "--scheduler-file", str(file)]
+            process = subprocess.Popen(
+                [*command, "--no-dashboard", *words[1:]], stderr=subprocess.DEVNULL
+            )
+            stack.callback(process.terminate)
+        client = stack.enter_context(Client(scheduler_file=str(file), timeout=60.0))
+        client.wait_for_workers(2)
+        yield client
 
 
 @contextmanager
-def on_cluster(machine: Machine) -> Iterator[Callable[[int], object]]:
-    """Give a function that runs a batch on a cluster of two processes of this computer."""
-    from dask.distributed import Client, LocalCluster
+def growing(place: str) -> Iterator[Callable[[int], object]]:
+    """Yield the function that makes an experiment of some runs at a place."""
+    base = linear_machine()
+    machine, loads = wm.build_machine(base), tuple(wm.case_of(base, name) for name in LOADS)
+    with tempfile.TemporaryDirectory() as folder, ExitStack() as stack:
+        client = stack.enter_context(cluster()) if place == CLUSTER else None
 
-    def run(count: int) -> object:
-        path = Path(folder) / f"{count}.sqlite"
-        with open_ledger(path, {"study": "growth"}) as ledger:
-            return simulate_on_cluster(machine, gasket_cases(count), ledger, client)
+        def run(count: int) -> object:
+            path, points = Path(folder) / f"{count}.sqlite", range(count // len(LOADS))
+            with open_ledger(path, {"study": "growth"}) as ledger:
+                executor = Executor(ledger, client=client)
+                experiment = Experiment(machine, ("extremes",), executor.simulate, loads)
+                return experiment.at(points, gasket_machines(len(points)))
 
-    cluster = LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None)
-    with cluster, Client(cluster) as client, tempfile.TemporaryDirectory() as folder:
         yield run
-
-
-RUNS = dict(zip(PLACES, (here, on_cluster), strict=True))
 
 
 def peak_mb() -> float:
@@ -75,7 +88,7 @@ def measured(place: str, count: int) -> dict[str, float]:
 
 def measure_here(place: str, count: int) -> None:
     """Print time per run and growth of the memory of a batch in this process."""
-    with RUNS[place](wm.build_machine(linear_machine())) as run:
+    with growing(place) as run:
         run(min(WARM, count // 2))
         before, begin = peak_mb(), time.perf_counter()
         run(count)

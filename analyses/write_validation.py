@@ -8,10 +8,9 @@ MSTV damper of [C]. It renews verification, validation and prediction on a page:
     python analyses/write_validation.py --page docs/validation.md --fitted-means
 
 Explanations of results that are missed are in validation_reasons.yaml, the tests of the
-verification in verification.yaml. Loads held out of the calibration take hours:
-calibrate_reference.py wrote them for the machine `reference_2026_11` to
-reference_2026_11_held_out.csv. The script takes about two minutes; with --tests, which runs the
-tests except those marked `hours`, three to five more.
+verification in verification.yaml. Tables held out of the calibration take an hour:
+`calibrate_reference.py --predict` wrote them. The script takes about two minutes; with --tests,
+which runs the tests except those marked `hours`, three to five more.
 """
 
 import argparse
@@ -47,7 +46,6 @@ from wm_drake.studies.spin_cycle.study import compiled_runs, run_spin_cycle
 HERE = Path(__file__).parent
 REASONS, VERIFICATION = HERE / "validation_reasons.yaml", HERE / "verification.yaml"
 HELD_OUT, HELD_OUT_STUDY = (HERE / f"reference_held_out{end}.csv" for end in ("", "_study"))
-EARLIER = HERE / "reference_2026_11_held_out.csv"
 QUICK = 150  # trials with --quick
 SHOWN_BY_A = ("2", "5", "29")  # cases of [A] Table 9 that [A] describes
 
@@ -73,7 +71,6 @@ def compared(reference: MachineParameters, quick: bool, means_kind: str) -> list
     amplitudes = pd.concat([rows.amplitude_table(runs) for runs in both.values()])
     table = rows.amplitude_rows(amplitudes)
     table += rows.held_out_table_rows(pd.read_csv(HELD_OUT), pd.read_csv(HELD_OUT_STUDY))
-    table += rows.held_out_rows(pd.read_csv(EARLIER))
     table += rows.effect_rows(differences_of(both, dict.fromkeys(both, "without")))
     published = published_results(reference.published)
     screening = screening_of(reference, QUICK if quick else ORTHOGONAL)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import pytest
 from hypothesis import settings
+from simple_machines import SPONGES
 from threadpoolctl import threadpool_limits
 from upright_springs import with_upright_springs
 
@@ -42,9 +43,9 @@ def reference():
 
 
 @pytest.fixture(scope="session")
-def earlier():
-    """Return the earlier reference machine: constant gasket stiffnesses, dampers with a sponge."""
-    return load_machine("reference_2026_11")
+def sponges():
+    """Return a machine with constant gasket stiffnesses and dampers with a sponge."""
+    return load_machine(SPONGES)
 
 
 @pytest.fixture(scope="session")

@@ -48,6 +48,7 @@ def _fit(template: str, bench: tuple[str, ...], *words: str) -> Kind:
 
 
 KINDS = {
+    "machine": _one("sections.html", "machine", "check", "ball_rings", "--page", "out/report.html"),
     "spin": _one("sections.html", "spin"),
     "spin_of_motor": _one("sections.html", "spin", "--machine", "motor", "--load", "middle", "--detail"),
     "spin_of_cabinet": _one("sections.html", "spin", "--machine", "light_cabinet", "--load", "middle"),
@@ -140,7 +141,7 @@ def _with_files(command: tuple[str, ...], folder: Path) -> list[str]:
             words.append(str(next((folder / "bench").glob("*.nc"))) if words else word)
         else:
             words.append(word)
-    return words if "--out" in words else [*words, "--out", "out"]
+    return words if {"--out", "--page"} & set(words) else [*words, "--out", "out"]
 
 
 def _run(words: list[str]) -> None:

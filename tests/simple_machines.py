@@ -1,10 +1,15 @@
 """Machines with a closed-form solution: one isotropic bushing, no gravity and no friction."""
 
+from pathlib import Path
+
 import numpy as np
 
 from wm_drake.parameters import Load, SpinProfile, Unbalance, load_machine, with_values
 from wm_drake.parameters.machine import BodyOverride, InertiaMatrix
 from wm_drake.parameters.variation import number_at
+
+SPONGES = Path(__file__).with_name("sponges.yaml")
+"""File of a machine whose dampers have a sponge and whose gasket has constant stiffnesses."""
 
 STIFFNESS = 7000.0  # N/m
 DAMPING = 55.0  # N s/m

@@ -34,7 +34,7 @@ _HOMES = {
     "load_record": "simulation.records",
     "measure": "simulation.measures",
     "modes": "studies.modes.study",
-    "natural_modes": "studies.machine_show.description",
+    "natural_modes": "studies.modes.natural",
     "progress_bar": "report.progress",
     "register_element": "elements.kind",
     "register_study": "studies.study",

@@ -100,6 +100,21 @@ def problems_at(where: str, key: str | None = None) -> Iterator[None]:
 
 
 @contextmanager
+def problems_inside(key: str) -> Iterator[None]:
+    """Prefix the key paths of the problems that the block raises.
+
+    Args:
+        key: Key path of what the block reads.
+    """
+    try:
+        yield
+    except InputError as error:
+        raise InputError(
+            replace(p, key=f"{key}.{p.key}" if p.key else key) for p in error.problems
+        ) from None
+
+
+@contextmanager
 def libraries_named() -> Iterator[None]:
     """Replace the error of an import that does not find a library by one that names its package."""
     try:

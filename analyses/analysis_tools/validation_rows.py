@@ -43,9 +43,6 @@ STIFFNESS_LIMIT = 20.0
 DAMPING_FACTOR = 2.0
 """Largest ratio of a fitted c1 of [C] that counts as met; c1 spans a factor of 30 there."""
 
-HELD_OUT_LIMIT, COVERED_LIMIT = 15.0, 85.0
-"""Goals for held-out loads: mean difference, and part of the amplitudes in their intervals. [%]"""
-
 HELD_OUT_GOALS = {
     ("amplitudes", "mean"): 12.0,
     ("amplitudes", "covered"): 90.0,
@@ -237,45 +234,6 @@ def _held_out_kind(section: str, loads: str, group: dict[Hashable, Any]) -> list
                 "" if goal else "no goal",
             )
         )
-    return rows
-
-
-def held_out_rows(table: pd.DataFrame) -> list[Row]:
-    """Return rows for loads that were held out of the calibration and predicted.
-
-    Args:
-        table: Table from `wm_drake.studies.calibrate.tables.prediction_table`.
-    """
-    section, rows = "[B] Tables 1 and 3: loads held out of the calibration", list[Row]()
-    for group in table.to_dict("records"):
-        loads = " and ".join(str(group["held_out"]).split())
-        mean, covered = group["predicted_mean_percent"], group["in_intervals_percent"]
-        difference = (
-            f"largest {group['predicted_largest_percent']:.1f} %; "
-            f"{group['calibrated_mean_percent']:.1f} % in the mean when they are fitted"
-        )
-        rows += [
-            Row(
-                section,
-                f"{loads}: mean difference of {group['values']} amplitudes",
-                PREDICTED,
-                f"at most {HELD_OUT_LIMIT:g} % (goal)",
-                f"{mean:.1f} %",
-                difference,
-                _verdict(mean <= HELD_OUT_LIMIT),
-                f"{'within' if mean <= HELD_OUT_LIMIT else 'above'} {HELD_OUT_LIMIT:g} %",
-            ),
-            Row(
-                section,
-                f"{loads}: amplitudes in their 95 % intervals",
-                PREDICTED,
-                f"at least {COVERED_LIMIT:g} % (goal)",
-                f"{covered:.0f} %",
-                "",
-                _verdict(covered >= COVERED_LIMIT),
-                f"{'not below' if covered >= COVERED_LIMIT else 'below'} {COVERED_LIMIT:g} %",
-            ),
-        ]
     return rows
 
 

@@ -23,7 +23,6 @@ from analysis_tools.validation_rows import (
     coulomb_rows,
     counts,
     effect_rows,
-    held_out_rows,
     held_out_table_rows,
     mean_rows,
     spin_cycle_rows,
@@ -135,23 +134,6 @@ def test_coulomb_fits_are_judged_by_difference_and_ratio():
         }
     )
     assert [row.verdict for row in coulomb_rows(fits)] == [MET, MISSED, MISSED, MET]
-
-
-def test_held_out_loads_are_judged_by_their_mean_and_their_intervals():
-    table = pd.DataFrame(
-        {
-            "held_out": ["back front"],
-            "values": [12],
-            "calibrated_mean_percent": [8.5],
-            "predicted_mean_percent": [18.3],
-            "predicted_largest_percent": [48.9],
-            "in_intervals_percent": [100.0],
-        }
-    )
-    mean, covered = held_out_rows(table)
-    assert mean.quantity == "back and front: mean difference of 12 amplitudes"
-    assert (mean.ours, mean.verdict, mean.kind) == ("18.3 %", MISSED, PREDICTED)
-    assert (covered.ours, covered.verdict) == ("100 %", MET)
 
 
 def test_held_out_tables_of_b_are_judged_by_leading_factors_points_and_intervals():

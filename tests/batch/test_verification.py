@@ -16,9 +16,9 @@ def test_runs_of_the_reference_are_converged(machine):
     assert (error.step, error.runs, error.is_large) == (machine.parameters.step, 4, False)
 
 
-def test_springs_that_no_step_at_rest_reveals_are_found(earlier):
+def test_springs_that_no_step_at_rest_reveals_are_found(sponges):
     # stable and below the limit of the phase, but amplitudes are wrong by up to 90 %
-    stiff = wm.with_value(earlier, "spring_types.suspension.stiffness", 1510e3)
+    stiff = wm.with_value(sponges, "spring_types.suspension.stiffness", 1510e3)
     machine = wm.build_machine(stiff)
     error = wm.step_error(machine, [wm.case_of(stiff, "back")])
     assert error.difference > 0.1

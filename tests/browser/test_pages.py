@@ -19,7 +19,7 @@ from wm_drake.studies.gasket.page import GasketResult
 from wm_drake.studies.gasket.screening import Meaning, Responses, run_screening
 from wm_drake.studies.gasket.study import GasketTrials
 from wm_drake.studies.gasket.surface import surfaces
-from wm_drake.studies.machine_show.page import machine_page
+from wm_drake.studies.machine_show.page import machine_answer
 from wm_drake.studies.spin.page import spin_answer
 from wm_drake.studies.study import Facts
 
@@ -141,7 +141,8 @@ def test_what_is_folded_is_not_printed_and_the_paper_says_so(browser, pages):
 
 def test_machine_page_turns_and_names_parts(browser, tmp_path):
     page = tmp_path / "machine.html"
-    page.write_text(machine_page(build_machine("reference"), []), encoding="utf-8")
+    answer = machine_answer(build_machine("reference"), [])
+    page.write_text(answer.page(Facts()), encoding="utf-8")
     browser.open(page)
     assert serious_faults(browser) == []
     spring = "document.querySelector('g[data-name=left] path.spring')"

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from simple_machines import SPONGES
 
 from wm_drake.parameters import load_machine
 
@@ -191,7 +192,7 @@ def test_published_results_that_a_user_names_are_beside_ours(study_without_page)
 
 
 def test_another_profile_is_not_compared_with_published_results(study_without_page):
-    one = ("--machine", "reference_2026_11", "--load", "middle", "--response", "Dx")
+    one = ("--machine", SPONGES, "--load", "middle", "--response", "Dx")
     printed = json.loads(study_without_page("--json", *one).out)
     assert "published" not in printed
     assert "published_mean" not in printed["responses"]["middle"]["Dx"]

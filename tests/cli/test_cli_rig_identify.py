@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from simple_machines import SPONGES
 
 from wm_drake.elements.layouts import packed_stiffness
 from wm_drake.laws.table import stiffness_force
@@ -51,9 +52,7 @@ def test_the_machine_may_be_changed_on_the_command_line(wm_drake):
     change = ("--set", "damper_types.friction.friction_force=200 N", "--sponge-mass", "10 g")
     plain, changed = (
         json.loads(
-            wm_drake(
-                "rig damper --machine reference_2026_11 -f '1 Hz' -a '10 mm' --json", *more
-            ).out
+            wm_drake(f"rig damper --machine {SPONGES} -f '1 Hz' -a '10 mm' --json", *more).out
         )
         for more in ((), (*change, "--overwrite"))
     )
@@ -214,7 +213,7 @@ def test_other_changes_of_the_machine_are_kept(wm_drake, loops_of):
 
 
 def test_a_bad_fit_is_called_bad_first(wm_drake, loops_of):
-    sponge = ("--machine", "reference_2026_11")
+    sponge = ("--machine", SPONGES)
     files = loops_of("damper", *sponge, "-f", "1,3 Hz", "-a", "1,5 mm")
     ended = wm_drake("identify", "damper", *files, *sponge, "--law", "coulomb", "--out", "fit")
     assert ended.code == 0

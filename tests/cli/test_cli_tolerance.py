@@ -29,18 +29,21 @@ def test_study_writes_tables_and_page_and_prints_json(study):
     ended = study("--samples", "16", "--sensitivity", "16", "--limits", "l.yaml", "--json", *few)
     assert ended.code == 0
     printed = json.loads(ended.out)
-    assert (printed["samples"], printed["runs"]) == (16, 16 + 48)
-    assert printed["contact_probability"]["method"] == "crude count"
-    assert {"p5", "p50", "p95"} <= set(printed["measures"]["smallest_gap_mm"])
-    assert printed["sobol"]["Dx_mm"]["mass"]["total"] > printed["sobol"]["Dx_mm"]["radius"]["total"]
+    assert printed["runs"] == 16 + 48 + 4
+    (contact,) = printed["contact_probability"]
+    assert contact["method"] == "crude count"
+    measures = {row["quantity"]: row for row in printed["measures"]}
+    assert {"unit", "p5", "p50", "p95"} <= set(measures["smallest_gap"])
+    of = {(row["measure"], row["quantity"]): row["total"] for row in printed["sobol"]}
+    assert of["Dx", "mass"] > of["Dx", "radius"]
     assert len(printed["limits"]) == 1
     samples = pd.read_csv("out/samples.csv")
     touching = (samples["smallest_gap_mm"] <= 0.0).mean()
-    assert printed["contact_probability"]["estimate"] == pytest.approx(touching)
+    assert contact["probability_percent"] == pytest.approx(100.0 * touching)
     page = Path("out/report.html").read_text()
     assert "in a million" not in page
-    assert page.index('id="gap"') < page.index('id="distributions"')
-    assert set(printed["smallest_gap_of_loads_mm"]) == {"middle", "counter", "back", "front"}
+    assert page.index('id="smallest-gap"') < page.index('id="distributions"')
+    assert [row["load"] for row in printed["loads"]] == ["middle", "counter", "back", "front"]
 
 
 def test_doubling_keeps_the_finished_runs(study, no_runs):

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from simple_machines import SPONGES
 
 from wm_drake.parameters import load_component, load_machine
 
@@ -84,7 +85,7 @@ def test_a_law_with_numbers_that_one_loop_does_not_show_reports_its_error(wm_dra
     bench = ("rig", "damper", "--component", "dashpot.yaml", "-f", "2 Hz", "-a", "5 mm")
     assert wm_drake(*bench, "--out", "bench").code == 0
     files = sorted(Path("bench").glob("loop_*.csv"))
-    files += ["--machine", "reference_2026_11"]  # whose dampers have another law
+    files += ["--machine", SPONGES]  # whose dampers have another law
     ended = wm_drake("identify", "damper", *files, "--law", law, "--out", "fit")
     assert ended.code == 0
     assert "identified.yaml is not written: the data do not determine" in ended.out

@@ -52,9 +52,9 @@ def test_friction_counts_with_its_steepest_slope():
     assert fastest.rate == pytest.approx(500.0 * np.pi / (2.0 * 0.5) / inertia, rel=1e-4)
 
 
-def test_the_sponge_of_a_damper_decays_with_stiffness_over_damping(shipped):
+def test_the_sponge_of_a_damper_decays_with_stiffness_over_damping(sponges):
     """Check k1 / (c1 + c2) while it slips, from [C] Eq. (3) without mass."""
-    machine = shipped("reference_2026_11")
+    machine = build_machine(sponges)
     kind = machine.parameters.damper_types["friction"]
     expected = kind.sponge_stiffness / (kind.sponge_damping + kind.slider_damping)
     sponges = [m for part, m in fastest_motions(machine.set_up()).items() if "sponge" in part]
@@ -117,10 +117,10 @@ def test_unbalance_does_not_change_the_step():
     assert fastest_motion(loaded).rate == pytest.approx(fastest_motion(empty).rate, rel=0.05)
 
 
-def test_a_machine_that_no_step_can_follow_is_refused_at_once(shipped, earlier):
-    parameters = with_value(earlier, "damper_types.friction.sponge_stiffness", 1e15)
-    case = Case("stiff", earlier.loads["middle"], constant_speed(20.0, 1.0), parameters=parameters)
+def test_a_machine_that_no_step_can_follow_is_refused_at_once(sponges):
+    parameters = with_value(sponges, "damper_types.friction.sponge_stiffness", 1e15)
+    case = Case("stiff", sponges.loads["middle"], constant_speed(20.0, 1.0), parameters=parameters)
     with pytest.raises(
         InputError, match=r"too long for the sponge of damper .*; allowed are up to"
     ):
-        simulate(shipped(earlier.name), case)
+        simulate(build_machine(sponges), case)

@@ -43,7 +43,6 @@ ALIKE = {
     "reference": "test_fmu.py runs it",
     "light_cabinet": "the machine of rubber has its feet",
     "heavy_cabinet": "other numbers of light_cabinet",
-    "reference_2026_11": "other numbers of the reference machine, a law that motor_mstv has",
     "rodrigues_2010": "two bushings alone",
     "free_stroke": TOGETHER,
     "ball_rings": TOGETHER,

@@ -37,12 +37,14 @@ class UnbalanceTask(Task):
         from wm_drake.parameters.units import Unit
         from wm_drake.report.labelled import LabelledTable
         from wm_drake.report.quantity import Quantity, shown
-        from wm_drake.studies.answer import Answer, Part, diverged_runs
+        from wm_drake.studies.answer import Answer, Part
+        from wm_drake.studies.experiment import Experiment, failures
 
-        runs = executor.simulate(self.machine, ("amplitudes",), self.cases, "masses")
+        experiment = Experiment(self.machine, ("amplitudes",), executor.simulate)
         masses = [sum(u.mass for u in case.load.unbalances) for case in self.cases]
+        runs = experiment.over({"mass": masses}, self.cases, "masses")
         mass = Quantity("mass", Unit("kg", "kg")).variable("mass", masses)
-        data = runs[["amplitude"]].rename(run="mass").assign_coords(mass=mass)
+        data = runs[["amplitude"]].assign_coords(mass=mass)
         per_kg = shown(data.amplitude[:, 0]) / masses
         caption = "Amplitude of each sensor over the mass of the unbalance."
         table = LabelledTable("amplitudes", data, "Amplitudes", caption, across="sensor")
@@ -52,7 +54,7 @@ class UnbalanceTask(Task):
             f"unbalance, {per_kg[-1]:.1f} mm of the largest.",
             self.machine.parameters,
             (Part("Figures", [_plot(data, caption)]), Part("Amplitudes", [table])),
-            diverged=diverged_runs(runs),
+            diverged=failures(runs),
         )
 
 

@@ -36,7 +36,7 @@ COMPUTATIONS = (
     "wm_drake.studies.fitting.methods.identify",
     "wm_drake.solid.curves.Gasket.curve",
     "wm_drake.studies.calibrate.study.calibrate",
-    "wm_drake.studies.tolerance.study.run_tolerances",
+    "wm_drake.studies.tolerance.study.ToleranceTrials.samples",
     "wm_drake.studies.design.study.run_designs",
     "wm_drake.studies.response.study.run_response_study",
     "wm_drake.studies.modes.study.modes",

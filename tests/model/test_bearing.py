@@ -23,7 +23,7 @@ from wm_drake.parameters import (
 )
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.runs import simulate
-from wm_drake.studies.machine_show.description import natural_modes
+from wm_drake.studies.modes.natural import natural_modes
 
 RUN_UP = SpinProfile(time=(0.0, 3.0), speed=(5.0, 30.0))
 RADIAL, TILTING = 2e5, 5e3  # N/m, N m/rad
@@ -204,7 +204,7 @@ def test_runs_side_by_side_are_those_of_simulate(name):
 
 def test_modes_of_the_tub_hardly_change(whirling, machine):
     np.testing.assert_allclose(
-        natural_modes(whirling).frequency_hz, natural_modes(machine).frequency_hz, rtol=5e-3
+        natural_modes(whirling).frequency, natural_modes(machine).frequency, rtol=5e-3
     )
 
 

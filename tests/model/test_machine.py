@@ -11,7 +11,7 @@ from wm_drake.model.bodies import sdf_path
 from wm_drake.model.build import build_machine
 from wm_drake.model.equilibrium import EQUILIBRIUM_TOLERANCE
 from wm_drake.parameters import Load, Unbalance, load_machine, with_value, with_values
-from wm_drake.studies.machine_show.description import natural_modes
+from wm_drake.studies.modes.natural import natural_modes
 from wm_drake.systems.speed_source import REFLECTED_INERTIA
 
 
@@ -179,8 +179,8 @@ def test_linearized_frequencies_equal_those_of_a_finite_difference_stiffness(
     )
     np.testing.assert_allclose(stiffness, stiffness.T, atol=1e-3 * np.abs(stiffness).max())
     squared = eigh(0.5 * (stiffness + stiffness.T), mass, eigvals_only=True)
-    assert len(modes.frequency_hz) == 6
-    np.testing.assert_allclose(modes.frequency_hz, np.sqrt(squared) / (2 * np.pi), rtol=1e-5)
+    assert len(modes.frequency) == 6
+    np.testing.assert_allclose(modes.frequency, np.sqrt(squared) / (2 * np.pi), rtol=1e-5)
     np.testing.assert_allclose(modes.damping_ratio, 0.0, atol=1e-9)
 
 

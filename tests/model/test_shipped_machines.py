@@ -17,7 +17,8 @@ from wm_drake.parameters import (
     shipped_machines,
     source_of,
 )
-from wm_drake.studies.machine_show.description import natural_modes, oscillating_mass
+from wm_drake.studies.machine_show.description import oscillating_mass
+from wm_drake.studies.modes.natural import natural_modes
 
 README = SDF_FOLDER / "README.md"
 CARRIED = {"oscillating_group.sdf": 2e-3}
@@ -176,7 +177,7 @@ def test_springs_carry_the_weight(washing_machine, built):
 
 def test_tub_has_six_soft_modes(washing_machine, built):
     machine = washing_machine
-    frequencies = natural_modes(built).frequency_hz
+    frequencies = natural_modes(built).frequency.values
     assert len(frequencies) == 6
     assert 0.5 < frequencies[0] < frequencies[-1] < 10.0
     # the run-up goes through all of them

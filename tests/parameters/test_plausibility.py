@@ -39,8 +39,8 @@ def test_slip_is_found(reference, slip):
     assert " is unusual; usual is " in problem.message
 
 
-def test_slip_of_a_sponge_is_found(earlier):
-    soft = with_values(earlier, {"damper_types.friction.sponge_stiffness": "50 N/m"})
+def test_slip_of_a_sponge_is_found(sponges):
+    soft = with_values(sponges, {"damper_types.friction.sponge_stiffness": "50 N/m"})
     (problem,) = unusual_numbers(soft)
     assert problem.key == "damper_types.friction.sponge_stiffness"
 

@@ -71,16 +71,16 @@ def test_ends_of_a_range(text, ends):
 @pytest.mark.parametrize(
     ("text", "expected"), [("110 %", 1.1), ("nominal + 1 kN/m", None), ("9 N/mm", None)]
 )
-def test_variation_changes_all_its_numbers_and_nothing_else(earlier, text, expected):
+def test_variation_changes_all_its_numbers_and_nothing_else(sponges, text, expected):
     keys = (SPRING, "gasket.stiffness_x")
-    variation, values = variation_of(earlier, "k", keys, {"to": text})
-    changed = apply(earlier, [variation], [values["to"]])
+    variation, values = variation_of(sponges, "k", keys, {"to": text})
+    changed = apply(sponges, [variation], [values["to"]])
     for key in keys:
-        before, after = number_at(earlier, key).nominal, number_at(changed, key).nominal
+        before, after = number_at(sponges, key).nominal, number_at(changed, key).nominal
         known = {"nominal + 1 kN/m": before + 1000.0, "9 N/mm": 9000.0}
         assert after == pytest.approx(expected * before if expected else known[text])
     if variation.change is not Change.VALUE:
-        assert apply(earlier, [variation], [variation.nominal]) == earlier
+        assert apply(sponges, [variation], [variation.nominal]) == sponges
 
 
 def test_table_is_scaled_with_its_nominal_stiffness(reference):
@@ -109,9 +109,9 @@ def test_table_is_scaled_with_its_nominal_stiffness(reference):
         ("gasket.stiffness_x", {"low": "9 N"}, "unit 'N' does not fit"),
     ],
 )
-def test_wrong_variation_is_refused(earlier, key, texts, message):
+def test_wrong_variation_is_refused(sponges, key, texts, message):
     with pytest.raises(InputError, match=message) as caught:
-        variation_of(earlier, "k", (key,), texts)
+        variation_of(sponges, "k", (key,), texts)
     assert caught.value.problems[0].key.startswith(key)
 
 

@@ -10,6 +10,7 @@ from machines_of_each_kind import damper_of
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput, Multiplexer, Sine
+from simple_machines import SPONGES
 
 from wm_drake.elements.damper_law import packed_damper_law
 from wm_drake.elements.friction_damper import FrictionDamperParameters
@@ -198,7 +199,7 @@ def test_a_sponge_of_a_milligram_is_massless_in_all_tests_of_c(motion):
 
 def test_all_tests_of_c_run_with_a_sponge_of_ten_grams():
     motions = MATRICES["damper"]["C"]
-    damper = load_machine("reference_2026_11").damper_types["friction"]
+    damper = load_machine(SPONGES).damper_types["friction"]
     loops = {m: force_loops(damper_bench(damper, m), motions) for m in (0.0, 0.01)}
     assert len(loops[0.01]) == 18
     for heavy, massless in zip(loops[0.01], loops[0.0], strict=True):

@@ -8,7 +8,7 @@ from wm_drake.engines.drake import run_drake
 from wm_drake.model.build import build_machine
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.runs import simulate
-from wm_drake.studies.machine_show.description import natural_modes
+from wm_drake.studies.modes.natural import natural_modes
 
 UNBALANCE = 0.02  # kg: so small that the drive torque couples pitch into translation by < 1e-3
 RADIUS = 0.25  # m
@@ -29,11 +29,13 @@ def damping_ratio():
 
 def test_modes_of_one_mass_are_the_closed_form(machine):
     modes = natural_modes(machine)
-    translations = np.argsort(np.abs(modes.frequency_hz - natural_frequency() / (2 * np.pi)))[:3]
+    translations = np.argsort(np.abs(modes.frequency.values - natural_frequency() / (2 * np.pi)))[
+        :3
+    ]
     np.testing.assert_allclose(
-        modes.frequency_hz[translations], natural_frequency() / (2 * np.pi), rtol=1e-9
+        modes.frequency.values[translations], natural_frequency() / (2 * np.pi), rtol=1e-9
     )
-    np.testing.assert_allclose(modes.damping_ratio[translations], damping_ratio(), rtol=1e-9)
+    np.testing.assert_allclose(modes.damping_ratio.values[translations], damping_ratio(), rtol=1e-9)
 
 
 def test_free_decay_has_the_closed_form_frequency_and_log_decrement(machine):

@@ -93,10 +93,10 @@ def check_energy(machine, case, step):
     return abs(work - change - dissipated) / dissipated
 
 
-@pytest.fixture(scope="module", params=["reference", "reference_2026_11"])
-def of_each_damper(shipped, request):
+@pytest.fixture(scope="module", params=["reference", "sponges"])
+def of_each_damper(request):
     """Return a machine with smoothed dampers, and one whose dampers have a sponge."""
-    return shipped(request.param)
+    return build_machine(request.getfixturevalue(request.param))
 
 
 def test_energy_balances_over_a_fast_run_up(of_each_damper):
@@ -237,16 +237,16 @@ def test_diverging_run_stops_keeps_its_record_and_reports_time_and_reason(machin
     assert np.max(np.abs(record.tub_position)) <= 0.5
 
 
-def test_run_that_ends_in_nan_reports_it(shipped, earlier, engine, monkeypatch):
+def test_run_that_ends_in_nan_reports_it(sponges, engine, monkeypatch):
     # the sponge is so stiff that the second sample is NaN; Drake reports this itself
     monkeypatch.setattr(
         "wm_drake.simulation.runs.choose_stepping", lambda *_: Stepping("runge_kutta", 2.5e-3)
     )
-    parameters = with_value(earlier, "damper_types.friction.sponge_stiffness", 1e15)
-    case = Case("stiff", earlier.loads["middle"], FAST_RUN_UP, parameters=parameters)
+    parameters = with_value(sponges, "damper_types.friction.sponge_stiffness", 1e15)
+    case = Case("stiff", sponges.loads["middle"], FAST_RUN_UP, parameters=parameters)
     why = {"compiled": "roll = nan rad", "drake": "Detected NaN"}[engine]
     with pytest.warns(DivergenceWarning, match=f"diverged at 0.005 s: {why}"):
-        record = simulate(shipped(earlier.name), case, engine)
+        record = simulate(build_machine(sponges), case, engine)
     assert record.sizes["time"] == 1
     assert np.isfinite(record.displacement).all()
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from made_up_runs import made_up
 
 from wm_drake.parameters import load_machine
 from wm_drake.parameters.first_machine import FirstMachine, FirstNumbers
@@ -11,9 +12,9 @@ from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.measures.responses import Response
 from wm_drake.studies.orders.page import order_text
-from wm_drake.studies.tolerance.study import ToleranceSettings, run_tolerances
+from wm_drake.studies.tolerance.page import about_loads, masses_text, summary
+from wm_drake.studies.tolerance.study import ToleranceSettings, ToleranceTrials
 from wm_drake.studies.tolerance.variables import uncertain_machine
-from wm_drake.studies.tolerance.words import about_loads, masses_text, summary
 
 GAP = Response("gap", MEASURES["gap"].variables[0])
 SPRING = "spring_types.suspension.stiffness"
@@ -26,19 +27,17 @@ def machine():
 
 
 def tolerances(machine, tree, gap):
-    """Return the result of a tolerance study in which a function of the load gives the gap."""
+    """Return a tolerance study in which a function of the load gives the gap, and its samples."""
 
-    def run(cases, _):
-        gaps = np.array([gap(case) for case in cases])
-        none = np.full(len(cases), "", dtype=object)
-        table = {"smallest_gap": ("run", gaps), "diverged": ("run", none)}
-        table["nearest_pair"] = ("run", np.zeros(len(cases)))
-        return xr.Dataset(table, {"pair": ["tub|wall"]})
+    def run(cases):
+        table = {"smallest_gap": ("run", np.array([gap(case) for case in cases]))}
+        return xr.Dataset(table)
 
     uncertain = uncertain_machine(
         machine, tree, Case("middle", machine.loads["middle"], machine.profile)
     )
-    return run_tolerances(uncertain, (GAP,), run, ToleranceSettings(256, 256, 0), ())
+    trials = ToleranceTrials(uncertain, (GAP,), made_up(run), ToleranceSettings(256, 256, 0))
+    return trials, trials.samples()
 
 
 def of_load(machine, *keys):
@@ -53,10 +52,11 @@ def of_load(machine, *keys):
         for key, size in keys
     }
     tree = Tolerances.model_validate({"load": "middle", "quantities": quantities})
-    return " ".join(summary(tolerances(machine, tree, lambda case: (
+    trials, samples = tolerances(machine, tree, lambda case: (
         0.03 + case.load.unbalances[0].y
         + 1e-5 * case.parameters.spring_types["suspension"].stiffness
-    ))))  # fmt: skip
+    ))  # fmt: skip
+    return " ".join(summary(trials, trials.indices(samples), xr.Dataset(), xr.Dataset()))
 
 
 def test_nobody_can_tighten_a_load(machine):
@@ -78,8 +78,8 @@ def test_nobody_can_tighten_a_load(machine):
 def test_loads_are_compared_with_the_laundry_that_was_drawn(machine, mass, words):
     tree = load_tolerances("laundry").model_dump()
     tree["laundry"]["mass"]["high"] = mass
-    result = tolerances(machine, Tolerances.model_validate(tree), lambda _: 0.02)
-    text = about_loads(result, dict.fromkeys(machine.loads, 0.01))
+    gaps = xr.DataArray(np.full(4, 0.01), {"load": list(machine.loads)})
+    text = about_loads(*tolerances(machine, Tolerances.model_validate(tree), lambda _: 0.02), gaps)
     assert words in text
     assert "often" not in text
 

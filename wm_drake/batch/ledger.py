@@ -69,14 +69,14 @@ class Ledger:
         self.path = path
         self._connection = connection
         self._lock = threading.Lock()
-        self._keys = {key for (key,) in self._query("SELECT key FROM results")}
 
     def __contains__(self, key: str) -> bool:
         """Return whether the ledger has a result with this key."""
-        return key in self._keys
+        return bool(self._query("SELECT 1 FROM results WHERE key = ?", key))
 
     def __len__(self) -> int:
-        return len(self._keys)
+        ((count,),) = self._query("SELECT count(*) FROM results")
+        return int(count)
 
     def get(self, key: str) -> LedgerEntry:
         """Return the result with a key.
@@ -86,8 +86,6 @@ class Ledger:
             LedgerError: the row of the result is damaged.
         """
         rows = self._query("SELECT shapes, numbers, note, checksum FROM results WHERE key = ?", key)
-        if not rows and key in self._keys:
-            raise LedgerError(f"{self.path}: is damaged: result {key} is missing; {_UNCHANGED}")
         if not rows:
             raise KeyError(key)
         shapes, numbers, note, checksum = rows[0]
@@ -142,15 +140,13 @@ class Ledger:
             rows.append(
                 (key, shapes, numbers, result.note, _checksum(key, shapes, numbers, result.note))
             )
-        with self._lock, _ledger_errors(self.path):
-            with self._connection:
-                self._connection.execute("BEGIN")
-                self._connection.executemany(
-                    "INSERT OR IGNORE INTO results (key, shapes, numbers, note, checksum) "
-                    "VALUES (?, ?, ?, ?, ?)",
-                    rows,
-                )
-            self._keys.update(results)
+        with self._lock, _ledger_errors(self.path), self._connection:
+            self._connection.execute("BEGIN")
+            self._connection.executemany(
+                "INSERT OR IGNORE INTO results (key, shapes, numbers, note, checksum) "
+                "VALUES (?, ?, ?, ?, ?)",
+                rows,
+            )
 
     def mark_finished(self) -> None:
         """Mark the study as finished: the ledger can then be opened again without `resume`."""

@@ -36,7 +36,7 @@ class RunTable:
         self.parameters = parameters
         self.variables = [v for name in measures for v in MEASURES[name].variables]
         self._columns: dict[str, FloatArray] = {}
-        self._names: dict[int, str] = {}
+        self._names: np.ndarray = np.empty(0, dtype=object)
         self._diverged: dict[int, str] = {}
         self._region_counts: set[int] = set()
 
@@ -51,6 +51,7 @@ class RunTable:
             values: Values of the variables of the measures by name. [SI]
             diverged: When and why the run stopped early; "" if it did not.
         """
+        self._names = _with_place(self._names, number)
         self._names[number] = name
         if diverged:
             self._diverged[number] = diverged
@@ -72,9 +73,9 @@ class RunTable:
         Raises:
             InputError: the runs have different numbers of regions.
         """
-        numbers = np.array(sorted(self._names), dtype=int)
+        numbers = np.flatnonzero(self._names != None)  # noqa: E711
         used = {dim for variable in self.variables for dim in variable.dims}
-        parameters, names = self.parameters, [self._names[number] for number in numbers.tolist()]
+        parameters, names = self.parameters, self._names[numbers].astype(str)
         labels: dict[str, Any] = {"run": numbers, "case": ("run", names)}
         for dim in (*_ALWAYS, "foot", *sorted(used - {"region", "pair"})):
             labels[dim] = list(LABELS[dim](parameters, parameters.profile))
@@ -111,10 +112,12 @@ class RunTable:
         return next(iter(self._region_counts), 0)
 
 
-def _with_place(column: FloatArray, number: int) -> FloatArray:
+def _with_place(column: np.ndarray, number: int) -> np.ndarray:
     """Return an array with a row for a number, at least twice as long as before if it grows."""
     if number < len(column):
         return column
-    longer = np.empty((max(FEWEST, 2 * len(column), number + 1), *column.shape[1:]))
+    longer = np.empty(
+        (max(FEWEST, 2 * len(column), number + 1), *column.shape[1:]), dtype=column.dtype
+    )
     longer[: len(column)] = column
     return longer

@@ -18,8 +18,11 @@ from wm_drake.parameters.machine import Integrator
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
 
-KEPT_BODIES, KEPT_NUMBERS = 2048, 2048
-"""How many sets of bodies with a load, and of other numbers, are cached."""
+KEPT_BODIES, KEPT_NUMBERS = 256, 64
+"""How many sets of bodies with a load, and of other numbers, are cached.
+
+Runs of one machine or load follow each other, so that a few are enough; each takes memory.
+"""
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ import json
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
+from time import perf_counter
 from typing import Annotated
 
 import typer
@@ -12,6 +13,7 @@ from wm_drake.cli.common import JsonOption, SetOption
 from wm_drake.cli.new_machine import NewOptions, machine_new
 from wm_drake.cli.options import with_options
 from wm_drake.errors import InputError, WmDrakeError, input_error, shortened
+from wm_drake.report.provenance import command_line
 from wm_drake.report.terminal import say
 from wm_drake.studies.inputs import built_with_problems, load_parameters, located_in
 
@@ -58,12 +60,15 @@ def machine_check(
 
 def _check(file: str, strict: bool, draw: Callable[[str], None] | None) -> None:
     """Check a machine file and say what is unusual."""
+    begin = perf_counter()
     parameters = load_parameters(file, None)
     machine, unusual = built_with_problems(file, parameters)
     if draw is not None:
-        from wm_drake.studies.machine_show.page import machine_page
+        from wm_drake.studies.machine_show.page import machine_answer
+        from wm_drake.studies.study import Facts
 
-        draw(machine_page(machine, [str(problem) for problem in unusual]))
+        shown = machine_answer(machine, [str(problem) for problem in unusual])
+        draw(shown.page(Facts(command_line(), perf_counter() - begin)))
     if unusual and strict:
         raise InputError(unusual)
     for problem in unusual:
@@ -142,7 +147,7 @@ def machine_schema(
     if of == "file":
         from wm_drake.parameters.file_keys import file_schema as schema
     elif of == "description":
-        from wm_drake.studies.machine_show.schema import description_schema as schema
+        from wm_drake.studies.machine_show.description import description_schema as schema
     else:
         raise input_error(
             f"no schema of '{shortened(of, 40)}'; allowed are file, description",

@@ -133,7 +133,8 @@ def _limits(field: FieldInfo) -> dict[str, float]:
 def _print(result: Result, facts: Facts, as_json: bool) -> None:
     """Print a result as one JSON object, or as tables and sentences."""
     if as_json:
-        typer.echo(json.dumps(result.as_json() | {"wall_s": facts.wall_s}, allow_nan=False))
+        shown = {"runs": facts.runs, **result.as_json(), "wall_s": facts.wall_s}
+        typer.echo(json.dumps(shown, allow_nan=False))
         return
     for part in result.terminal():
         if isinstance(part, str):

@@ -33,7 +33,7 @@ from wm_drake.elements.state_map import (
     tubes_part,
 )
 from wm_drake.elements.telescopic_damper import TelescopicDamperParameters
-from wm_drake.errors import input_error
+from wm_drake.errors import input_error, problems_inside
 from wm_drake.model.bodies import drawn_pose
 from wm_drake.model.frame_poses import FramePoses
 from wm_drake.model.state_layout import StateLayout
@@ -331,7 +331,8 @@ def _placed(poses: FramePoses, key: str, kind: ElementKind | None, parts: Sequen
             f"they must be more than {1e3 * SHORTEST_STRUT:g} mm apart",
             key=key,
         )
-    return kind.place(ends, *parts)
+    with problems_inside(key):
+        return kind.place(ends, *parts)
 
 
 def _telescopes(

@@ -9,7 +9,7 @@ import xarray as xr
 
 from wm_drake.report.formatting import plain
 from wm_drake.report.quantity import HIDDEN, quantity_of
-from wm_drake.report.table import Table, table_of
+from wm_drake.report.table import Table, line, table_of
 
 MOST_LINES = 200
 """Largest number of lines of a table on the page; the file has all."""
@@ -86,6 +86,36 @@ class LabelledTable:
                 column.attrs = quantity.named(words).attributes()
                 wide[f"{name}_{label}" if several else str(label)] = column
         return wide
+
+
+@dataclass(frozen=True)
+class TurnedTable(LabelledTable):
+    """A table with a line for each variable, in its own unit, and a column for each label.
+
+    The variables have one dimension, the same for all.
+    """
+
+    def frame(self) -> pd.DataFrame:
+        """Return the numbers in units for reading, with name and unit of each variable."""
+        rows = [
+            [str(name), quantity_of(array).unit.label, *quantity_of(array).values(array.values)]
+            for name, array in self.data.items()
+        ]
+        return pd.DataFrame(rows, columns=["quantity", "unit", *self._labels])
+
+    def table(self) -> Table:
+        """Return the table for page and terminal."""
+        rows = (
+            line(q.words, [q.unit_text, *map(q.number, array.values)])
+            for q, array in ((quantity_of(array), array) for array in self.data.values())
+        )
+        heads = [self.words.get(label, label) for label in self._labels]
+        return Table(self.caption, ("quantity", "unit", *heads), tuple(rows), text_columns=2)
+
+    @property
+    def _labels(self) -> list[str]:
+        (dim,) = self.data.dims
+        return [str(label) for label in self.data[dim].values.tolist()]
 
 
 def _rows(data: xr.Dataset) -> pd.DataFrame:

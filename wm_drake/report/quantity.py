@@ -146,3 +146,4 @@ def text_of(array: "xr.DataArray") -> str:
 
 SPEED = Quantity("drum speed", Unit("rad/s", "rpm"), 0)
 TIME = Quantity("time", Unit("s", "s"), 2)
+STEP = Quantity("step", Unit("s", "ms"), form="{:g}".format)

@@ -88,7 +88,7 @@ class Answer(Result):
         warned: Sentences on what a reader must know before the answer, in a box at the top and on
             the terminal.
         short: Part in a box between the answer and the contents. Its facts are also printed.
-        diverged: A line for each run that diverged, also in the box at the top.
+        diverged: A line for each run that diverged, or another reason for exit code 1.
         others: Answers with pages of their own beside this one, by the names of their files.
         script: Script of the page, beside that of the pictures.
     """
@@ -145,7 +145,7 @@ class Answer(Result):
             [_section(part) for part in self.parts],
             [*about, time, *self.details, *facts.rows()],
             self.machine,
-            [*facts.warnings, *self.diverged, *self.warned],
+            [*facts.warnings, *self.warned],
             method=self.method,
             advice=_section(self.short) if self.short else None,
             script=self.script,
@@ -172,7 +172,7 @@ class Answer(Result):
         return self.warned
 
     def failures(self) -> tuple[str, ...]:
-        """Return a line for each run that diverged."""
+        """Return the lines for which the exit code is 1."""
         return self.diverged
 
 

@@ -1,6 +1,6 @@
 """Run the cases of a study: on the cores of this computer or on a cluster."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
@@ -58,13 +58,13 @@ class Executor:
         Args:
             machine: Built machine.
             measures: Names of measures.
-            cases: Cases.
+            cases: Cases. They are taken one by one if their number is known.
             what: Word beside the progress bar.
         """
         if self._report is None:
-            listed = list(cases)
-            with progress_bar(len(listed), what) as report:
-                return self._run(machine, measures, listed, report)
+            counted = cases if isinstance(cases, Sized) else list(cases)
+            with progress_bar(len(counted), what) as report:
+                return self._run(machine, measures, counted, report)
         whole, before = self._report, self._reported
         table = self._run(machine, measures, cases, lambda done: whole(before + done))
         self._reported += table.sizes["run"]

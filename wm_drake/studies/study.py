@@ -20,9 +20,9 @@ A study has four parts, as in `studies/drive`:
 
 Each imports only those above it.
 
-A task gets an `Executor` and calls it for tables of runs, as often as it needs: once for a plain
-study, many times for an adaptive one. So optimisers of libraries and bisections are written as
-plain functions, and tests can pass any other function of the same form.
+A task gets an `Executor` and makes an `Experiment` with it (`wm_drake.studies.experiment`), which
+it calls as often as it needs: once for a plain study, many times for an adaptive one. So optimisers
+of libraries and bisections are written as plain functions, and tests make up the runs.
 """
 
 import pkgutil
@@ -131,9 +131,10 @@ class Facts:
     def rows(self) -> list[tuple[str, str]]:
         """Return the facts as pairs of word and text, for the end of a page."""
         from wm_drake.batch import sources_version
+        from wm_drake.report.quantity import STEP
         from wm_drake.simulation.records import versions
 
-        step = f"{1e3 * self.step:g} ms, integrator {self.integrator}"
+        step = f"{STEP.text(self.step)}, integrator {self.integrator}"
         return [
             *([("Largest step", step)] if self.step else []),
             *([("Check of the step", self.verified)] if self.verified else []),

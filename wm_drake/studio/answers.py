@@ -26,7 +26,9 @@ from wm_drake.model.scene import Gap
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.plausibility import unusual_numbers
 from wm_drake.parameters.types import FloatArray
-from wm_drake.report.formatting import MM_PER_M, MS_PER_S, RPM_PER_RAD_S, plain, shape_name
+from wm_drake.parameters.units import Unit
+from wm_drake.report.formatting import plain, shape_name
+from wm_drake.report.quantity import SPEED, STEP, Quantity
 from wm_drake.simulation.band import band_warnings, pass_band
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.displacements import local_maxima, replay_samples
@@ -52,7 +54,8 @@ LANES = WIDTH - 1
 BINS = 350
 """Number of time bins of a force; each is drawn from its smallest to its largest value."""
 
-MICRO = 1e6
+DISTANCE = Quantity("distance", Unit("m", "mm"))
+MICRO, MILLI = 1e-6, 1e-3
 """Displacements are sent in whole micrometres, times in whole milliseconds."""
 
 
@@ -101,7 +104,7 @@ def picture(machine: OpenMachine, runner: Runner, state: PageState) -> dict[str,
         "duration": profile.duration,
         "profile": {
             "time": list(profile.time),
-            "rpm": [speed * RPM_PER_RAD_S for speed in profile.speed],
+            "rpm": SPEED.values(profile.speed).tolist(),
         },
         "values": machine.shown_values(case, state),
         **_gap_of(main),
@@ -112,7 +115,7 @@ def picture(machine: OpenMachine, runner: Runner, state: PageState) -> dict[str,
         "band": pass_band(profile, period),
         "stepping": {
             "integrator": batch_key.stepping.integrator,
-            "step_ms": MS_PER_S * batch_key.stepping.step,
+            "step": STEP.text(batch_key.stepping.step),
         },
     }
 
@@ -256,9 +259,9 @@ def _gap_of(run: RunResult) -> dict[str, Any]:
 
 def _gap(gap: Gap, profile: SpinProfile) -> dict[str, Any]:
     return {
-        "distance": gap.distance * MM_PER_M,
+        "distance": float(DISTANCE.values(gap.distance)),
         "time": gap.time,
-        "rpm": float(profile.speed_at(gap.time)) * RPM_PER_RAD_S,
+        "rpm": float(SPEED.values(profile.speed_at(gap.time))),
         "moving": shape_name(gap.moving),
         "fixed": shape_name(gap.fixed),
     }
@@ -303,7 +306,7 @@ def _motion(run: RunResult, setup: Setup) -> dict[str, Any]:
         },
         "largest": {
             "time": float(motion.time[largest]),
-            "rpm": float(motion.drum_speed[largest]) * RPM_PER_RAD_S,
+            "rpm": float(SPEED.values(motion.drum_speed[largest])),
         },
     }
 
@@ -313,7 +316,7 @@ def _envelopes(motion: ShownMotion) -> list[dict[str, Any]]:
 
     They are `measures.envelopes`, which are lines from peak to peak, without the samples between.
     """
-    time = np.rint(motion.time * MS_PER_S).astype(int)
+    time = _milliseconds(motion.time)
     corners: list[dict[str, Any]] = []
     for column in motion.filtered.T:
         sides: dict[str, Any] = {}
@@ -337,7 +340,7 @@ def _orbits(motion: ShownMotion, setup: Setup) -> list[dict[str, Any]]:
     points = np.array([[0.0, y, 0.0] for y in at])
     paths = point_displacements(motion.poses[window], points, motion.rest_pose)
     return [
-        {"y": y * MM_PER_M, "x": _whole(path[:, 0]), "z": _whole(path[:, 2])}
+        {"y": float(DISTANCE.values(y)), "x": _whole(path[:, 0]), "z": _whole(path[:, 2])}
         for y, path in zip(at, np.moveaxis(paths, 1, 0), strict=True)
     ]
 
@@ -359,7 +362,7 @@ def _forces(record: Record) -> dict[str, Any]:
     count = record.sizes["time"]
     begins = np.unique(np.linspace(0, count, min(BINS, count), endpoint=False).astype(int))
     return {
-        "time": np.rint(record.time.values[begins] * MS_PER_S).astype(int).tolist(),
+        "time": _milliseconds(record.time.values[begins]).tolist(),
         "bands": {
             name: [
                 np.round(reduce.reduceat(values, begins), 3).tolist()
@@ -382,4 +385,9 @@ def _gap_points(runner: Runner, run: RunResult) -> dict[str, Any] | None:
 
 def _whole(values: FloatArray) -> list[int]:
     """Return displacements in whole micrometres."""
-    return np.rint(values * MICRO).astype(int).tolist()
+    return np.rint(values / MICRO).astype(int).tolist()
+
+
+def _milliseconds(time: FloatArray) -> np.ndarray:
+    """Return times in whole milliseconds."""
+    return np.asarray(np.rint(time / MILLI).astype(int))

@@ -123,14 +123,9 @@ def test_a_run_up_has_a_region_for_each_range_of_speed():
 
 
 def test_a_run_that_diverged_is_worse_than_any_other():
-    sizes = np.array([[[1.0, 2.0], [3.0, np.nan]], [[1.0, 2.0], [3.0, 4.0]]])
-    table = xr.Dataset(
-        {
-            "region_amplitude": (("run", "region", "sensor"), sizes),
-            "diverged": ("run", ["at 3 s", ""]),
-        }
-    )
-    found = curves_of(table, run_up(4.0, 1.0))
+    sizes = np.array([np.full((2, 2), np.nan), [[1.0, 2.0], [3.0, 4.0]]])
+    runs = xr.Dataset({"region_amplitude": (("run", "region", "sensor"), sizes)})
+    found = curves_of(runs, run_up(4.0, 1.0))
     assert np.isinf(found.level[0])
     assert (found.amplitude.values[1], found.level[1]) == (2.0, 4.0)
     both = compared(found, found)

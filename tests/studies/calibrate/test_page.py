@@ -15,7 +15,7 @@ from wm_drake.studies.calibrate.solutions import Solution
 from wm_drake.studies.calibrate.study import Calibration, SearchPlan
 from wm_drake.studies.calibrate.targets import Targets
 from wm_drake.studies.fitting.posterior import Posterior
-from wm_drake.studies.machine_show.description import natural_modes
+from wm_drake.studies.modes.natural import natural_modes
 from wm_drake.studies.spin.study import run_spin
 from wm_drake.studies.study import Facts
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 import xarray as xr
+from made_up_runs import made_up
 from motor_machines import isotropic_motor
 from simple_machines import DAMPING, MASS, STIFFNESS, unbalance
 
-from wm_drake.batch import simulate_many
 from wm_drake.errors import InputError
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import Load, SpinProfile, Unbalance, load_machine
@@ -20,6 +20,7 @@ from wm_drake.studies.drive.study import (
     random_loads,
     torque_map,
 )
+from wm_drake.studies.experiment import Experiment
 
 PROFILE = SpinProfile(time=(0.0, 60.0, 80.0), speed=(9.0, 18.0, 18.0))
 
@@ -31,7 +32,7 @@ def limit_of(case):
 def planted(needed):
     """Return a function that runs cases: a drum passes if its limit is as large as its load needs."""
 
-    def run(cases, _what):
+    def run(cases):
         good = np.array([limit_of(case) >= needed[case.name.split()[0]] for case in cases])
         caught = np.where(good, np.nan, 11.0)
         return xr.Dataset(
@@ -49,7 +50,7 @@ def test_bisection_finds_planted_limits_and_says_what_is_out_of_range():
     machine = load_machine("motor")  # 2.2 N m at most
     needed = {"a": 0.5, "b": 1.37, "always": 1e-3, "never": 5.0}
     cases = [Case(name, Load(unbalances=()), PROFILE) for name in needed]
-    found = find_thresholds(machine, cases, planted(needed))
+    found = find_thresholds(made_up(planted(needed), machine, cases))
     for name in ("a", "b"):
         of = found.sel(load=name)
         assert of.caught_below < needed[name] <= of.passes_from
@@ -70,10 +71,8 @@ def test_the_smallest_torque_is_the_largest_of_the_whirl():
         )
     )
 
-    def run(cases, _what):
-        return simulate_many(machine, cases, measures=MEASURES)
-
-    found = find_thresholds(machine.parameters, [Case("c", unbalance(0.5), PROFILE)], run)
+    load = Case("c", unbalance(0.5), PROFILE)
+    found = find_thresholds(Experiment(machine, MEASURES, loads=(load,)))
     speeds = np.linspace(9.0, 16.0, 7001)
     x = 0.125 * speeds**2 / np.hypot(STIFFNESS - (MASS + 0.5) * speeds**2, DAMPING * speeds)
     largest = np.max(DAMPING * speeds * x**2) / 12.0
@@ -84,11 +83,10 @@ def test_the_smallest_torque_is_the_largest_of_the_whirl():
 def test_a_map_scales_the_masses():
     needed = {"0.5": 0.3, "1": 0.6}
     found = torque_map(
-        load_machine("motor"),
+        made_up(planted(needed), load_machine("motor")),
         Case("c", unbalance(2.0, radius=0.2), PROFILE),
         [0.2, 0.4, 0.8],
         [0.5, 1.0],
-        planted(needed),
     )
     np.testing.assert_allclose(found.sum_of_mass_times_radius, [0.2, 0.4])
     np.testing.assert_array_equal(found.end, [[11.0, 18.0, 18.0], [11.0, 11.0, 18.0]])
@@ -103,7 +101,7 @@ def test_unbalance_is_the_part_of_torque_and_acceleration_that_goes_round():
         sum(u.mass * u.radius * np.exp(1j * u.phase) for u in load.unbalances) for load in loads
     ]
 
-    def run(cases, _what):
+    def run(cases):
         torque = rng.normal(size=(len(cases), 2))
         pulls = [(-g * u.imag, -g * u.real) for u in moments]  # -g U sin(phi + phase)
         acceleration = (torque + pulls) / inertia
@@ -114,7 +112,7 @@ def test_unbalance_is_the_part_of_torque_and_acceleration_that_goes_round():
             }
         )
 
-    found = estimate_unbalance(machine, 9.0, loads, run, inertia)
+    found = estimate_unbalance(made_up(run, machine), 9.0, loads, inertia)
     np.testing.assert_allclose(found.planted, np.abs(moments))
     np.testing.assert_allclose(found.estimated, found.planted, rtol=1e-9)
 

@@ -37,8 +37,8 @@ def aim_of(gap, displacement):
 
 
 @pytest.fixture(scope="module")
-def factors(earlier):
-    return levels_of(earlier, {n: f for n, f in load_factors(GASKET_FACTORS).items() if n in NAMES})
+def factors(sponges):
+    return levels_of(sponges, {n: f for n, f in load_factors(GASKET_FACTORS).items() if n in NAMES})
 
 
 def test_rows_of_many_settings_are_those_of_each():
@@ -64,16 +64,16 @@ def test_nothing_is_proposed_where_level_zero_is_best():
     assert best_places(aim) is None
 
 
-def test_the_runs_are_beside_the_machine_and_the_line_sets_what_was_run(earlier, factors):
+def test_the_runs_are_beside_the_machine_and_the_line_sets_what_was_run(sponges, factors):
     places = (1.0, 0.0, -0.5, 0.0)
-    every = [change_of(earlier, f, x) for f, x in zip(factors, places, strict=True) if x]
+    every = [change_of(sponges, f, x) for f, x in zip(factors, places, strict=True) if x]
     assert [change.sets for change in every] == [{"C_L": "0.0285 N*s/mm"}, {"K_Lx": "1.64 N/mm"}]
     aim = aim_of(lambda a, b, c, d: 8 + a, lambda *_: 10 + _[3])
     settings = settings_of(tuple(every), factors)
     frame = pd.DataFrame({GAP: [8.0, 9.0], "Dx": [10.0, 10.5]})
     responses = Responses({"a": frame, "left out": frame - 1.0}, UNITS, {}, MEANINGS)
     check = Check(tuple(settings), aim.surfaces, responses)
-    proposal = Proposal(tuple(every), check, ("a",), is_level_zero(earlier, factors), "")
+    proposal = Proposal(tuple(every), check, ("a",), is_level_zero(sponges, factors), "")
     assert settings[0].text == ZERO
     assert proposal.is_machine
     assert proposal.left_out == ["left out"]

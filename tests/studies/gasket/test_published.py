@@ -186,7 +186,7 @@ def test_level_zero_is_the_machine_if_tables_are_scaled(reference, tables):
 
 
 @pytest.mark.parametrize("factor", ["C_L", "K_Lx"])
-def test_level_zero_is_not_run_without_tables(earlier, factor):
+def test_level_zero_is_not_run_without_tables(sponges, factor):
     known = {factor: load_factors(GASKET_FACTORS)[factor]}
-    every = {name: levels_of(earlier, known, name) for name in TABLES}
-    assert run_level_zero(earlier, every, "scaled", None, None) is None
+    every = {name: levels_of(sponges, known, name) for name in TABLES}
+    assert run_level_zero(sponges, every, "scaled", None, None) is None

@@ -310,23 +310,23 @@ def revolutions_of(balance, start, speed, count, steps=256):
     return np.array(ended)
 
 
-def test_a_machine_without_gasket_leaves_its_unstable_motions_and_keeps_its_stable_ones(shipped):
-    """Check load middle of `reference_2026_11`: unstable from 172 to 195 rpm, with a pair of complex multipliers.
+def test_a_machine_without_gasket_leaves_its_unstable_motions_and_keeps_its_stable_ones(sponges):
+    """Check load middle with sponges: unstable from 200 to 270 rpm.
 
-    A run that starts on the harmonic balance misses the motion by the cut harmonics, 0.01 mm. This
+    A run that starts on the harmonic balance misses the motion by the cut harmonics, 0.03 mm. This
     distance stays on a stable motion and grows on an unstable one.
     """
-    setup = shipped("reference_2026_11").set_up("middle", gasket=False)
+    setup = build_machine(sponges).set_up("middle", gasket=False)
     balance = HarmonicBalance(setup, Series(HARMONICS, 128))
     with threadpool_limits(1, "blas"):
-        points = branch_of(balance, setup, np.linspace(150.0, 205.0, 12) * RPM)
+        points = branch_of(balance, setup, np.linspace(160.0, 300.0, 15) * RPM)
     unstable = max(points, key=lambda point: point.multiplier)
-    assert 179.0 < unstable.speed / RPM < 186.0
+    assert 215.0 <= unstable.speed / RPM <= 230.0
     for point, count in ((points[2], 20), (unstable, 40), (points[-2], 20)):
         begin = balance.series.synthesis[0] @ point.coefficients
         states = revolutions_of(balance, [begin], point.speed, count)[:, 0]
         away = np.linalg.norm((states - begin) * balance.scale, axis=1)
-        assert away[1] < 2e-5
+        assert away[1] < 3e-5
         assert point.stable == (away[-1] < 1.2 * away[1])
         if point is unstable:
             assert away[-1] > 10.0 * away[1]

@@ -6,74 +6,93 @@ import xarray as xr
 from hand_made_records import harmonic_record
 
 from wm_drake.model.scene import Scene
-from wm_drake.studies.response.figures import peaks_of, response_figure
-from wm_drake.studies.response.page import largest_table, summary
+from wm_drake.report.quantity import SPEED
+from wm_drake.studies.response.figures import reachable_peaks, response_figure
+from wm_drake.studies.response.page import branches_table, largest_table, summary
+from wm_drake.studies.response.quantities import AMPLITUDE, RUN_SPEED
 from wm_drake.studies.response.response import settled_trajectory, steady_response
-from wm_drake.studies.response.study import ResponseCase, ResponseStudy, _envelopes
+from wm_drake.studies.response.study import _run_up, case_of_response, largest_of, peaks_of
 
 RPM = np.pi / 30.0
 SPEEDS = (100.0, 120.0, 140.0, 160.0, 180.0)
 
 
-def case(gasket, amplitudes_mm, stable=(True,) * 5, gaps_mm=(20.0,) * 5, run_up=None):
+def case(gasket, amplitudes_mm, stable=(True,) * 5, gaps_mm=(20.0,) * 5):
     response = xr.Dataset(
         {
-            "amplitude": (("point", "sensor"), 1e-3 * np.array([amplitudes_mm]).T),
+            "amplitude": AMPLITUDE.variable(
+                ("point", "sensor"), AMPLITUDE.to_si([amplitudes_mm]).T
+            ),
+            "first_harmonic": (("point", "coordinate", "part"), np.zeros((5, 6, 2))),
             "smallest_gap": ("point", 1e-3 * np.array(gaps_mm)),
             "stable": ("point", np.array(stable)),
         },
-        {"speed": ("point", RPM * np.array(SPEEDS)), "sensor": ["Xr"]},
+        {"speed": SPEED.variable("point", RPM * np.array(SPEEDS)), "sensor": ["Xr"]},
     )
-    return ResponseCase("middle", gasket, response, run_up, 0.0)
+    return case_of_response(response, "middle", gasket)
 
 
 @pytest.fixture
-def study(reference):
-    """Return a study with a huge unstable motion without gasket, and a stable one in contact."""
+def cases():
+    """Return a huge unstable motion without gasket, and a stable one in contact."""
     without = case(
         False,
         (5.0, 45.0, 14.0, 203.4, 8.0),
         stable=(True, True, True, False, True),
         gaps_mm=(25.0, -4.5, 16.0, -170.0, 22.0),
     )
-    return ResponseStudy(reference, [case(True, (4.0, 6.0, 12.6, 7.0, 5.0)), without], None, 0.0)
+    return [case(True, (4.0, 6.0, 12.6, 7.0, 5.0)), without]
 
 
-def test_summary_leads_with_what_a_machine_reaches(study):
-    sentences = summary(study).split(". ")
-    most = "the largest steady amplitude that is stable and without contact is"
-    assert sentences[:3] == [
-        f"With gasket {most} 12.6 mm at sensor Xr with load middle, at 140 rpm",
-        f"Without gasket {most} 14.0 mm at sensor Xr with load middle, at 140 rpm",
-        "With load middle, without gasket, the tub touches the housing at 120 rpm, with an overlap "
-        "of up to 4.5 mm",
-    ]
-    assert sentences[3] == (
-        "Unstable motions, which a machine leaves for another motion: load middle, without gasket, "
-        "at 160 rpm, up to 203.4 mm"
-    )
+def test_summary_has_what_is_reached_where_the_tub_touches_and_what_is_unstable(cases):
+    reached, without, touching, unstable, *_ = summary(cases).split(". ")
+    assert "12.6 mm at sensor Xr" in reached
+    assert "14.0 mm at sensor Xr" in without
+    assert "at 120 rpm" in touching
+    assert touching.endswith(" 4.5 mm")
+    assert "at 160 rpm, up to 203.4 mm" in unstable
 
 
-def test_table_and_peaks_have_reachable_motions_only(study):
-    with_gasket, without = study.cases
-    assert without.reachable.tolist() == [True, False, True, False, True]
-    shown = str(largest_table(study).groups)
-    assert "14.0" in shown
-    assert "203.4" not in shown
-    assert peaks_of(with_gasket) == [2]
-    assert peaks_of(without) == []  # both peaks are out of reach
+def test_table_and_peaks_have_reachable_motions_only(reference, cases):
+    with_gasket, without = cases
+    assert without.reachable.values.tolist() == [True, False, True, False, True]
+    frame = largest_table(reference, cases).frame()
+    assert frame["Xr_mm"].tolist() == pytest.approx([12.6, 14.0])
+    assert frame["speed_rpm"].tolist() == pytest.approx([140.0, 140.0])
+    assert reachable_peaks(with_gasket) == [2]
+    assert reachable_peaks(without) == []  # both peaks are out of reach
 
 
-def test_nothing_reachable_is_said(reference):
+def test_nothing_reachable_is_nan_and_said():
     nothing = case(True, (9.0,) * 5, stable=(False,) * 5)
-    text = summary(ResponseStudy(reference, [nothing], None, 0.0))
-    assert text.startswith("With gasket no steady motion is stable and without contact. Unstable")
-    assert "at 100 to 180 rpm, up to 9.0 mm" in text
-    assert np.isnan(nothing.largest()).all()
+    assert "at 100 to 180 rpm, up to 9.0 mm" in summary([nothing])
+    assert np.isnan([*largest_of(nothing).amplitude, *largest_of(nothing).speed]).all()
 
 
-def test_picture_shows_what_is_reached_and_cuts_what_is_not(study):
-    (panel,) = response_figure(study.cases).panels
+def test_peak_of_the_run_is_beside_the_steady_one(cases):
+    lower = xr.DataArray(AMPLITUDE.to_si([[-3.0], [-9.45], [-2.0]]), dims=("time", "sensor"))
+    run = {
+        "upper": -0.5 * lower,
+        "lower": lower,
+        "run_speed": RUN_SPEED.variable("time", (1, 2, 3)),
+    }
+    peak = peaks_of(cases[0].assign(run)).isel(sensor=0)
+    assert AMPLITUDE.values(peak.run_amplitude) == pytest.approx(9.45)
+    assert peak.run_speed == 2.0
+    assert peak.difference == pytest.approx(-0.25)
+    assert np.isnan(peaks_of(cases[1]).run_amplitude).all()
+
+
+def test_file_has_a_row_for_each_point_of_each_branch(cases):
+    frame = branches_table(cases).frame()
+    assert frame["gasket"].tolist() == ["yes"] * 5 + ["no"] * 5
+    assert frame["speed_rpm"].tolist() == pytest.approx([*SPEEDS, *SPEEDS])
+    assert frame["amplitude_Xr_mm"].iloc[8] == pytest.approx(203.4)
+    assert frame["reachable"].tolist()[5:] == [True, False, True, False, True]
+
+
+def test_picture_shows_what_is_reached_and_cuts_what_is_not(cases):
+    (panel,) = response_figure(cases).panels
     assert panel.y.range == (0.0, pytest.approx(1.25 * 14.0))
     lines = {mark.key: mark for mark in panel.marks}
     assert np.isfinite(lines["steady, without gasket"].y).tolist() == [1, 0, 1, 0, 1]
@@ -85,11 +104,11 @@ def test_run_is_shown_at_the_speeds_of_the_response(reference):
     record = harmonic_record(reference, "middle", True, 0.02)
     speed = np.linspace(0.0, 1400.0, record.sizes["time"]) * RPM
     record["drum_speed"] = ("time", speed)
-    shown = _envelopes(record, RPM * np.array([60.0, 300.0]))
-    assert shown.speed.values.min() >= 60.0 * RPM
-    assert shown.speed.values.max() <= 300.0 * RPM
+    shown = _run_up(record, RPM * np.array([60.0, 300.0]))
+    assert shown.run_speed.values.min() >= 60.0 * RPM
+    assert shown.run_speed.values.max() <= 300.0 * RPM
     assert shown.sizes["time"] == np.count_nonzero((speed >= 60.0 * RPM) & (speed <= 300.0 * RPM))
-    assert _envelopes(record, RPM * np.array([1500.0, 1600.0])) is None
+    assert not _run_up(record, RPM * np.array([1500.0, 1600.0])).variables
 
 
 def test_gap_of_a_motion_is_that_of_the_engine(machine):

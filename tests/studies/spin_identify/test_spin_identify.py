@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+from made_up_runs import made_up
 
 from wm_drake.errors import InputError
 from wm_drake.parameters import SpinProfile, load_machine, with_value
@@ -50,7 +51,7 @@ def reference(tmp_path_factory):
     return load_machine(path)
 
 
-def made_up(reference, seen):
+def model_of(reference, seen):
     """Return a model with a known answer: the last number changes the displacements only if `seen`."""
     sought = tuple(sought_of(reference, keys) for keys in KEYS)
     labels = labels_of(reference, CASES, PROFILE)
@@ -78,11 +79,11 @@ def made_up(reference, seen):
         )
 
     assert list(labels) == ["case", "region", "accelerometer", "axis"]
-    return SpinModel(reference, PROFILE, CASES, sought, regions)
+    return SpinModel(made_up(regions), reference, PROFILE, CASES, sought)
 
 
 def test_true_numbers_are_recovered_and_differ_from_the_machines(reference):
-    model = made_up(reference, seen=True)
+    model = model_of(reference, seen=True)
     planted = planted_values(model.sought, seed=3)
     starts = np.array([sought.unknown.start for sought in model.sought])
     assert np.abs(planted / starts - 1.0).min() > 0.03
@@ -95,7 +96,7 @@ def test_true_numbers_are_recovered_and_differ_from_the_machines(reference):
 
 
 def test_numbers_that_the_data_do_not_determine_are_named(reference):
-    model = made_up(reference, seen=False)
+    model = model_of(reference, seen=False)
     planted = planted_values(model.sought, seed=4)
     fit, found = identify_from_spin(
         model, virtual_experiment(model, planted, noise=1e-3, seed=4), planted=planted
@@ -114,7 +115,7 @@ def test_numbers_that_the_data_do_not_determine_are_named(reference):
 
 def test_verdict_is_that_of_the_displacements_not_of_the_intervals(reference):
     """Fit a model that cannot reproduce the measurement: it still determines its numbers."""
-    model = made_up(reference, seen=True)
+    model = model_of(reference, seen=True)
     planted = planted_values(model.sought, seed=3)
     measured = virtual_experiment(model, planted, noise=0.0, seed=3)
     good = identify_from_spin(model, measured)
@@ -127,7 +128,7 @@ def test_verdict_is_that_of_the_displacements_not_of_the_intervals(reference):
 
 
 def test_noise_widens_intervals_until_a_number_is_not_identified(reference):
-    model = made_up(reference, seen=True)
+    model = model_of(reference, seen=True)
     planted = planted_values(model.sought, seed=5)
     halves = [
         identify_from_spin(model, virtual_experiment(model, planted, noise, 5))[1].half_width

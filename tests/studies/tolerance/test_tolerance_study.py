@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from made_up_runs import made_up
 from scipy import stats
 
 from wm_drake.errors import InputError
@@ -17,9 +18,15 @@ from wm_drake.parameters.tolerances import (
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.measures.responses import Response
-from wm_drake.studies.tolerance.study import ToleranceSettings, limits_of, run_tolerances
+from wm_drake.studies.tolerance.page import tolerance_answer
+from wm_drake.studies.tolerance.study import (
+    SHARE,
+    ToleranceSettings,
+    ToleranceTrials,
+    judged,
+    limits_of,
+)
 from wm_drake.studies.tolerance.variables import uncertain_machine
-from wm_drake.studies.tolerance.words import in_percent, rare_sentences, summary
 
 SPRING = "spring_types.suspension.stiffness"
 GAP = Response("gap", MEASURES["gap"].variables[0])
@@ -170,61 +177,67 @@ def study(machine):
         }
         return xr.Dataset(table, {"pair": ["tub_shell|wall_left", "motor|wall_bottom"]})
 
-    def do(settings, correlations=None, limits=(), shift=0.0):
+    def trials(settings, correlations=None, shift=0.0):
         tree = {"load": "middle", "quantities": quantities, "correlations": correlations}
-        found = uncertain(machine, tree)
-        return run_tolerances(
-            found, (GAP,), lambda cases, _: run(cases, shift), settings, limits_of(limits, (GAP,))
-        )
+        experiment = made_up(lambda cases: run(cases, shift))
+        return ToleranceTrials(uncertain(machine, tree), (GAP,), experiment, settings)
 
-    return do
+    return trials
 
 
 EXACT = stats.norm.cdf(-0.03 / np.hypot(0.01, 0.002))
 
 
+def answer_of(trials):
+    """Return the answer of all parts of a study."""
+    samples = trials.samples()
+    indices, contact = trials.indices(samples), trials.contact(samples)
+    return tolerance_answer(trials, samples, indices, contact, xr.Dataset())
+
+
 def test_study_finds_the_probability_of_contact(study):
-    result = study(ToleranceSettings(2048, 256, 0))
-    contact = result.contact
+    trials = study(ToleranceSettings(2048, 256, 0))
+    samples = trials.samples()
+    contact = trials.contact(samples)
     assert contact.method == "crude count"
-    assert contact.lower < EXACT < contact.upper
-    assert list(contact.pairs) == ["motor|wall_bottom"]
+    assert contact.probability_lower < EXACT < contact.probability_upper
+    (touching,) = np.flatnonzero(contact.touches)
+    assert contact["pair"][touching] == "motor|wall_bottom"
     # linear in independent normals: first and total indices are shares of the variance
-    for index, share in zip(result.indices["smallest_gap_mm"], (100 / 104, 4 / 104), strict=True):
-        assert (index.first, index.total) == pytest.approx((share, share), abs=0.02)
-    assert "To tighten: k (96 %), f (4 %)." in " ".join(summary(result))
+    indices = trials.indices(samples).sel(measure="smallest_gap")
+    for part in (indices["first"], indices.total):
+        np.testing.assert_allclose(part, [100 / 104, 4 / 104], atol=0.02)
+    assert "To tighten: k (96 %), f (4 %)." in answer_of(trials).answer
 
 
 def test_rare_contact_is_found_by_subset_simulation(study):
-    result = study(ToleranceSettings(256, 0, 1000))
-    assert result.contact.method == "subset simulation"
-    assert result.contact.lower < EXACT < result.contact.upper
-    assert result.contact.rare.evaluations < 5000
-    assert result.contact.rare_pairs == {"motor|wall_bottom": 1.0}
-    assert "100 % of the runs that touch do so at motor and wall bottom" in " ".join(
-        summary(result)
-    )
+    trials = study(ToleranceSettings(256, 0, 1000))
+    contact = trials.contact(trials.samples())
+    assert contact.method == "subset simulation"
+    assert contact.probability_lower < EXACT < contact.probability_upper
+    assert contact.rare_runs < 5000
+    assert contact.rare_touches.sel(pair="motor|wall_bottom") == 1.0
+    assert contact.rare_touches.sum() == 1.0
+    assert "100 % of the runs that touch do so at motor and wall bottom" in answer_of(trials).answer
 
 
 def test_words_claim_no_more_than_the_samples_support(study):
-    result = study(ToleranceSettings(16, 0, 100), shift=1.0)
-    assert (result.contact.method, result.contact.estimate) == ("crude count", 0.0)
-    assert result.contact.upper == pytest.approx(1.0 - 0.05 ** (1 / 16))
-    words = " ".join(summary(result))
-    assert "in none of 16 runs, so in at most 17.1 % of all such runs" in words
-    text = rare_sentences(result.contact)
-    assert "took 640 runs in 7 levels" in text
-    assert "without contact the simulation gives no probability" in text
+    trials = study(ToleranceSettings(16, 0, 100), shift=1.0)
+    contact = trials.contact(trials.samples())
+    assert (contact.method, contact.probability) == ("crude count", 0.0)
+    assert contact.probability_upper == pytest.approx(1.0 - 0.05 ** (1 / 16))
+    assert (contact.rare_runs, contact.sizes["level"]) == (640, 6)
+    assert np.isinf(contact.rare_deviation)
+    assert "in none of 16 runs, so in at most 17.1 % of all such runs" in answer_of(trials).answer
 
 
 def test_correlated_quantities_have_no_sobol_indices(study):
-    result = study(
+    trials = study(
         ToleranceSettings(64, 64, 0), {"quantities": ("k", "f"), "matrix": ((1, 0.5), (0.5, 1))}
     )
-    assert not result.indices
-    assert "correlated" in result.refused
-    assert "Shapley effects" in result.refused
-    assert "samples.csv" in result.refused  # they need no other runs
+    indices = trials.indices(trials.samples())
+    assert not indices
+    assert "correlated" in indices.attrs["refused"]
 
 
 @pytest.mark.parametrize(
@@ -233,8 +246,8 @@ def test_correlated_quantities_have_no_sobol_indices(study):
 )
 def test_verdict_of_a_limit(study, limit, allowed, word):
     wanted = Limit(quantity="gap", at_least=limit, allowed_share=allowed)
-    (verdict,) = study(ToleranceSettings(512, 0, 0), limits=[wanted]).verdicts
-    assert verdict.word == word
+    samples = study(ToleranceSettings(512, 0, 0)).samples()
+    assert judged(samples, limits_of([wanted], (GAP,))).verdict.values == [word]
 
 
 def test_limits_that_cannot_be_judged_are_refused(tmp_path):
@@ -251,5 +264,5 @@ def test_limits_that_cannot_be_judged_are_refused(tmp_path):
 
 
 def test_shares_in_percent():
-    shown = [in_percent(x) for x in (0.0, 1.25e-6, 7.31e-4, 1.2345e-2, 0.5)]
+    shown = [SHARE.text(x) for x in (0.0, 1.25e-6, 7.31e-4, 1.2345e-2, 0.5)]
     assert shown == ["0 %", "0.00013 %", "0.073 %", "1.2 %", "50 %"]

@@ -28,12 +28,12 @@ from wm_drake.report.formatting import number
 from wm_drake.report.quantity import HIDDEN, SPEED, Quantity
 from wm_drake.simulation.balance import in_planes, rings_of
 from wm_drake.simulation.cases import Case
-from wm_drake.studies.executor import Executor
+from wm_drake.studies.experiment import Experiment, Simulate
 
 MEASURES = ("amplitudes in regions",)
 """Measures of `simulate_many` that the study needs."""
 
-WINDOW = 25.0 * np.pi / 30.0
+WINDOW = float(SPEED.to_si(25.0))
 """Width of the ranges of speed. [rad/s]"""
 
 HOLD = 10.0
@@ -171,19 +171,18 @@ def with_factors(
     return with_values(parameters, values)
 
 
-def curves_of(table: xr.Dataset, profile: SpinProfile) -> xr.Dataset:
+def curves_of(runs: xr.Dataset, profile: SpinProfile) -> xr.Dataset:
     """Return the largest amplitude of all sensors in each range of speed, and at the end.
 
     Args:
-        table: Runs of the profile, which has a region for each range and a last one for its end.
+        runs: Runs of the profile over `run`, as of `Experiment.over`. The profile has a region for
+            each range and a last one for its end.
 
     Returns:
         Over `run` and the begin of each range, `from` [rad/s]: `amplitude`; over `run`: `level` at
         the highest speed [m]. Both are infinite for a run that diverged.
     """
-    sizes = table.region_amplitude.values.max(axis=-1)
-    failed = table.diverged.values[:, None] != ""
-    sizes = np.where(failed | np.isnan(sizes), np.inf, sizes)
+    sizes = runs.region_amplitude.max("sensor", skipna=False).fillna(np.inf).values
     begins = [profile.speed_at(region.begin) for region in profile.regions[:-1]]
     return xr.Dataset(
         {
@@ -249,7 +248,7 @@ class BalancerTrials:
     """
 
     machine: Machine
-    executor: Executor
+    simulate: Simulate
     high: float
     rate: float
     radius: float
@@ -319,12 +318,17 @@ class BalancerTrials:
             names.append(f"{name}, locked {ball_mass:g}")
             held[names[-1]] = Case(names[-1], locked(load, changed), profile)
         plain = build_machine(without_rings(parameters))
-        of_free = self.executor.simulate(self.machine, MEASURES, free, f"{what}, free balls")
-        of_held = self.executor.simulate(plain, MEASURES, held.values(), f"{what}, locked balls")
+        curves = self._curves(self.machine, free, f"{what}, free balls")
+        of_held = self._curves(plain, [*held.values()], f"{what}, locked balls")
         place = {name: at for at, name in enumerate(held)}
-        curves = curves_of(of_free, profile)
-        of_locked = curves_of(of_held, profile).isel(run=[place[name] for name in names])
+        of_locked = of_held.isel(run=[place[name] for name in names])
         return compared(curves, of_locked).assign(free=curves.amplitude, locked=of_locked.amplitude)
+
+    def _curves(self, machine: Machine, cases: Sequence[Case], what: str) -> xr.Dataset:
+        """Return the curves of cases whose profiles have the same ranges, as of `curves_of`."""
+        experiment = Experiment(machine, MEASURES, self.simulate)
+        runs = experiment.over({"run": range(len(cases))}, cases, what)
+        return curves_of(runs, cases[0].profile)
 
     def plain(self, load: xr.Dataset) -> xr.Dataset:
         """Return the curve of one of `loads` in the machine without rings, as of `curves_of`."""
@@ -332,8 +336,7 @@ class BalancerTrials:
         machine = build_machine(without_rings(self.machine.parameters))
         at = self.load(load.mass.item(), load.place.item())
         cases = [Case("without rings", at, profile)]
-        table = self.executor.simulate(machine, MEASURES, cases, "without rings")
-        return curves_of(table, profile).isel(run=0)
+        return self._curves(machine, cases, "without rings").isel(run=0)
 
     def releases(self, load: xr.Dataset, speeds: Sequence[float]) -> xr.Dataset:
         """Return runs that begin at a speed, at which balls locked before are released.
@@ -360,12 +363,8 @@ class BalancerTrials:
         }
         free = [Case(f"released {s:g}", at, p, True, begun) for s, p in profiles.items()]
         held = [Case(f"locked {s:g}", locked(at, parameters), p) for s, p in profiles.items()]
-        tables = (
-            self.executor.simulate(self.machine, MEASURES, free, "releases"),
-            self.executor.simulate(plain, MEASURES, held, "still locked"),
-        )
-        curves = [curves_of(table, next(iter(profiles.values()))) for table in tables]
-        return released(speeds, *curves)
+        of_free = self._curves(self.machine, free, "releases")
+        return released(speeds, of_free, self._curves(plain, held, "still locked"))
 
 
 def released(speeds: Sequence[float], free: xr.Dataset, held: xr.Dataset) -> xr.Dataset:

@@ -79,7 +79,7 @@ class BalancerTask(Task):
 
     def run(self, executor: Executor) -> Answer:
         """Run loads, rings and releases."""
-        trials = BalancerTrials(self.machine, executor, self.high, self.rate, self.radius)
+        trials = BalancerTrials(self.machine, executor.simulate, self.high, self.rate, self.radius)
         loads = trials.loads(self.masses, self.places)
         base = base_of(loads)
         rings = trials.rings(base, self.ball_masses, self.dampings)

@@ -4,20 +4,21 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import xarray as xr
 
 from wm_drake.engines.trajectory import COORDINATES
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report import figure as fig
 from wm_drake.report.formatting import number
 from wm_drake.studies.calibrate.study import Calibration
-from wm_drake.studies.machine_show.description import Modes
+from wm_drake.studies.modes.shapes import ANGLE_ARM
 
 OTHER = "#8a8f98"
 """Colour of the errors of another model."""
 
 _SHAPE_ORDER = (3, 4, 5, 0, 1, 2)
-_SHAPE_WEIGHTS = np.array([0.25, 0.25, 0.25, 1.0, 1.0, 1.0])
-"""Weights of the components of a mode shape: angles are multiplied by 0.25 m, as in `Modes`."""
+_SHAPE_WEIGHTS = np.repeat([ANGLE_ARM, 1.0], 3)
+"""Weights of the components of a mode shape, as in `natural_modes`."""
 
 
 def errors_figure(
@@ -48,7 +49,7 @@ def errors_figure(
     return fig.Figure(panels=placed, height=150.0)
 
 
-def modes_figure(modes: Sequence[tuple[str, Modes]]) -> fig.Figure:
+def modes_figure(modes: Sequence[tuple[str, xr.Dataset]]) -> fig.Figure:
     """Return mode shapes as coloured tables: one row per mode, one column per direction of motion.
 
     Angles are multiplied by 0.25 m. The frequency is at the left of each row.
@@ -57,18 +58,18 @@ def modes_figure(modes: Sequence[tuple[str, Modes]]) -> fig.Figure:
         modes: Title and modes of each state of the machine; the states are drawn side by side.
     """
     scale = fig.Scale(low=-1.3, high=1.3, shades="RdBu")
-    count = max(len(state.frequency_hz) for _, state in modes)
+    count = max(state.sizes["mode"] for _, state in modes)
     plain = fig.Axis(has_grid=False, has_line=False)
     x = replace(plain, ticks=fig.named(COORDINATES[k] for k in _SHAPE_ORDER), range=(-0.5, 5.5))
     panels = []
     for title, state in modes:
-        shape = (state.shape * _SHAPE_WEIGHTS)[:, _SHAPE_ORDER]
+        shape = (state["shape"].values * _SHAPE_WEIGHTS)[:, _SHAPE_ORDER]
         marks: list[fig.Mark] = [fig.Cells(shape, range(6), range(len(shape)), scale=scale)]
         for (row, column), value in np.ndenumerate(shape):
             if abs(value) >= 0.1:
                 color = "#ffffff" if abs(value) > 0.75 else fig.MARK
                 marks.append(fig.Text(column, row, number(value), color=color))
-        labels = [f"{number(f, 2)} Hz, {number(60.0 * f, 0)} rpm" for f in state.frequency_hz]
+        labels = [f"{number(f, 2)} Hz, {number(60.0 * f, 0)} rpm" for f in state.frequency.values]
         y = replace(plain, ticks=fig.named(labels), range=(count - 0.5, -0.5))
         panels.append(fig.Panel(title=title, marks=tuple(marks), x=x, y=y))
     return fig.Figure(panels=fig.in_grid(panels, len(panels)), height=42.0 * count)

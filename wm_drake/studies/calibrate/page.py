@@ -31,7 +31,7 @@ from wm_drake.studies.calibrate.tables import (
     response_table,
     responses_shown,
 )
-from wm_drake.studies.machine_show.description import Modes, natural_modes
+from wm_drake.studies.modes.natural import natural_modes
 from wm_drake.studies.spin.data import OURS, amplitudes_of, differences_of, experiment_of, gaps_of
 from wm_drake.studies.spin.figures import envelopes_figure
 from wm_drake.studies.spin.page import amplitude_tables, gaps_table, sensors_table
@@ -135,7 +135,7 @@ def calibration_page(result: CalibrateResult, facts: Facts) -> str:
 
 
 def drawn_page(
-    result: CalibrateResult, best: SpinRuns, modes: Sequence[tuple[str, Modes]], facts: Facts
+    result: CalibrateResult, best: SpinRuns, modes: Sequence[tuple[str, xr.Dataset]], facts: Facts
 ) -> str:
     """Return the page with computed runs.
 
@@ -164,7 +164,7 @@ def drawn_page(
 def _picture_sections(
     result: CalibrateResult,
     best: SpinRuns,
-    modes: Sequence[tuple[str, Modes]],
+    modes: Sequence[tuple[str, xr.Dataset]],
     amplitudes: xr.Dataset,
 ) -> list[Section]:
     calibration = result.calibration
@@ -463,14 +463,14 @@ def _quantities_picture(calibration: Calibration) -> Picture:
     return picture(quantities_figure(calibration), "The numbers are in the table below.", caption)
 
 
-def _modes_picture(modes: Sequence[tuple[str, Modes]]) -> Picture:
+def _modes_picture(modes: Sequence[tuple[str, xr.Dataset]]) -> Picture:
     caption = (
         "Rigid-body modes of the empty tub without dampers and with the drum at rest: natural "
         "frequency, drum speed of the same frequency, and mode shape. Angles are multiplied by "
         "0.25 m. The largest component of each shape is 1."
     )
     alternative = "; ".join(
-        f"{title}: {', '.join(number(f, 2) for f in shown.frequency_hz)} Hz"
+        f"{title}: {', '.join(number(f, 2) for f in shown.frequency.values)} Hz"
         for title, shown in modes
     )
     return picture(modes_figure(modes), f"Natural frequencies {alternative}.", caption)

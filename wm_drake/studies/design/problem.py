@@ -17,7 +17,7 @@ from wm_drake.parameters.variation import value_at
 from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.cases import Case, load_of
 from wm_drake.simulation.measures.responses import Response, chosen_responses
-from wm_drake.studies.executor import RunCases
+from wm_drake.studies.experiment import Experiment, response_of
 from wm_drake.studies.tolerance.variables import UncertainMachine
 
 
@@ -208,7 +208,9 @@ class MachineDesigns:
             return self.runs_of(parameters, name)
         return self.scattered(parameters).cases(np.zeros((1, self.scores.shape[1])))
 
-    def evaluate(self, designs: FloatArray, run: RunCases) -> tuple[FloatArray, FloatArray]:
+    def evaluate(
+        self, designs: FloatArray, experiment: Experiment
+    ) -> tuple[FloatArray, FloatArray]:
         """Return values of all objectives, then of all constraints, in units for reading.
 
         Args:
@@ -217,13 +219,13 @@ class MachineDesigns:
         Returns:
             (n, objectives) and (n, constraints); NaN for a design of which a run failed.
         """
-        values = self.scenario_values(designs, run)
+        values = self.scenario_values(designs, experiment)
         columns = np.column_stack(
             [goal.over(value) for goal, value in zip(self.goals, values, strict=True)]
         )
         return columns[:, : len(self.objectives)], columns[:, len(self.objectives) :]
 
-    def scenario_values(self, designs: FloatArray, run: RunCases) -> list[FloatArray]:
+    def scenario_values(self, designs: FloatArray, experiment: Experiment) -> list[FloatArray]:
         """Return the values of each goal by design and scenario, in units for reading.
 
         Args:
@@ -233,27 +235,27 @@ class MachineDesigns:
             For each of `goals` (n, scenarios); NaN for a run that failed.
         """
         machines = [self.machine_at(design) for design in designs]
-        table = run(
-            [
-                case
-                for number, machine in enumerate(machines, start=1)
-                for case in self.runs_of(machine, f"design {number}")
-            ]
+        labels = {"design": range(1, len(designs) + 1), "scenario": range(self.scenarios)}
+        cases = (
+            case
+            for number, machine in enumerate(machines, start=1)
+            for case in self.runs_of(machine, f"design {number}")
         )
-        failed = table.diverged.values != ""
+        runs = experiment.over(labels, cases)
         by_goal: list[FloatArray] = []
         for goal in self.goals:
             if goal.response is None:
-                numbers = [goal.unit.from_si(value_at(m, goal.given.quantity)) for m in machines]
-                values: FloatArray = np.repeat(np.array(numbers), self.scenarios)
+                numbers = [value_at(machine, goal.given.quantity) for machine in machines]
+                has_ended = runs.diverged.values == ""
+                values = np.where(has_ended, np.array(numbers)[:, None], np.nan)
             else:
-                values = goal.response.values(table)
-            by_goal.append(np.where(failed, np.nan, values).reshape(len(designs), -1))
+                values = response_of(runs, goal.response).values
+            by_goal.append(goal.quantity.values(values))
         return by_goal
 
-    def costs(self, designs: FloatArray, run: RunCases) -> tuple[FloatArray, FloatArray]:
+    def costs(self, designs: FloatArray, experiment: Experiment) -> tuple[FloatArray, FloatArray]:
         """Return what the search makes small, and constraints that are met at 0 and below."""
-        objectives, constraints = self.evaluate(designs, run)
+        objectives, constraints = self.evaluate(designs, experiment)
         f = [g.cost(column) for g, column in zip(self.objectives, objectives.T, strict=True)]
         g = [c.cost(column) for c, column in zip(self.constraints, constraints.T, strict=True)]
         return np.column_stack(f), np.column_stack(g) if g else np.empty((len(designs), 0))

@@ -19,7 +19,7 @@ from wm_drake.simulation.records import Record, sample_period
 from wm_drake.studies.design.problem import DesignGoal, MachineDesigns
 from wm_drake.studies.design.search import DesignProblem, SearchSettings, search_front
 from wm_drake.studies.design.surrogate import search_with_surfaces
-from wm_drake.studies.executor import RunCases
+from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.tolerance.distributions import base_samples
 from wm_drake.studies.tolerance.shares import CONFIDENCE, Percentile, percentile_of
 
@@ -36,7 +36,10 @@ ENVELOPE = Quantity("largest envelope", Unit("m", "mm"))
 
 
 def run_designs(
-    designs: MachineDesigns, run: RunCases, settings: SearchSettings, search: str = "genetic"
+    designs: MachineDesigns,
+    experiment: Experiment,
+    settings: SearchSettings,
+    search: str = "genetic",
 ) -> xr.Dataset:
     """Search the Pareto front of the designs of a machine.
 
@@ -51,13 +54,13 @@ def run_designs(
         chosen designs by name: best Dx, ..., compromise.
     """
     problem = DesignProblem(
-        lambda x: designs.costs(x, run),
+        lambda x: designs.costs(x, experiment),
         designs.nominal(),
         len(designs.objectives),
         len(designs.constraints),
     )
     result = SEARCHES[search](problem, settings)
-    nominal, _ = designs.evaluate(designs.nominal()[None], run)
+    nominal, _ = designs.evaluate(designs.nominal()[None], experiment)
     costs = [*result.objectives.T, *result.constraints.T]
     evaluations, volumes = zip(*result.history, strict=True)
     places = zip(designs.dimensions, result.designs.T, strict=True)
@@ -113,7 +116,9 @@ OTHER_SEED = 1_000_003
 """Added to the seed of the search for the fresh samples."""
 
 
-def promises(designs: MachineDesigns, front: xr.Dataset, run: RunCases, seed: int) -> xr.Dataset:
+def promises(
+    designs: MachineDesigns, front: xr.Dataset, experiment: Experiment, seed: int
+) -> xr.Dataset:
     """Return what the chosen designs of a robust front promise, and keep on fresh samples.
 
     Returns:
@@ -130,8 +135,8 @@ def promises(designs: MachineDesigns, front: xr.Dataset, run: RunCases, seed: in
     points = front.place.sel(design=numbers).values
     count, size = scores.shape
     fresh, _ = base_samples(size, FRESH * count, seed + OTHER_SEED)
-    before = designs.scenario_values(points, run)
-    after = replace(designs, scores=fresh).scenario_values(points, run)
+    before = designs.scenario_values(points, experiment)
+    after = replace(designs, scores=fresh).scenario_values(points, experiment)
     rows = [numbers.index(number) for number in chosen.values()]
     data = xr.Dataset(coords={"chosen": list(chosen), "samples": ["promised", "fresh"]})
     for goal, old, new in zip(designs.goals, before, after, strict=True):

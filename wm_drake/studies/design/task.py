@@ -18,6 +18,7 @@ from wm_drake.studies.design.problem import MachineDesigns, machine_designs
 from wm_drake.studies.design.search import SearchSettings
 from wm_drake.studies.design.study import SEARCHES, front_envelopes, promises, run_designs
 from wm_drake.studies.executor import Executor
+from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.inputs import problems_of_file, selected_cases
 from wm_drake.studies.run import machine_text
 from wm_drake.studies.study import Task
@@ -88,11 +89,12 @@ class DesignTask(Task):
 
     def run(self, executor: Executor) -> Answer:
         """Search the front, check a robust one on fresh samples, and run it with histories."""
-        options, run = self.options, partial(executor.simulate, self.machine, self.measures)
+        options = self.options
+        experiment = Experiment(self.machine, self.measures, executor.simulate)
         total = (options.evaluations + 1) * self.designs.scenarios  # and the machine itself
         with executor.progress(total):
-            front = run_designs(self.designs, run, self.settings, options.search)
-        checked = promises(self.designs, front, partial(run, what="fresh samples"), options.seed)
+            front = run_designs(self.designs, experiment, self.settings, options.search)
+        checked = promises(self.designs, front, experiment, options.seed)
         envelopes = None
         if front.sizes["design"]:
             histories = partial(executor.records, self.machine, what="envelopes of the front")

@@ -6,9 +6,10 @@ import numpy as np
 import xarray as xr
 
 from wm_drake.parameters import MachineParameters, SpinProfile
+from wm_drake.parameters.units import Unit
 from wm_drake.report import figure as fig
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import SPEED, quantity_of, shown, text_of
+from wm_drake.report.quantity import SPEED, Quantity, quantity_of, shown, text_of
 from wm_drake.studies.answer import Answer, Part, Plot
 from wm_drake.studies.drive.study import (
     PASSES,
@@ -18,6 +19,8 @@ from wm_drake.studies.drive.study import (
     estimation_errors,
     motor_with_limit,
 )
+
+SHARE = Quantity("share", Unit("", "%"), 0)
 
 
 def drive_answer(
@@ -44,7 +47,7 @@ def drive_answer(
         thresholds,
         f"Smallest torque limit of machine '{parameters.name}'",
         "Smallest torque of the motor with which the drum passes every critical speed, by "
-        f"bisection to 2 %: it has at least {100.0 * PASSES:g} % of the wanted speed at the end of "
+        f"bisection to 2 %: it has at least {SHARE.text(PASSES)} of the wanted speed at the end of "
         "the profile. 0: it passes with the smallest torque tried. A dash: it does not pass with "
         "the torque of the machine. Where the torque is a little smaller than needed, the drum "
         "stays at the speed of the last column: near 0 rpm the motor cannot lift the unbalance, "

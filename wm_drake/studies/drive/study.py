@@ -13,7 +13,7 @@ so that the parts of order one of torque T and acceleration w' give m r, whateve
 does: m r = |T_1 - J w'_1| / g. An appliance knows T from its current and w' from its tacho.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -33,6 +33,7 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.report.quantity import SPEED, Quantity
 from wm_drake.simulation.cases import Case
+from wm_drake.studies.experiment import Experiment
 
 MEASURES = ("drive",)
 """Measures of `simulate_many` that the study needs."""
@@ -48,9 +49,6 @@ PRECISION = 1.02
 
 RAMP, HOLD = 10.0, 12.0
 """Durations of run-up and hold of the runs for the estimation. [s]"""
-
-Runs = Callable[[Iterable[Case], str], xr.Dataset]
-"""Function that runs cases and returns the table of their measures; the text says what for."""
 
 TORQUE, MOMENT = Unit("N*m", "N*m"), Unit("kg*m", "g*m")
 
@@ -95,12 +93,12 @@ def with_torque(parameters: MachineParameters, torque: float) -> MachineParamete
     return with_values(parameters, {"drive.torque_limit.torque": float(torque)})
 
 
-def passes(table: xr.Dataset, profile: SpinProfile) -> np.ndarray:
-    """Return which runs have the wanted speed at the end of the profile. (run,) bool"""
-    return np.asarray(table.drive_end_speed.values >= PASSES * profile.speed[-1])
+def passes(runs: xr.Dataset, profile: SpinProfile) -> np.ndarray:
+    """Return which runs have the wanted speed at the end of the profile. Bool"""
+    return np.asarray(runs.drive_end_speed.values >= PASSES * profile.speed[-1])
 
 
-def find_thresholds(parameters: MachineParameters, loads: Sequence[Case], run: Runs) -> xr.Dataset:
+def find_thresholds(experiment: Experiment) -> xr.Dataset:
     """Return the smallest torque limit of each load by bisection; all loads run side by side.
 
     Returns:
@@ -109,46 +107,38 @@ def find_thresholds(parameters: MachineParameters, loads: Sequence[Case], run: R
         even the largest one does [N m at the motor's shaft]; `caught_speed` [rad/s] and
         `caught_mean_torque_at_drum` [N m], where it is caught at `caught_below`, NaN if it is not.
     """
+    parameters, loads = experiment.machine.parameters, experiment.loads
     motor, limit = motor_with_limit(parameters)
     largest = limit.torque
     count, profile = len(loads), loads[0].profile
     low, high = np.full(count, largest / RANGE), np.full(count, largest)
     caught = np.full((count, 2), np.nan)
 
-    def tried(torques: FloatArray, which: Iterable[int], what: str) -> dict[int, bool]:
-        numbers = list(which)
-        cases = [
+    def tried(torques: FloatArray, which: Sequence[int], what: str) -> np.ndarray:
+        cases = (
             replace(
                 loads[i],
                 name=f"{loads[i].name} {torques[i]:g}",
                 parameters=with_torque(parameters, torques[i]),
             )
-            for i in numbers
-        ]
-        table = run(cases, what)
-        good = dict(zip(numbers, passes(table, profile).tolist(), strict=True))
-        for row, i in enumerate(numbers):
-            if not good[i]:
-                caught[i] = (
-                    table.drive_caught_speed.values[row],
-                    table.drive_caught_torque.values[row],
-                )
+            for i in which
+        )
+        runs = experiment.over({"load": [loads[i].name for i in which]}, cases, what)
+        good = passes(runs, profile)
+        places = np.stack([runs.drive_caught_speed, runs.drive_caught_torque], axis=1)
+        caught[np.array(which)[~good]] = places[~good]
         return good
 
     at_most = tried(high, range(count), "largest torque")
-    at_least = tried(low, range(count), "smallest torque")
-    high = np.where([at_most[i] for i in range(count)], high, np.nan)
-    always = np.array([at_least[i] for i in range(count)])
+    always = tried(low, range(count), "smallest torque")
+    high = np.where(at_most, high, np.nan)
     high, low = np.where(always, low, high), np.where(always, 0.0, low)
     low = np.where(np.isnan(high), largest, low)
-    while True:
-        open_ends = [i for i in range(count) if low[i] > 0.0 and high[i] > PRECISION * low[i]]
-        if not open_ends:
-            break
+    while (open_ends := np.flatnonzero((low > 0.0) & (high > PRECISION * low))).size:
         middle = np.sqrt(low * np.nan_to_num(high))
-        good = tried(middle, open_ends, "bisection")
-        for i in open_ends:
-            (high if good[i] else low)[i] = middle[i]
+        good = tried(middle, open_ends.tolist(), "bisection")
+        high[open_ends[good]] = middle[open_ends[good]]
+        low[open_ends[~good]] = middle[open_ends[~good]]
     return xr.Dataset(
         {
             "caught_below": CAUGHT_BELOW.variable("load", low),
@@ -164,11 +154,7 @@ def find_thresholds(parameters: MachineParameters, loads: Sequence[Case], run: R
 
 
 def torque_map(
-    parameters: MachineParameters,
-    case: Case,
-    torques: Sequence[float],
-    factors: Sequence[float],
-    run: Runs,
+    experiment: Experiment, case: Case, torques: Sequence[float], factors: Sequence[float]
 ) -> xr.Dataset:
     """Return where the drum passes, over torque limits and factors on the masses of a load.
 
@@ -177,21 +163,20 @@ def torque_map(
         end of the profile, `caught`, where the drum is caught, NaN if it is not [rad/s], and
         `sum_of_mass_times_radius` of the load [kg m].
     """
-    machines = [with_torque(parameters, torque) for torque in torques]
+    machines = [with_torque(experiment.machine.parameters, torque) for torque in torques]
     loads = [scaled(case.load, factor) for factor in factors]
-    cases = [
+    cases = (
         Case(f"{factor:g} {torque:g}", load, case.profile, case.gasket, machine)
         for factor, load in zip(factors, loads, strict=True)
         for torque, machine in zip(torques, machines, strict=True)
-    ]
-    table, shape = run(cases, "map"), (len(factors), len(torques))
+    )
+    runs = experiment.over({"mass_factor": factors, "torque_limit": torques}, cases, "map")
     unbalance = [sum(u.mass * u.radius for u in load.unbalances) for load in loads]
-    dims = ("mass_factor", "torque_limit")
     return xr.Dataset(
         {
             "sum_of_mass_times_radius": UNBALANCE.variable("mass_factor", unbalance),
-            "end": END_SPEED.variable(dims, table.drive_end_speed.values.reshape(shape)),
-            "caught": CAUGHT_SPEED.variable(dims, table.drive_caught_speed.values.reshape(shape)),
+            "end": END_SPEED.variable(runs.drive_end_speed.dims, runs.drive_end_speed),
+            "caught": CAUGHT_SPEED.variable(runs.drive_end_speed.dims, runs.drive_caught_speed),
         },
         {
             "load": case.name,
@@ -209,7 +194,7 @@ def scaled(load: Load, factor: float) -> Load:
 
 
 def estimate_unbalance(
-    parameters: MachineParameters, speed: float, loads: Sequence[Load], run: Runs, inertia: float
+    experiment: Experiment, speed: float, loads: Sequence[Load], inertia: float
 ) -> xr.Dataset:
     """Return the unbalance of loads as the drive sees it at a constant speed.
 
@@ -223,13 +208,15 @@ def estimate_unbalance(
         alone, in size [kg m]. Attribute `speed` [rad/s].
     """
     profile = SpinProfile(time=(0.0, RAMP, RAMP + HOLD), speed=(0.0, speed, speed))
-    cases = [
+    parameters = experiment.machine.parameters
+    cases = (
         Case(f"random {number}", load, profile, parameters=parameters)
         for number, load in enumerate(loads)
-    ]
-    table, g = run(cases, "estimation"), parameters.gravity
+    )
+    runs = experiment.over({"random_load": range(len(loads))}, cases, "estimation")
+    g = parameters.gravity
     torque, acceleration = (
-        table[f"drive_{name}_order_one"].values @ np.array([1.0, 1.0j])
+        runs[f"drive_{name}_order_one"].values @ np.array([1.0, 1.0j])
         for name in ("torque", "acceleration")
     )
     planted = [

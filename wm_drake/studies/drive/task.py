@@ -1,6 +1,5 @@
 """Check the options of the drive study, and run it."""
 
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -8,6 +7,7 @@ import numpy as np
 from wm_drake.engines.compiled.step_check import drum_inertia
 from wm_drake.errors import input_error
 from wm_drake.model.machine import Machine
+from wm_drake.report.quantity import SPEED
 from wm_drake.studies.answer import Answer
 from wm_drake.studies.drive.options import DriveOptions
 from wm_drake.studies.drive.page import drive_answer
@@ -20,6 +20,7 @@ from wm_drake.studies.drive.study import (
     torque_map,
 )
 from wm_drake.studies.executor import Executor
+from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.inputs import selected_cases
 from wm_drake.studies.study import Task
 
@@ -47,18 +48,19 @@ class DriveTask(Task):
     def run(self, executor: Executor) -> Answer:
         """Find thresholds, draw the map for the load that needs most, and estimate unbalance."""
         options, parameters = self.options, self.machine.parameters
-        run = partial(executor.simulate, self.machine, MEASURES)
-        thresholds = find_thresholds(parameters, self.cases, run)
+        loads = tuple(self.cases)
+        experiment = Experiment(self.machine, MEASURES, executor.simulate, loads)
+        thresholds = find_thresholds(experiment)
         needs = thresholds.passes_from.fillna(motor_with_limit(parameters)[1].torque).values
         worst = int(np.argmax(np.where(thresholds.passes_from.isnull(), np.inf, needs)))
         top = needs[worst]
         torques = (top * np.linspace(0.25, 2.0, options.torques)).tolist()
         factors = np.linspace(0.25, 1.5, options.unbalances).tolist()
-        grid = torque_map(parameters, self.cases[worst], torques, factors, run)
+        grid = torque_map(experiment, self.cases[worst], torques, factors)
         estimation = None
         if options.loads:
             inertia = drum_inertia(self.machine.set_up())
-            loads = random_loads(options.loads, options.seed, self.cases[0].load)
-            speed = options.speed * np.pi / 30.0
-            estimation = estimate_unbalance(parameters, speed, loads, run, inertia)
+            drawn = random_loads(options.loads, options.seed, self.cases[0].load)
+            speed = SPEED.to_si(options.speed).item()
+            estimation = estimate_unbalance(experiment, speed, drawn, inertia)
         return drive_answer(parameters, self.cases[0].profile, thresholds, grid, estimation)

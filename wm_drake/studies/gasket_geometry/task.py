@@ -16,10 +16,10 @@ from wm_drake.parameters.elements import ForceTable, TorqueTable
 from wm_drake.parameters.gasket_drawing import load_gasket_drawing
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
-from wm_drake.simulation.cases import Case
 from wm_drake.solid.curves import MOTIONS, Gasket, Mesh
 from wm_drake.studies.answer import Answer
 from wm_drake.studies.executor import Executor
+from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.gasket_curves.study import (
     GasketStiffness,
     check_gasket,
@@ -189,26 +189,23 @@ class GasketGeometryTask(Task):
         machines = [
             self._machine(at, one.stiffness) for at, one in zip(levels, computed, strict=True)
         ]
-        cases = [
-            Case(case.name, case.load, case.profile, parameters=machine)
-            for machine in machines
-            for case in self.cases
-        ]
-        table = executor.simulate(build_machine(machines[0]), MEASURES, cases)
-        shape = (len(machines), len(self.cases), -1)
-
-        def of_runs(name: str) -> FloatArray:
-            return np.asarray(table[name].values, dtype=float).reshape(shape)
-
+        experiment = Experiment(
+            build_machine(machines[0]), MEASURES, executor.simulate, tuple(self.cases)
+        )
+        runs = experiment.at(range(len(machines)), machines)
+        for at, reasons in zip(levels, runs.diverged.values, strict=True):
+            if any(reasons):
+                where, reason = drawings.text_at(self.factors, at), next(filter(None, reasons))
+                raise WmDrakeError(f"{reason}, with the gasket of the drawing with {where}")
         slopes = {
             name: np.array([one.stiffness.tables[name].nominal_stiffness for one in computed])
             for name in (motion.name for motion in MOTIONS)
         }
-        force = np.linalg.norm(of_runs("gasket_force"), axis=-1)
+        force = np.linalg.norm(runs.gasket_force, axis=-1)
         return {
             **slopes,
-            GAP: of_runs("smallest_gap").min(axis=(1, 2)),
-            "largest_amplitude": of_runs("amplitude").max(axis=(1, 2)),
+            GAP: runs.smallest_gap.min("load").values,
+            "largest_amplitude": runs.amplitude.max(("load", "sensor")).values,
             "largest_gasket_force": force.max(axis=1),
             "largest_stretch": np.array([one.stretch for one in computed]),
         }

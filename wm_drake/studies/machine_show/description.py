@@ -1,24 +1,40 @@
-"""Description of a machine in SI units, complete enough to rebuild it elsewhere; its modes."""
+"""Description of a machine in SI units, complete enough to rebuild it in another program.
 
-from dataclasses import dataclass
-from typing import Any
+Each type declares keys, units and meaning, from which pydantic writes the JSON schema. The suffix
+of a key is the frame of a point or direction: W housing, T tub, D drum.
+"""
+
+from typing import Any, Literal
 
 import numpy as np
+from pydantic import Field
 
-from wm_drake.compiler.compilation import generic
-from wm_drake.compiler.vectors import rotation_from_rpy
 from wm_drake.elements.spin_profile import drum_motion
 from wm_drake.elements.state_map import BEARING_WORDS
 from wm_drake.engines.compiled.step_check import fastest_motions
 from wm_drake.model.bodies import DRUM, drawn_frame, drawn_pose, oscillating_bodies
 from wm_drake.model.build import AnyMachine, machine_of
-from wm_drake.model.equilibrium import tensions_at
-from wm_drake.model.machine import Setup
+from wm_drake.model.machine import Machine, Setup
 from wm_drake.model.sdf_names import tubes_of
 from wm_drake.model.state_layout import CARRIER
-from wm_drake.parameters import DAMPER_LAWS, BushingType, ForceTable, MachineParameters, TorqueTable
-from wm_drake.parameters.rubber import RubberBranches
-from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters import (
+    DAMPER_LAWS,
+    InertiaMatrix,
+    Load,
+    MachineParameters,
+    SpinProfile,
+    Unbalance,
+)
+from wm_drake.parameters import units as u
+from wm_drake.parameters.cabinet import Foot, FootType
+from wm_drake.parameters.drive import (
+    BearingFriction,
+    SpeedController,
+    TorqueLimit,
+    TorqueLimitTable,
+)
+from wm_drake.parameters.elements import Frozen
+from wm_drake.parameters.file_keys import DocumentedSchema
 from wm_drake.simulation.band import (
     FILTER_ORDER,
     HIGH_PASS_HZ,
@@ -26,15 +42,23 @@ from wm_drake.simulation.band import (
     RMS_FILTER_ORDER,
     pass_band,
 )
-from wm_drake.studies.machine_show.schema import VERSION
-from wm_drake.studies.modes.linearisation import MODES, Linearisation
-from wm_drake.studies.modes.shapes import shape_of
+from wm_drake.studies.machine_show.elements import (
+    Bushing,
+    Damper,
+    Open,
+    OtherElement,
+    Pose,
+    Rotation,
+    Spring,
+    TelescopicDamper,
+    Vector,
+)
+from wm_drake.studies.modes.natural import natural_modes
 
-_BEARING_NUMBERS = [
-    f"{kind}_{axis}"
-    for kind in ("stiffness", "rotational_stiffness", "damping", "rotational_damping")
-    for axis in "xyz"
-]
+VERSION = "wm_drake machine description 3"
+"""Name and version of the format. In version 2 springs could not go slack; version 1 had no key
+`format`."""
+
 CONVENTIONS = {
     "frames": "W housing, T tub, D drum; x right, y to the rear, z up. As drawn, all coincide.",
     "rest pose": "Equilibrium of the empty machine. Displacements count from it.",
@@ -59,7 +83,170 @@ CONVENTIONS = {
 }
 """Conventions that a rebuilt machine needs, by subject."""
 
-PRODUCTS = ("xx", "yy", "zz", "xy", "xz", "yz")
+
+class Body(Frozen):
+    """A rigid body without load, at the rest pose and drum angle 0."""
+
+    turns_with: str = Field(description="Body that it moves with: tub, drum, or its own name.")
+    mass: u.Mass
+    centre_of_mass_T: u.Position
+    inertia_about_centre_T: InertiaMatrix
+
+
+class DrumJoint(Frozen):
+    """The joint by which the drum turns in the tub, or in the carrier of a compliant bearing."""
+
+    name: str
+    axis_T: Vector = Field(description="Unit vector; the drum angle is right-handed about it.")
+    through_T: u.Position = Field(description="A point of the axis.")
+    start_angle: u.Angle = Field(description="Drum angle at time 0, where D coincides with T.")
+
+
+BEARING_KEYS = tuple(
+    f"{kind}_{axis}"
+    for kind in ("stiffness", "rotational_stiffness", "damping", "rotational_damping")
+    for axis in "xyz"
+)
+"""Keys of the components of a compliant bearing, those of a bushing."""
+
+
+class DrumBearing(Open):
+    """A compliant bearing between tub and drum carrier; the other keys are its six components."""
+
+    point_T: u.Position
+    rotation_T: Rotation = Field(description="Its y axis is the drum axis.")
+    sag_of_Do_at_rest_W: Vector = Field(description="Of the origin of D against T. [m]")
+    fastest_motion_hz: float
+
+
+class Motor(Frozen, from_attributes=True):
+    """A motor with belt and speed controller: friction at the drum, the rest at its shaft."""
+
+    belt_ratio: u.Ratio = Field(description="Speed of the motor over speed of the drum.")
+    rotor_inertia_kgm2: u.Inertia = Field(
+        validation_alias="rotor_inertia",
+        description="About the motor's axis. The inertias of tub and drum contain its coupling.",
+    )
+    reflected_inertia_kgm2: u.Inertia = Field(
+        validation_alias="reflected_inertia",
+        description="Acts on the joint of the drum alone, in addition to the inertia of the drum.",
+    )
+    torque_limit: TorqueLimit | TorqueLimitTable
+    controller: SpeedController
+    bearing_friction: BearingFriction
+    torque_constant_NmA: u.TorqueConstant | None = Field(
+        validation_alias="torque_constant",
+        description="Torque at the motor's shaft per current; null if it is not known.",
+    )
+
+
+class Imperfections(Frozen, from_attributes=True):
+    """Imperfections other than the bearing.
+
+    Attributes:
+        residual_imbalance: It is added to every load, but not to the empty machine.
+        phase_error: It is added to the phase of the rear mass of spin-cycle cases that have a front
+            mass too, and to nothing else.
+    """
+
+    residual_imbalance: Unbalance
+    phase_error: u.Angle
+
+
+class Sensor(Frozen):
+    """A sensor of the displacement of a point of the tub from its rest position, along one axis."""
+
+    point_T: u.Position
+    axis_W: Literal["x", "y", "z"]
+
+
+class Accelerometer(Frozen):
+    """A vibration sensor at a point of the tub, along all axes of W."""
+
+    point_T: u.Position
+
+
+class Cabinet(Frozen, from_attributes=True):
+    """The rigid cabinet on four feet; it has no influence on the motion unless it moves."""
+
+    mass: u.Mass = Field(description="Of all that does not hang on the mounts.")
+    centre_of_mass_W: u.Position = Field(validation_alias="centre_of_mass")
+    floor_z_W: u.Length = Field(validation_alias="floor", description="Height of the floor.")
+    friction: u.Ratio = Field(description="Coefficient of Coulomb friction of the feet.")
+    feet: dict[str, Foot]
+    moves: bool = Field(description="Whether it moves on its feet; else the housing is fixed.")
+    inertia_kgm2: InertiaMatrix | None = Field(
+        validation_alias="inertia", description="None for a fixed cabinet."
+    )
+    foot_type: FootType | None = Field(description="None for a fixed cabinet.")
+
+
+class Residual(Frozen):
+    """What remains of moment about To and force on the tub at the rest pose."""
+
+    moment_Nm: Vector
+    force_N: Vector
+
+
+class Numerics(Frozen):
+    """Numbers of the integration and of the signal processing."""
+
+    integrator: str
+    step_s: u.Duration
+    output_period_s: u.Duration
+    displacement_filter: str
+    displacement_band_hz: tuple[float, float]
+    rms_filter: str
+    rms_high_pass_hz: float
+
+
+class Description(Frozen):
+    """A machine in SI units, complete enough to rebuild it in another program.
+
+    The suffix of a key is the frame of a point or direction: W housing, T tub, D drum.
+    """
+
+    machine: str
+    units: str = "SI: m, kg, s, rad, N; x right, y to the rear, z up"
+    format: str = Field(VERSION, description=f"'{VERSION}'")
+    conventions: dict[str, str] = Field(
+        CONVENTIONS, description="Conventions by subject, as sentences."
+    )
+    laws: dict[str, str] = Field(description="Equation numbers of the laws in use, by name.")
+    gravity_W: Vector = Field(description="[m/s^2]")
+    bodies: dict[str, Body]
+    oscillating_mass_kg: u.Mass
+    drum_joint: DrumJoint
+    drum_bearing: DrumBearing | None
+    motor: Motor | None
+    imperfections: Imperfections
+    springs: dict[str, Spring]
+    dampers: dict[str, Damper]
+    bushings: dict[str, Bushing]
+    telescopic_dampers: dict[str, TelescopicDamper]
+    sensors: dict[str, Sensor]
+    accelerometers: dict[str, Accelerometer]
+    detergent_point_T: u.Position
+    cabinet: Cabinet | None
+    loads: dict[str, Load]
+    profile: SpinProfile
+    numerics: Numerics
+    rest_pose: Pose
+    sag_at_rest: u.Length = Field(
+        description="By how much the centre of mass of tub and drum is below its drawn place."
+    )
+    equilibrium_residual: Residual
+    natural_frequencies_hz: list[float]
+    mode_damping_ratios: list[float]
+    elements: dict[str, OtherElement] = Field(
+        description="Elements of kinds of other packages, or on the drum."
+    )
+
+
+def description_schema() -> dict[str, Any]:
+    """Return the JSON schema of what `describe` returns and `machine show --json` prints."""
+    schema = Description.model_json_schema(mode="serialization", schema_generator=DocumentedSchema)
+    return {"$schema": DocumentedSchema.schema_dialect, **schema}
 
 
 def describe(machine: AnyMachine) -> dict[str, Any]:
@@ -67,7 +254,8 @@ def describe(machine: AnyMachine) -> dict[str, Any]:
 
     The frames are W (housing), T (tub) and D (drum); in the SDF all three coincide. The suffix of a
     key is the frame in which a point or direction is given. Inertias are about the centre of mass;
-    products of inertia are elements of the matrix.
+    products of inertia are elements of the matrix. `wm-drake machine schema description` has all
+    keys with their meaning.
 
     Example:
         >>> import wm_drake as wm
@@ -75,79 +263,50 @@ def describe(machine: AnyMachine) -> dict[str, Any]:
         >>> description["machine"], description["gravity_W"]
         ('reference', [0.0, 0.0, -9.81])
     """
-    machine = machine_of(machine)
+    return description_of(machine_of(machine)).model_dump(mode="json")
+
+
+def description_of(machine: Machine) -> Description:
+    """Return the description of a machine at rest as an object."""
     setup, modes = machine.set_up(), natural_modes(machine)
     parameters, bodies = setup.parameters, _bodies(setup)
-    described = {
-        "machine": parameters.name,
-        "units": "SI: m, kg, s, rad, N; x right, y to the rear, z up",
-        "format": VERSION,
-        "conventions": CONVENTIONS,
-        "laws": _laws(parameters),
-        "gravity_W": [0.0, 0.0, -parameters.gravity],
-        "bodies": bodies,
-        "oscillating_mass_kg": oscillating_mass(setup),
-        "drum_joint": {"name": parameters.drive.joint, **_drum_axis(setup)},
-        "drum_bearing": _drum_bearing(setup),
-        "motor": _motor(setup),
-        "imperfections": parameters.imperfections.model_dump(exclude={"bearing"}),
-        "springs": {name: _spring(setup, name) for name in setup.springs},
-        "dampers": {name: _damper(setup, name) for name in setup.dampers},
-        "bushings": {name: _bushing(setup, name) for name in setup.bushings},
-        "telescopic_dampers": {name: _telescope(setup, name) for name in setup.telescopes},
-        "sensors": {
-            name: {"point_T": setup.sensor_points[name].tolist(), "axis_W": sensor.axis}
+    cabinet, motor = parameters.cabinet, setup.motor
+    return Description(
+        machine=parameters.name,
+        laws=_laws(parameters),
+        gravity_W=(0.0, 0.0, -parameters.gravity),
+        bodies=bodies,
+        oscillating_mass_kg=oscillating_mass(setup),
+        drum_joint=_drum_joint(setup),
+        drum_bearing=_drum_bearing(setup),
+        motor=None if motor is None else Motor.model_validate(motor),
+        imperfections=Imperfections.model_validate(parameters.imperfections),
+        springs={name: Spring.of(setup, name) for name in setup.springs},
+        dampers={name: Damper.of(setup, name) for name in setup.dampers},
+        bushings={name: Bushing.of(setup, name) for name in setup.bushings},
+        telescopic_dampers={n: TelescopicDamper.of(setup, n) for n in setup.telescopes},
+        sensors={
+            name: Sensor(point_T=setup.sensor_points[name].tolist(), axis_W=sensor.axis)
             for name, sensor in parameters.sensors.items()
         },
-        "accelerometers": {
-            name: {"point_T": point.tolist()} for name, point in setup.accelerometer_points.items()
+        accelerometers={
+            name: Accelerometer(point_T=point.tolist())
+            for name, point in setup.accelerometer_points.items()
         },
-        "detergent_point_T": setup.detergent_point.tolist(),
-        "cabinet": _cabinet(parameters),
-        "loads": {name: load.model_dump() for name, load in parameters.loads.items()},
-        "profile": parameters.profile.model_dump(),
-        "numerics": _numerics(parameters),
-        "rest_pose": _pose(setup.rest_pose),
-        "sag_at_rest": _sag(setup, bodies),
-        "equilibrium_residual": {
-            "moment_Nm": setup.residual[:3].tolist(),
-            "force_N": setup.residual[3:].tolist(),
-        },
-        "natural_frequencies_hz": modes.frequency_hz.tolist(),
-        "mode_damping_ratios": modes.damping_ratio.tolist(),
-    }
-    if setup.elements.others:
-        described["elements"] = {name: _element(setup, name) for name in setup.elements.others}
-    return described
-
-
-def _element(setup: Setup, name: str) -> dict[str, Any]:
-    """Return an element of another package: its kind, its parameters and its points."""
-    placed, element = setup.elements.others[name], setup.parameters.elements[name]
-    return element.model_dump(exclude={"tub_frame", "housing_frame"}) | {
-        "law": placed.kind.words,
-        **{
-            f"{name}_{'T' if name.startswith('tub') else 'W'}": value.tolist()
-            for name, value in placed.ends._asdict().items()
-        },
-    }
-
-
-def _cabinet(parameters: MachineParameters) -> dict[str, Any] | None:
-    """Return the cabinet and its feet; None for a machine without one."""
-    cabinet = parameters.cabinet
-    if cabinet is None:
-        return None
-    return {
-        "mass": cabinet.mass,
-        "centre_of_mass_W": list(cabinet.centre_of_mass),
-        "floor_z_W": cabinet.floor,
-        "friction": cabinet.friction,
-        "feet": {name: foot.model_dump() for name, foot in cabinet.feet.items()},
-        "moves": cabinet.moves,
-        "inertia_kgm2": cabinet.inertia and cabinet.inertia.model_dump(),
-        "foot_type": cabinet.foot_type and cabinet.foot_type.model_dump(),
-    }
+        detergent_point_T=setup.detergent_point.tolist(),
+        cabinet=None if cabinet is None else Cabinet.model_validate(cabinet),
+        loads=parameters.loads,
+        profile=parameters.profile,
+        numerics=_numerics(parameters),
+        rest_pose=Pose.of(setup.rest_pose),
+        sag_at_rest=_sag(setup, bodies),
+        equilibrium_residual=Residual(
+            moment_Nm=setup.residual[:3].tolist(), force_N=setup.residual[3:].tolist()
+        ),
+        natural_frequencies_hz=modes.frequency.values.tolist(),
+        mode_damping_ratios=modes.damping_ratio.values.tolist(),
+        elements={name: OtherElement.of(setup, name) for name in setup.elements.others},
+    )
 
 
 def _laws(parameters: MachineParameters) -> dict[str, str]:
@@ -187,24 +346,20 @@ INTEGRATORS = {
 """Description of each integrator of the compiled engine."""
 
 
-def _numerics(parameters: MachineParameters) -> dict[str, Any]:
+def _numerics(parameters: MachineParameters) -> Numerics:
     period = parameters.profile.sample_period(parameters.output_period)
     band = pass_band(parameters.profile, period)
     both_ways = "forwards and backwards, so that no phase is shifted"
-    return {
-        "integrator": INTEGRATORS[parameters.integrator],
-        "step_s": parameters.step,
-        "output_period_s": period,
-        "displacement_filter": f"Butterworth band-pass of order {FILTER_ORDER}, {both_ways}; ends "
+    return Numerics(
+        integrator=INTEGRATORS[parameters.integrator],
+        step_s=parameters.step,
+        output_period_s=period,
+        displacement_filter=f"Butterworth band-pass of order {FILTER_ORDER}, {both_ways}; ends "
         f"mirrored over {PADDING_PERIODS / band[0]:g} s",
-        "displacement_band_hz": list(band),
-        "rms_filter": f"Butterworth high-pass of order {RMS_FILTER_ORDER}, {both_ways}",
-        "rms_high_pass_hz": HIGH_PASS_HZ,
-    }
-
-
-def _pose(values: FloatArray) -> dict[str, float]:
-    return dict(zip(("roll", "pitch", "yaw", "x", "y", "z"), values.tolist(), strict=True))
+        displacement_band_hz=band,
+        rms_filter=f"Butterworth high-pass of order {RMS_FILTER_ORDER}, {both_ways}",
+        rms_high_pass_hz=HIGH_PASS_HZ,
+    )
 
 
 def oscillating_mass(setup: Setup) -> float:
@@ -213,17 +368,18 @@ def oscillating_mass(setup: Setup) -> float:
     return float(sum(body.get_mass(setup.plant_context) for body in bodies))
 
 
-def _sag(setup: Setup, bodies: dict[str, Any]) -> float:
+def _sag(setup: Setup, bodies: dict[str, Body]) -> float:
     """Return by how much the centre of mass of tub and drum is below its place as drawn. [m]"""
     context, lost = setup.plant_context, 0.0
     for body in oscillating_bodies(setup.machine.plant):
         centre = body.EvalPoseInWorld(context) @ body.CalcCenterOfMassInBodyFrame(context)
-        drawn = bodies[body.name()]["centre_of_mass_T"][2]
+        drawn = bodies[body.name()].centre_of_mass_T[2]
         lost += body.get_mass(context) * (drawn - float(centre[2]))
     return lost / oscillating_mass(setup)
 
 
-def _bodies(setup: Setup) -> dict[str, Any]:
+def _bodies(setup: Setup) -> dict[str, Body]:
+    """Return the bodies that move, and the tubes of telescopic dampers, by name."""
     plant, context = setup.machine.plant, setup.plant_context
     tub, described = drawn_frame(plant, plant.GetBodyByName("tub")), {}
     moving = oscillating_bodies(plant)
@@ -244,153 +400,48 @@ def _bodies(setup: Setup) -> dict[str, Any]:
         M_B = part.CalcSpatialInertiaInBodyFrame(context)
         central = M_B.Shift(M_B.get_com()).CalcRotationalInertia().ReExpress(X_TB.rotation())
         matrix = central.CopyToFullMatrix3()
-        described[part.name()] = {
-            "turns_with": groups.get(part.name(), part.name()),
-            "mass": M_B.get_mass(),
-            "centre_of_mass_T": (X_TB @ M_B.get_com()).tolist(),
-            "inertia_about_centre_T": {
-                key: float(matrix["xyz".index(key[0]), "xyz".index(key[1])]) for key in PRODUCTS
-            },
+        inertia = {
+            key: float(matrix["xyz".index(key[0]), "xyz".index(key[1])])
+            for key in InertiaMatrix.model_fields
         }
+        described[part.name()] = Body(
+            turns_with=groups.get(part.name(), part.name()),
+            mass=M_B.get_mass(),
+            centre_of_mass_T=(X_TB @ M_B.get_com()).tolist(),
+            inertia_about_centre_T=InertiaMatrix.model_construct(**inertia),
+        )
     return described
 
 
-def _drum_axis(setup: Setup) -> dict[str, Any]:
+def _drum_joint(setup: Setup) -> DrumJoint:
     joint = setup.machine.plant.GetJointByName(setup.parameters.drive.joint)
     X_TF = drawn_pose(setup.machine.plant, joint.frame_on_parent())
-    axis = X_TF.rotation() @ joint.revolute_axis()
     _, start_angle = drum_motion(setup.parameters.profile, np.zeros(1))
-    return {
-        "axis_T": list(map(float, axis)),
-        "through_T": list(map(float, X_TF.translation())),
-        "start_angle": float(start_angle[0]),
-    }
+    return DrumJoint(
+        name=setup.parameters.drive.joint,
+        axis_T=(X_TF.rotation() @ joint.revolute_axis()).tolist(),
+        through_T=X_TF.translation().tolist(),
+        start_angle=float(start_angle[0]),
+    )
 
 
-def _drum_bearing(setup: Setup) -> dict[str, Any] | None:
-    """Return the position and the six components of a compliant bearing; None for a rigid bearing.
+def _drum_bearing(setup: Setup) -> DrumBearing | None:
+    """Return a compliant bearing; None for a rigid one.
 
-    The components are along x, y and z of a frame whose y axis is the drum axis.
+    Its components are along x, y and z of a frame whose y axis is the drum axis.
     """
     placed, bearing = setup.bearing, setup.parameters.imperfections.bearing
     if placed is None or bearing is None:
         return None
-    kind = bearing.as_bushing().model_dump(include=set(_BEARING_NUMBERS))
+    numbers = dict(bearing.as_bushing())
     sag = setup.carrier_rest[3:] - setup.rest_pose[3:]
-    rate = {"fastest_motion_hz": fastest_motions(setup)[BEARING_WORDS].rate / (2.0 * np.pi)}
-    return {
-        "point_T": placed.ground_side_point.tolist(),
-        "rotation_T": placed.ground_side_rotation.tolist(),
-        **kind,
-        "sag_of_Do_at_rest_W": sag.tolist(),
-        **rate,
-    }
-
-
-def _motor(setup: Setup) -> dict[str, Any] | None:
-    """Return the motor; None if the speed of the drum is prescribed."""
-    drive = setup.motor
-    if drive is None:
-        return None
-    return {
-        "belt_ratio": drive.belt_ratio,
-        "rotor_inertia_kgm2": drive.rotor_inertia,
-        "reflected_inertia_kgm2": drive.reflected_inertia,
-        "torque_limit": drive.torque_limit.model_dump(),
-        "controller": drive.controller.model_dump(),
-        "bearing_friction": drive.bearing_friction.model_dump(),
-        "torque_constant_NmA": drive.torque_constant,
-    }
-
-
-def _line(setup: Setup, element: Any) -> dict[str, Any]:
-    """Return ends, length and direction of a strut at the rest pose.
-
-    The direction points from the housing end to the tub end.
-    """
-    rotation = np.reshape(generic(rotation_from_rpy)(*setup.rest_pose[:3]), (3, 3))
-    line = setup.rest_pose[3:] + rotation @ element.p_ToA_T - element.p_WH
-    length = float(np.linalg.norm(line))
-    return {
-        "tub_point_T": element.p_ToA_T.tolist(),
-        "housing_point_W": element.p_WH.tolist(),
-        "length_at_rest": length,
-        "direction_at_rest_W": (line / length).tolist(),
-    }
-
-
-def _spring(setup: Setup, name: str) -> dict[str, Any]:
-    placed = setup.springs[name]
-    kind = setup.parameters.spring_types[setup.parameters.springs[name].type]
-    return {
-        **_line(setup, placed),
-        "action": kind.action,
-        "stiffness": _stiffness(kind.stiffness),
-        "length_at_preload": placed.rest_length,
-        "preload": placed.preload,
-        "tension_at_rest": tensions_at(setup.elements, setup.rest_pose)[name],
-        "taut_from": None if placed.pushes else placed.taut_from,
-        "free_length": placed.free_length,
-    }
-
-
-def _damper(setup: Setup, name: str) -> dict[str, Any]:
-    kind = setup.parameters.damper_types[setup.parameters.dampers[name].type]
-    placed = setup.dampers[name]
-    line = placed.p_ToA_T - placed.p_WH
-    neutral = (line / np.linalg.norm(line)).tolist()
-    return {**_line(setup, placed), "neutral_direction": neutral, **kind.model_dump()}
-
-
-def _bushing(setup: Setup, name: str) -> dict[str, Any]:
-    placed = setup.bushings[name]
-    element = setup.parameters.all_bushings()[name]
-    constants = {
-        key: _stiffness(value) if isinstance(value, ForceTable | TorqueTable) else value
-        for key, value in element
-        if key in BushingType.model_fields
-    }
-    rubber = {key: value for key, value in element if key in RubberBranches.model_fields and value}
-    if rubber:
-        constants["rubber"] = rubber
-    return {
-        "tub_point_T": placed.tub_side_point.tolist(),
-        "tub_rotation_T": placed.tub_side_rotation.tolist(),
-        "housing_point_W": placed.ground_side_point.tolist(),
-        "housing_rotation_W": placed.ground_side_rotation.tolist(),
-        **constants,
-    }
-
-
-def _telescope(setup: Setup, name: str) -> dict[str, Any]:
-    placed, damper = setup.telescopes[name], setup.parameters.telescopic_dampers[name]
-    kind = setup.parameters.damper_types[damper.type]
-    tubes = [body.name() for body in tubes_of(setup.machine.plant, damper.joint)]
-    rest = setup.tube_rest[list(setup.telescopes).index(name)]
-    return {
-        "outer_tube": tubes[0],
-        "inner_tube": tubes[1],
-        "axis_outer_tube": placed.axis.tolist(),
-        "tub_point_T": placed.tub_bushing.tub_side_point.tolist(),
-        "outer_point_outer_tube": placed.tub_bushing.ground_side_point.tolist(),
-        "inner_point_outer_tube": placed.housing_bushing.tub_side_point.tolist(),
-        "housing_point_W": placed.housing_bushing.ground_side_point.tolist(),
-        "tub_bushing": setup.parameters.bushing_types[damper.tub_bushing].model_dump(),
-        "housing_bushing": setup.parameters.bushing_types[damper.housing_bushing].model_dump(),
-        "tub_bushing_on_tub_rotation_T": placed.tub_bushing.tub_side_rotation.tolist(),
-        "tub_bushing_law_rotation_outer_tube": placed.tub_bushing.ground_side_rotation.tolist(),
-        "housing_bushing_on_inner_tube_rotation_outer_tube": (
-            placed.housing_bushing.tub_side_rotation.tolist()
-        ),
-        "housing_bushing_law_rotation_W": placed.housing_bushing.ground_side_rotation.tolist(),
-        "outer_tube_rest_pose": _pose(rest[:6]),
-        "extension_at_rest": float(rest[6]),
-        **kind.model_dump(exclude={"end_bushing"}),
-    }
-
-
-def _stiffness(value: Any) -> Any:
-    return value.model_dump() if isinstance(value, ForceTable | TorqueTable) else value
+    return DrumBearing(
+        point_T=placed.ground_side_point.tolist(),
+        rotation_T=placed.ground_side_rotation.tolist(),
+        **{key: numbers[key] for key in BEARING_KEYS},
+        sag_of_Do_at_rest_W=sag.tolist(),
+        fastest_motion_hz=fastest_motions(setup)[BEARING_WORDS].rate / (2.0 * np.pi),
+    )
 
 
 def as_text(description: dict[str, Any]) -> str:
@@ -414,49 +465,3 @@ def _short(value: Any) -> str:
     if isinstance(value, dict):
         return "{" + ", ".join(f"{key}: {_short(item)}" for key, item in value.items()) + "}"
     return f"{value:.6g}" if isinstance(value, float) else str(value)
-
-
-@dataclass(frozen=True)
-class Modes:
-    """Natural modes in rising order of frequency.
-
-    Attributes:
-        frequency_hz: (n,) natural frequencies |lambda| / (2 pi). [Hz]
-        damping_ratio: (n,) -Re(lambda) / |lambda|.
-        shape: (n, 6) mode shapes: roll, pitch, yaw, x, y, z of T. Each is the real part at the
-            phase of its largest component, scaled so that this component is 1 after angles are
-            multiplied by 0.25 m. [rad, m]
-    """
-
-    frequency_hz: FloatArray
-    damping_ratio: FloatArray
-    shape: FloatArray
-
-
-def natural_modes(
-    machine: AnyMachine, parameters: MachineParameters | None = None, *, gasket: bool = True
-) -> Modes:
-    """Compute the natural modes of the empty machine about its rest pose, without friction.
-
-    The drum stands still. Dampers lose their law and their friction, because friction at rest is
-    neither a spring nor a dashpot; `wm_drake.studies.modes.study.modes` treats it. Their bushings
-    and tubes stay. Overdamped motions are not included. Of
-    the others, only the six slowest are included; damper tubes on their bushings and a drum in a
-    compliant bearing have faster ones.
-
-    Args:
-        machine: A built machine, its parameters, or its name or file.
-        parameters: Parameters to use; those of the built machine if None.
-        gasket: False removes the gasket.
-
-    Example:
-        >>> import wm_drake as wm
-        >>> modes = wm.natural_modes(wm.build_machine(wm.load_machine("reference")))
-        >>> len(modes.frequency_hz)
-        6
-    """
-    machine = machine_of(machine)
-    setup = machine.set_up(parameters=parameters, gasket=gasket, dampers=False)
-    spectrum = Linearisation(setup).spectrum().first(MODES)
-    shapes = [shape_of(vector).real for vector in spectrum.right.T]
-    return Modes(spectrum.frequency_hz, spectrum.damping_ratio, np.array(shapes))

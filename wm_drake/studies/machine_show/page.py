@@ -1,22 +1,32 @@
 """Page of a machine: its parts in space at rest, natural frequencies, tensions, warnings."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from wm_drake.model.machine import Machine
 from wm_drake.model.scene import Outline, Scene
+from wm_drake.parameters.elements import CurveTable
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
-from wm_drake.report.formatting import listed, number, shape_name, significant
-from wm_drake.report.page import Section, SectionedPage, as_json, fragment
-from wm_drake.report.table import Column, Table, line
-from wm_drake.studies.machine_show.description import describe
+from wm_drake.report.formatting import listed, shape_name
+from wm_drake.report.labelled import LabelledTable
+from wm_drake.report.page import as_json, fragment
+from wm_drake.report.quantity import SPEED, Quantity
+from wm_drake.studies.answer import Answer, Part
+from wm_drake.studies.machine_show.description import Description, description_of
+from wm_drake.studies.machine_show.elements import Spring, Strut, TelescopicDamper
+from wm_drake.studies.modes.quantities import FREQUENCY
 
-MM, STIFFNESS, DEG = Unit("m", "mm"), Unit("N/m", "N/mm"), Unit("rad", "deg")
+MASS = Quantity("mass", Unit("kg", "kg"))
+LENGTH = Quantity("length", Unit("m", "mm"), 1)
+ANGLE = Quantity("angle", Unit("rad", "deg"), 2)
+TENSION = Quantity("tension", Unit("N", "N"), 1)
+STIFFNESS = Quantity("stiffness", Unit("N/m", "N/mm"))
 
 KINDS = {
     "housing": "housing",
@@ -37,141 +47,152 @@ VIEWS = (("oblique", -0.55, 0.3), ("from the door", 0, 0), ("from the right", -1
 ROUND = 36
 """Points of a drawn circle."""
 
-MARK_M = 0.008
+MARK_ARM = 0.008
 """Half length of the arms of a drawn point. [m]"""
 
 Thing = dict[str, Any]
 """What is drawn: kind, name, words for the pointer, lines of points in W [m], label."""
 
 
-def machine_page(machine: Machine, warnings: Sequence[str]) -> str:
-    """Return the page of a machine as text of one self-contained file.
+def machine_answer(machine: Machine, warnings: Sequence[str]) -> Answer:
+    """Return what is shown of a machine that has been checked.
 
     Args:
         warnings: What is allowed but unusual.
     """
-    shown = describe(machine)
-    things = [*_things(Scene(machine.parameters), shown)]
+    parameters, shown = machine.parameters, description_of(machine)
+    things = [*_things(Scene(parameters), shown)]
+    valid = f"Machine '{parameters.name}' is valid"
+    return Answer(
+        f"Machine {parameters.name}",
+        f"{valid}; {len(warnings)} unusual values are named above." if warnings else f"{valid}.",
+        parameters,
+        (
+            Part("The machine at rest", body=lambda: _view(things)),
+            Part("Springs and dampers at rest", (_mounts(shown),)),
+            Part("Bodies", (_bodies(shown),)),
+        ),
+        (("SDF model", Path(parameters.model).name),),
+        warned=tuple(warnings),
+        short=Part("In short", facts=_facts(shown)),
+        script=Path(__file__).with_name("view.js"),
+    )
+
+
+def _view(things: Sequence[Thing]) -> str:
+    """Return the picture of the machine that a reader turns, as HTML."""
     names = ", ".join(thing["name"] for thing in things if thing["kind"] != "housing")
-    view = fragment(
+    return fragment(
         Path(__file__).with_name("view.html"),
         things=as_json(things),
         views=VIEWS,
         kinds=[(k, w) for k, w in KINDS.items() if any(t["kind"] == k for t in things)],
         alternative=f"The machine at rest with its parts: {names}.",
     )
-    valid = f"Machine '{machine.parameters.name}' is valid"
-    return SectionedPage(
-        f"Machine {machine.parameters.name}",
-        f"{valid}; {len(warnings)} unusual values are named above." if warnings else f"{valid}.",
-        [
-            Section("machine", "The machine at rest", body=view),
-            Section("springs", "Springs and dampers at rest", tables=(_mounts(shown),)),
-            Section("bodies", "Bodies", tables=(_bodies(shown),)),
-        ],
-        [("SDF model", Path(machine.parameters.model).name)],
-        machine.parameters,
-        warnings,
-        advice=Section("", "In short", facts=_facts(machine, shown)),
-        script=Path(__file__).with_name("view.js"),
-    ).html()
 
 
-def _facts(machine: Machine, shown: Mapping[str, Any]) -> list[tuple[str, str]]:
+def _facts(shown: Description) -> list[tuple[str, str]]:
     """Return mass, rest pose and natural frequencies in words."""
-    pose = shown["rest_pose"]
-    angles = [f"{name} {number(DEG.from_si(pose[name]), 2)}°" for name in ("roll", "pitch", "yaw")]
-    places = [f"{name} {number(MM.from_si(pose[name]), 1)} mm" for name in "xyz"]
-    frequencies = [f"{number(hz, 2)}" for hz in shown["natural_frequencies_hz"]]
-    critical = [f"{number(60.0 * hz, 0)}" for hz in shown["natural_frequencies_hz"]]
-    slack = [n for n, s in shown["springs"].items() if s["tension_at_rest"] <= 0.0]
+    pose, frequencies = shown.rest_pose, np.array(shown.natural_frequencies_hz)
+    angles = [f"{name} {ANGLE.text(getattr(pose, name))}" for name in ("roll", "pitch", "yaw")]
+    places = [f"{name} {LENGTH.text(getattr(pose, name))}" for name in "xyz"]
+    critical = map(SPEED.number, 2.0 * np.pi * frequencies)
+    slack = [name for name, spring in shown.springs.items() if spring.tension_at_rest <= 0.0]
     return [
-        ("Oscillating mass", f"{significant(shown['oscillating_mass_kg'])} kg"),
-        ("Rest pose", f"{', '.join(angles)}, {', '.join(places)} from the pose as drawn"),
-        ("Natural frequencies", f"{', '.join(frequencies)} Hz"),
-        ("Resonance speeds", f"{', '.join(critical)} rpm, where the unbalance turns as fast"),
+        ("Oscillating mass", MASS.text(shown.oscillating_mass_kg)),
+        ("Rest pose", f"{', '.join([*angles, *places])} from the pose as drawn"),
+        (
+            "Natural frequencies",
+            f"{', '.join(map(FREQUENCY.number, frequencies))} {FREQUENCY.unit_text}",
+        ),
+        (
+            "Resonance speeds",
+            f"{', '.join(critical)} {SPEED.unit_text}, where the unbalance turns as fast",
+        ),
         ("Slack springs", listed(slack) if slack else "none"),
-        ("Loads", ", ".join(machine.parameters.loads)),
+        ("Loads", ", ".join(shown.loads)),
     ]
 
 
-def _mounts(shown: Mapping[str, Any]) -> Table:
+def _mounts(shown: Description) -> LabelledTable:
     """Return stiffness or law, tension and length of springs and dampers."""
-    springs = (
-        line(
-            f"spring {name}",
-            (
-                f"{significant(STIFFNESS.from_si(spring['stiffness']))} N/mm",
-                spring["tension_at_rest"],
-                MM.from_si(spring["length_at_rest"]),
-            ),
-        )
-        for name, spring in shown["springs"].items()
+    springs, dampers = shown.springs, shown.dampers
+    names = [*(f"spring {name}" for name in springs), *(f"damper {name}" for name in dampers)]
+    struts: list[Strut] = [*springs.values(), *dampers.values()]
+    laws = [*map(_stiffness, springs.values()), *(damper.law for damper in dampers.values())]
+    tensions = [spring.tension_at_rest for spring in springs.values()] + [np.nan] * len(dampers)
+    data = xr.Dataset(
+        {
+            "stiffness_or_law": ("part", laws),
+            "tension": TENSION.variable("part", tensions),
+            "length": LENGTH.variable("part", [strut.length_at_rest for strut in struts]),
+        },
+        {"part": names},
     )
-    dampers = (
-        line(f"damper {name}", (of["law"], np.nan, MM.from_si(of["length_at_rest"])))
-        for name, of in shown["dampers"].items()
-    )
-    columns = ("part", "stiffness or law", Column("tension", "N", 1), Column("length", "mm", 1))
-    return Table("Springs and dampers at rest.", columns, (*springs, *dampers), text_columns=2)
+    title = "Springs and dampers at rest"
+    return LabelledTable("mounts", data, title, f"{title}.")
 
 
-def _bodies(shown: Mapping[str, Any]) -> Table:
+def _stiffness(spring: Spring) -> str:
+    """Return the stiffness of a spring in words; that of a table is its slope about the drawing."""
+    of = spring.stiffness
+    return STIFFNESS.text(of.nominal_stiffness if isinstance(of, CurveTable) else of)
+
+
+def _bodies(shown: Description) -> LabelledTable:
     """Return mass and centre of mass of the bodies."""
-    groups = tuple(
-        line(
-            shape_name(name),
-            (body["turns_with"], body["mass"], *map(MM.from_si, body["centre_of_mass_T"])),
-        )
-        for name, body in shown["bodies"].items()
-        if "centre_of_mass_T" in body
+    bodies = shown.bodies.values()
+    centres = [body.centre_of_mass_T for body in bodies]
+    data = xr.Dataset(
+        {
+            "moves_with": ("body", [body.turns_with for body in bodies]),
+            "mass": MASS.variable("body", [body.mass for body in bodies]),
+            "centre_of_mass": LENGTH.variable(("body", "axis"), centres),
+        },
+        {"body": [*map(shape_name, shown.bodies)], "axis": list("xyz")},
     )
-    numbers = (Column("mass", "kg"), *(Column(axis, "mm", 1) for axis in "xyz"))
-    caption = "Mass and centre of mass of each body, in the frame of the tub."
-    return Table(caption, ("body", "moves with", *numbers), groups, text_columns=2)
+    return LabelledTable(
+        "bodies",
+        data,
+        "Bodies",
+        "Mass and centre of mass of each body, in the frame of the tub.",
+        across="axis",
+    )
 
 
-def _things(scene: Scene, shown: Mapping[str, Any]) -> Iterator[Thing]:
+def _things(scene: Scene, shown: Description) -> Iterator[Thing]:
     """Yield all that is drawn: shapes, elements, sensors, centres of mass, axes."""
-    pose = shown["rest_pose"]
-    angles, place = [[pose[k] for k in keys] for keys in (("roll", "pitch", "yaw"), "xyz")]
-    tub = RigidTransform(RollPitchYaw(angles), place)
-    fixed = RigidTransform()
+    pose = shown.rest_pose
+    angles = RollPitchYaw(pose.roll, pose.pitch, pose.yaw)
+    tub, fixed = RigidTransform(angles, [pose.x, pose.y, pose.z]), RigidTransform()
     for name, outline in scene.outlines("housing").items():
         yield _thing("housing", name, shape_name(name), _edges(outline, fixed))
     for name, outline in scene.tub_outlines().items():
         kind = "drum" if name.startswith("drum") else "tub"
         yield _thing(kind, name, shape_name(name), _edges(outline, tub))
     yield from _elements(shown, tub)
-    for name, sensor in shown["sensors"].items():
-        words = f"sensor {name}, along {sensor['axis_W']}"
-        yield {**_thing("sensor", name, words, _mark(tub @ _vector(sensor["point_T"]))),
+    for name, sensor in shown.sensors.items():
+        words = f"sensor {name}, along {sensor.axis_W}"
+        yield {**_thing("sensor", name, words, _mark(tub @ np.array(sensor.point_T))),
                "label": name}  # fmt: skip
-    for name, body in shown["bodies"].items():
-        if "centre_of_mass_T" in body:
-            words = f"centre of mass of {shape_name(name)}, {significant(body['mass'])} kg"
-            lines = _mark(tub @ _vector(body["centre_of_mass_T"]))
-            yield _thing("centre", name, words, lines)
+    for name, body in shown.bodies.items():
+        words = f"centre of mass of {shape_name(name)}, {MASS.text(body.mass)}"
+        yield _thing("centre", name, words, _mark(tub @ np.array(body.centre_of_mass_T)))
     for axis, end in zip("xyz", 0.12 * np.eye(3), strict=True):
         words = f"axis {axis} of the housing"
         yield {**_thing("axis", axis, words, [[[0.0, 0.0, 0.0], end.tolist()]]), "label": axis}
 
 
-def _elements(shown: Mapping[str, Any], tub: RigidTransform) -> Iterator[Thing]:
+def _elements(shown: Description, tub: RigidTransform) -> Iterator[Thing]:
     """Yield springs, dampers, bushings and telescopic dampers."""
-    for name, spring in shown["springs"].items():
-        words = (
-            f"spring {name}: {significant(STIFFNESS.from_si(spring['stiffness']))} N/mm, tension "
-            f"at rest {number(spring['tension_at_rest'])} N"
-        )
+    for name, spring in shown.springs.items():
+        tension = TENSION.text(spring.tension_at_rest)
+        words = f"spring {name}: {_stiffness(spring)}, tension at rest {tension}"
         yield _thing("spring", name, words, [_between(spring, tub)])
-    for table in ("dampers", "telescopic_dampers"):
-        for name, damper in shown[table].items():
-            if "tub_point_T" in damper:
-                law = f": {damper['law']}" if "law" in damper else ""
-                yield _thing("damper", name, f"damper {name}{law}", [_between(damper, tub)])
-    for name, bushing in shown["bushings"].items():
-        lines = _mark(tub @ _vector(bushing["tub_point_T"]), 3.0 * MARK_M)
+    for name, damper in (*shown.dampers.items(), *shown.telescopic_dampers.items()):
+        yield _thing("damper", name, f"damper {name}: {damper.law}", [_between(damper, tub)])
+    for name, bushing in shown.bushings.items():
+        lines = _mark(tub @ np.array(bushing.tub_point_T), 3.0 * MARK_ARM)
         words = name if name == "gasket" else f"bushing {name}"
         yield _thing("gasket", name, words, lines)
 
@@ -180,17 +201,13 @@ def _thing(kind: str, name: str, words: str, lines: Sequence[Sequence[Sequence[f
     return {"kind": kind, "name": name, "words": words, "lines": lines}
 
 
-def _vector(values: Sequence[float]) -> FloatArray:
-    return np.asarray(values, dtype=float)
-
-
-def _between(element: Mapping[str, Any], tub: RigidTransform) -> list[list[float]]:
+def _between(element: Strut | TelescopicDamper, tub: RigidTransform) -> list[list[float]]:
     """Return the line of an element from the tub at rest to the housing."""
-    end = tub @ _vector(element["tub_point_T"])
-    return [end.tolist(), list(element["housing_point_W"])]
+    end = tub @ np.array(element.tub_point_T)
+    return [end.tolist(), list(element.housing_point_W)]
 
 
-def _mark(place: FloatArray, arm: float = MARK_M) -> list[list[list[float]]]:
+def _mark(place: FloatArray, arm: float = MARK_ARM) -> list[list[list[float]]]:
     """Return a cross of three lines about a point."""
     return [[(place - end).tolist(), (place + end).tolist()] for end in arm * np.eye(3)]
 

@@ -40,9 +40,8 @@ LARGEST_AMPLITUDE = 0.1
 AMPLITUDES = np.geomspace(1e-5, 2e-2, 34)
 """Amplitudes of the curves over the amplitude. [m]"""
 
-SPEEDS_RPM = (0.0, 1.5, 61)
-"""Speeds of the Campbell diagram: the first [rpm], the last over the fastest of the spin profile,
-and their number."""
+LAST_SPEED, SPEEDS = 1.5, 61
+"""Campbell diagram: its last speed over the fastest of the spin profile; number of its speeds."""
 
 ORDERS = (1.0, 2.0)
 """Orders of the drum's speed in the Campbell diagram."""
@@ -218,8 +217,7 @@ def _diagrams(
     linear: Mapping[str, Linearisation], spectra: Mapping[str, Spectrum], highest: float
 ) -> dict[str, Campbell]:
     """Return the Campbell diagrams up to beyond the highest speed of the profile. [rad/s]"""
-    first, last = SPEEDS_RPM[0] * np.pi / 30.0, SPEEDS_RPM[1] * highest
-    speeds = np.linspace(first, last, int(SPEEDS_RPM[2]))
+    speeds = np.linspace(0.0, LAST_SPEED * highest, SPEEDS)
     return {
         name: campbell(one.spectrum, speeds, len(spectra[name].values))
         for name, one in linear.items()

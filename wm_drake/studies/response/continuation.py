@@ -13,6 +13,7 @@ import numpy as np
 
 from wm_drake.errors import input_error
 from wm_drake.parameters.types import FloatArray
+from wm_drake.report.quantity import SPEED
 from wm_drake.studies.response.balance import HarmonicBalance
 from wm_drake.studies.response.condensed import Corrections
 
@@ -103,8 +104,8 @@ def first_motion(
         if solved is not None:
             return solved
     raise input_error(
-        f"no periodic motion was found at {speed * 30.0 / np.pi:.4g} rpm; choose another first "
-        "speed, or more harmonics",
+        f"no periodic motion was found at {SPEED.unit.from_si(speed):.4g} {SPEED.unit.label}; "
+        "choose another first speed, or more harmonics",
         key="speeds",
     )
 

@@ -1,6 +1,6 @@
 """Figures of the steady unbalance response."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,10 +9,11 @@ import xarray as xr
 from wm_drake.model.scene import Outline
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report import figure as fig
-from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number
+from wm_drake.report.quantity import SPEED, quantity_of, shown
 from wm_drake.simulation.outputs import point_positions
 from wm_drake.studies.modes.figures import VIEWS, joined, tub_lines, view_axis, view_panel
-from wm_drake.studies.response.study import ResponseCase, ResponseStudy
+from wm_drake.studies.response.quantities import AMPLITUDE, FORCE, HEIGHT, RATE, SHIFT
+from wm_drake.studies.response.study import GASKET, largest_of, peaks_of, run_amplitude
 
 COLUMNS = 3
 """Number of panels in a row."""
@@ -21,160 +22,158 @@ SHOWN_MOTION = 0.2
 """Largest displacement of a drawn deflection shape, as part of the tub's radius."""
 
 
-def response_figure(cases: list[ResponseCase]) -> fig.Figure:
+def response_figure(cases: Sequence[xr.Dataset]) -> fig.Figure:
     """Return the amplitudes of a load at the sensors over the speed, with the run-up beside them.
 
     Args:
         cases: The same load with and without gasket, or one of them.
     """
-    x = fig.Axis(label="drum speed, rpm")
-    y = fig.Axis(label="amplitude, mm", range=(0.0, _shown_amplitude(cases)))
+    x = fig.Axis(label=SPEED.label)
+    y = fig.Axis(label=AMPLITUDE.label, range=(0.0, _shown_amplitude(cases)))
     panels = []
-    for sensor in map(str, cases[0].response.sensor.values):
+    for sensor in cases[0].sensor.values.tolist():
         marks: list[fig.Mark] = []
         for case in cases:
-            color = fig.OURS if case.gasket else fig.MEASURED
-            marks += _run_up(case, sensor, color)
-            amplitude = MM_PER_M * case.response.amplitude.sel(sensor=sensor).values
-            marks += _branch(case, amplitude, color)
+            color = fig.OURS if case.gasket == GASKET[True] else fig.MEASURED
+            marks += _run_up(case, sensor, color) + _branch(case, sensor, color)
         panels.append(fig.Panel(title=sensor, marks=tuple(marks), x=x, y=y))
     return fig.Figure(panels=fig.in_grid(panels, COLUMNS, share="both"), height=160.0)
 
 
-def _shown_amplitude(cases: list[ResponseCase]) -> float | None:
-    """Return the upper end of the amplitudes: above what is reached, steady or in the run. [mm]
+def _shown_amplitude(cases: Sequence[xr.Dataset]) -> float | None:
+    """Return the upper end of the amplitudes: above what is reached, steady or in the run.
 
     Unstable motions may be much larger.
     """
-    sizes = [case.largest()[0] for case in cases]
-    sizes += [_run_up_size(case.run_up) for case in cases if case.run_up is not None]
-    largest = max(float(np.nanmax(size, initial=0.0)) for size in sizes)
-    return 1.25 * MM_PER_M * largest or None
+    peaks = map(peaks_of, cases)
+    sizes = [(peak.amplitude.values, peak.run_amplitude.values) for peak in peaks]
+    return 1.25 * float(AMPLITUDE.values(np.nanmax(sizes, initial=0.0))) or None
 
 
-def _branch(case: ResponseCase, values: FloatArray, color: str) -> list[fig.Mark]:
-    """Return a quantity along the branch: lines where it is stable, dots where it is not.
+def _branch(case: xr.Dataset, sensor: str, color: str) -> list[fig.Mark]:
+    """Return the amplitude along the branch: lines where it is stable, dots where it is not.
 
     The line is pale where the tub touches the housing.
     """
-    rpm = RPM_PER_RAD_S * case.response.speed.values
-    key = f"steady, {'with' if case.gasket else 'without'} gasket"
-    line = fig.Line(rpm, values, color=color)
+    values, stable = shown(case.amplitude.sel(sensor=sensor)), case.stable.values
+    line = fig.Line(shown(case.speed), values, color=color)
+    steady = f"steady, {words_of_gasket(case)}"
     kinds = (
-        (case.reachable, replace(line, width=2.4, key=key)),
-        (case.stable & case.touches, replace(line, width=2.4, opacity=0.35, key="in contact")),
-        (~case.stable, replace(line, width=2.0, dash="dotted", key="unstable")),
+        (case.reachable.values, replace(line, width=2.4, key=steady)),
+        (
+            stable & ~case.reachable.values,
+            replace(line, width=2.4, opacity=0.35, key="in contact"),
+        ),
+        (~stable, replace(line, width=2.0, dash="dotted", key="unstable")),
     )
     marks: list[fig.Mark] = []
     for index, (of_kind, style) in enumerate(kinds):
-        shown = of_kind.copy()
+        drawn = of_kind.copy()
         if index:  # reach to the points beside it, which are of another kind
-            shown[:-1] |= of_kind[1:]
-            shown[1:] |= of_kind[:-1]
+            drawn[:-1] |= of_kind[1:]
+            drawn[1:] |= of_kind[:-1]
         if of_kind.any():
-            marks.append(replace(style, y=np.where(shown, values, np.nan)))
+            marks.append(replace(style, y=np.where(drawn, values, np.nan)))
     return marks
 
 
-def _run_up(case: ResponseCase, sensor: str, color: str) -> list[fig.Mark]:
-    if case.run_up is None:
+def _run_up(case: xr.Dataset, sensor: str, color: str) -> list[fig.Mark]:
+    if "time" not in case.sizes:
         return []
-    run = case.run_up.sel(sensor=sensor)
-    size = _run_up_size(run)
-    rising = np.append(np.diff(run.speed.values) > 0.0, False)
-    rpm = RPM_PER_RAD_S * run.speed.values[rising][::5]
-    line = fig.Line(rpm, MM_PER_M * size[rising][::5], color=color, opacity=0.45, dash="long")
+    run = case.sel(sensor=sensor)
+    rising = np.append(np.diff(run.run_speed.values) > 0.0, False)
+    at, size = shown(run.run_speed)[rising][::5], AMPLITUDE.values(run_amplitude(run))[rising][::5]
+    line = fig.Line(at, size, color=color, opacity=0.45, dash="long")
     return [replace(line, key="spin profile of the machine")]
 
 
-def _run_up_size(run_up: xr.Dataset) -> FloatArray:
-    """Return the larger one of both envelopes. [m]"""
-    return np.maximum(np.abs(run_up.upper.values), np.abs(run_up.lower.values))
+def load_of(case: xr.Dataset) -> str:
+    """Return the name of the load of a case; a dataset has a method of this name."""
+    return str(case["load"].item())
 
 
-def forces_figure(cases: list[ResponseCase]) -> fig.Figure:
+def words_of_gasket(case: xr.Dataset) -> str:
+    """Return whether a case has the gasket, in words."""
+    return "with gasket" if case.gasket == GASKET[True] else "without gasket"
+
+
+def forces_figure(cases: Sequence[xr.Dataset]) -> fig.Figure:
     """Return displacement of the box and forces of the gasket over the speed, one line a load."""
-    quantities = (
-        ("detergent_displacement", MM_PER_M, "detergent box, mm"),
-        ("gasket_force", 1.0, "gasket force, N"),
-        ("gasket_moment", 1.0, "gasket moment, N m"),
-    )
     panels = []
-    for name, factor, title in quantities:
-        lines = [(case, factor * case.response[name].values.max(axis=1)) for case in cases]
+    for name in ("detergent_displacement", "gasket_force", "gasket_moment"):
+        title = quantity_of(cases[0][name]).label
+        lines = [(case, shown(case[name].max("axis", keep_attrs=True))) for case in cases]
         panels.append(_force_panel(title, lines, []))
     return fig.Figure(panels=fig.in_grid(panels, COLUMNS, share="x"), height=210.0)
 
 
-def mounts_figure(cases: list[ResponseCase]) -> fig.Figure:
+def mounts_figure(cases: Sequence[xr.Dataset]) -> fig.Figure:
     """Return the force of each mount on the cabinet over the speed, one colour a load.
 
     The peak is a line, the RMS without the mean is dashed.
     """
-    gasket = any(case.gasket for case in cases)
-    mounts = [str(name) for name in cases[0].response.mount.values if gasket or name != "gasket"]
+    has_gasket = any(case.gasket == GASKET[True] for case in cases)
+    mounts = cases[0].mount.values.tolist()
     panels = []
-    for mount in mounts:
-        of_mount = [(case, case.response.sel(mount=mount)) for case in cases]
-        peaks = [(case, force.mount_force_peak.values) for case, force in of_mount]
-        dynamic = [(case, force.mount_force_dynamic_rms.values) for case, force in of_mount]
+    for mount in (name for name in mounts if has_gasket or name != "gasket"):
+        of_mount = [(case, case.sel(mount=mount)) for case in cases]
+        peaks = [(case, shown(force.mount_force_peak)) for case, force in of_mount]
+        dynamic = [(case, shown(force.mount_force_dynamic_rms)) for case, force in of_mount]
         panel = _force_panel(mount, peaks, dynamic)
-        panels.append(replace(panel, y=replace(panel.y, label="force, N")))
+        panels.append(replace(panel, y=replace(panel.y, label=FORCE.label)))
     return fig.Figure(panels=fig.in_grid(panels, COLUMNS, share="x"), height=160.0)
 
 
 def _force_panel(
     title: str,
-    peaks: list[tuple[ResponseCase, FloatArray]],
-    dynamic: list[tuple[ResponseCase, FloatArray]],
+    peaks: list[tuple[xr.Dataset, FloatArray]],
+    dynamic: list[tuple[xr.Dataset, FloatArray]],
 ) -> fig.Panel:
     """Return values over the speed of cases, one colour a load; those of `dynamic` are dashed.
 
     A line has gaps where no steady motion is reachable.
     """
-    colors = colors_of_loads([case.load for case, _ in peaks])
+    colors = colors_of_loads([case for case, _ in peaks])
     marks = []
-    kinds: tuple[tuple[fig.Dash, list[tuple[ResponseCase, FloatArray]]], ...] = (
+    kinds: tuple[tuple[fig.Dash, list[tuple[xr.Dataset, FloatArray]]], ...] = (
         ("", peaks),
         ("dashed", dynamic),
     )
     for dash, lines in kinds:
         for case, values in lines:
-            rpm = RPM_PER_RAD_S * case.response.speed.values
-            shown = np.where(case.reachable, values, np.nan)
-            line = fig.Line(rpm, shown, color=colors[case.load], width=2.0, key=case.load)
+            load, reached = load_of(case), np.where(case.reachable, values, np.nan)
+            line = fig.Line(shown(case.speed), reached, color=colors[load], width=2.0, key=load)
             marks.append(replace(line, dash=dash))
     y = fig.Axis(range=(0.0, None))
-    return fig.Panel(title=title, marks=tuple(marks), x=fig.Axis(label="drum speed, rpm"), y=y)
+    return fig.Panel(title=title, marks=tuple(marks), x=fig.Axis(label=SPEED.label), y=y)
 
 
-def colors_of_loads(loads: list[str]) -> dict[str, str]:
+def colors_of_loads(cases: Sequence[xr.Dataset]) -> dict[str, str]:
     """Return a colour for each load, in order of appearance."""
-    names = dict.fromkeys(loads)
+    names = dict.fromkeys(load_of(case) for case in cases)
     return {name: fig.COLOURS[index % len(fig.COLOURS)] for index, name in enumerate(names)}
 
 
-def peaks_of(case: ResponseCase, most: int = 3) -> list[int]:
+def reachable_peaks(case: xr.Dataset, most: int = 3) -> list[int]:
     """Return the points of the largest reachable peaks, in order of speed."""
-    size = case.response.amplitude.values.max(axis=1)
+    size = case.amplitude.values.max(axis=1)
     inner = np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] >= size[2:])) + 1
-    inner = inner[case.reachable[inner]]
+    inner = inner[case.reachable.values[inner]]
     largest = inner[np.argsort(-size[inner])][:most]
     return sorted(int(index) for index in largest)
 
 
-def deflection_figure(case: ResponseCase, outlines: Mapping[str, Outline]) -> fig.Figure | None:
+def deflection_figure(case: xr.Dataset, outlines: Mapping[str, Outline]) -> fig.Figure | None:
     """Return the operating deflection shapes at the peaks of a load; None without a peak."""
-    points = peaks_of(case)
+    points = reachable_peaks(case)
     if not points:
         return None
     lines = tub_lines(outlines)
     panels = []
     for index in points:
-        row = _deflection(case.response.first_harmonic.values[index], lines)
-        rpm = RPM_PER_RAD_S * float(case.response.speed.values[index])
-        largest = MM_PER_M * float(case.response.amplitude.values[index].max())
-        title = f"{number(rpm, 0)} rpm, {number(largest, 1)} mm"
+        at = case.isel(point=index)
+        row = _deflection(at.first_harmonic.values, lines)
+        title = f"{SPEED.text(at.speed)}, {AMPLITUDE.text(at.amplitude.max())}"
         panels += [replace(row[0], title=title), *row[1:]]
     return fig.Figure(panels=fig.in_grid(panels, len(VIEWS)), height=260.0)
 
@@ -192,14 +191,14 @@ def _deflection(harmonic: FloatArray, lines: list[FloatArray]) -> list[fig.Panel
     poses = np.outer(np.cos(turn), harmonic[:, 0]) + np.outer(np.sin(turn), harmonic[:, 1])
     moved = point_positions(poses, rest) - rest
     scale = SHOWN_MOTION * reach / float(np.abs(moved).max())
-    shown = [joined(pose, lines[:2]) for pose in point_positions(scale * poses, ends)]
+    drawn = [joined(pose, lines[:2]) for pose in point_positions(scale * poses, ends)]
     still = joined(rest, lines)
     panels = []
     for view, across, up in VIEWS:
         marks: list[fig.Mark] = [
             fig.Line(still[:, across], still[:, up], color=fig.QUIET, width=1.0)
         ]
-        for opacity, pose in zip(np.linspace(0.9, 0.25, len(turn)), shown, strict=True):
+        for opacity, pose in zip(np.linspace(0.9, 0.25, len(turn)), drawn, strict=True):
             line = fig.Line(pose[:, across], pose[:, up], opacity=float(opacity))
             marks.append(line)
         label = f"{view}: {'xyz'[up]} over {'xyz'[across]}"
@@ -207,37 +206,34 @@ def _deflection(harmonic: FloatArray, lines: list[FloatArray]) -> list[fig.Panel
     return panels
 
 
-def sweep_figure(study: ResponseStudy) -> fig.Figure:
+def sweep_figure(cases: Sequence[xr.Dataset], sweeps: xr.Dataset) -> fig.Figure:
     """Return how sweeps shift and lower the peak of each load, at its largest sensor."""
-    assert study.sweeps is not None
-    colors = colors_of_loads([case.load for case in study.cases])
-    rate = RPM_PER_RAD_S * study.sweeps.rate.values
+    rate = shown(sweeps.rate)
     shifts: list[fig.Mark] = [fig.Rule(0.0, color=fig.MARK)]
-    heights: list[fig.Mark] = [fig.Rule(100.0, color=fig.MARK)]
+    heights: list[fig.Mark] = [fig.Rule(float(HEIGHT.values(1.0)), color=fig.MARK)]
     directions: tuple[tuple[str, fig.Dash, str], ...] = (
         ("up", "", "triangle-up"),
         ("down", "dashed", "triangle-down"),
     )
-    for load, color in colors.items():
-        case = next(case for case in study.cases if case.load == load)
-        sizes, speeds = case.largest()
-        if np.isnan(sizes).all():
+    for load, color in colors_of_loads(cases).items():
+        case = next(case for case in cases if load_of(case) == load)
+        peaks = largest_of(case)
+        if peaks.amplitude.isnull().all():
             continue
-        at = int(np.argmax(sizes))
-        sensor, speed = str(case.response.sensor.values[at]), RPM_PER_RAD_S * float(speeds[at])
-        chosen = study.sweeps.sel(load=load, gasket=case.gasket, sensor=sensor)
+        peak = peaks.isel(sensor=int(peaks.amplitude.argmax("sensor")))
+        sensor = peak.sensor.item()
+        chosen = sweeps.sel(load=load, gasket=case.gasket.item(), sensor=sensor)
         for direction, dash, symbol in directions:
             one = chosen.sel(direction=direction)
-            shift = RPM_PER_RAD_S * one.speed.values - speed
-            height = 100.0 * one.amplitude.values / sizes[at]
+            shift = SHIFT.values(one.speed.values - peak.speed.item())
+            height = HEIGHT.values(one.amplitude.values / peak.amplitude.item())
             for marks, y in ((shifts, shift), (heights, height)):
                 line = fig.Line(rate, y, color=color, dash=dash, symbol=symbol)
                 marks.append(replace(line, key=f"{load}, {sensor}, {direction}"))
     ticks = fig.named((f"{value:g}" for value in np.round(rate, 3)), rate)
-    x = fig.Axis(label="sweep rate, rpm/s", is_log=True, ticks=ticks)
-    titles = ("speed of the peak less that of the steady peak, rpm", "peak in % of the steady peak")
+    x = fig.Axis(label=RATE.label, is_log=True, ticks=ticks)
     panels = [
         fig.Panel(subtitle=title, name=title, marks=tuple(marks), x=x)
-        for title, marks in zip(titles, (shifts, heights), strict=True)
+        for title, marks in ((SHIFT.label, shifts), (HEIGHT.label, heights))
     ]
     return fig.Figure(panels=fig.in_grid(panels, 2), height=300.0)

@@ -16,35 +16,17 @@ from wm_drake.model.machine import Setup
 from wm_drake.model.scene import Scene
 from wm_drake.parameters import Load, SpinProfile
 from wm_drake.parameters.types import FloatArray
+from wm_drake.report.quantity import SPEED
 from wm_drake.simulation.mounts import KINDS, force_measures, mount_names
 from wm_drake.simulation.outputs import variables_of
 from wm_drake.studies.response.balance import HARMONICS, SAMPLES, HarmonicBalance
 from wm_drake.studies.response.continuation import BranchPoint, first_motion, follow
+from wm_drake.studies.response.quantities import OF_BRANCH
 from wm_drake.studies.response.series import Series
 from wm_drake.studies.threads import on_one_thread
 
 MOST_HARMONICS, MOST_SAMPLES = 40, 1024
 """Largest number of harmonics, and of samples of a period."""
-
-DECLARED = {
-    "amplitude": ("sensor", "m", "largest deviation from the mean of a revolution"),
-    "detergent_displacement": ("axis", "m", "largest displacement nearest the detergent box"),
-    "gasket_force": ("axis", "N", "largest force of the gasket on the housing"),
-    "gasket_moment": ("axis", "N m", "largest moment of the gasket on the housing"),
-    "spring_tension": ("spring", "N", "half the range of the tension in a revolution"),
-    "damper_tension": ("damper", "N", "half the range of the tension in a revolution"),
-    "mount_force_peak": ("mount", "N", "largest size of the force on the cabinet in a revolution"),
-    "mount_force_rms": ("mount", "N", "RMS of the force on the cabinet in a revolution"),
-    "mount_force_dynamic_rms": (
-        "mount",
-        "N",
-        "RMS without the mean of the force on the cabinet in a revolution",
-    ),
-    "smallest_gap": ("", "m", "smallest gap between tub and housing in a revolution"),
-    "first_harmonic": ("coordinate part", "rad, m", "first harmonic of the pose of the tub"),
-    "damper_spin": ("spinning", "rad/s", "mean rate of a damper about its axis"),
-}
-"""Dimensions along the branch, unit and words of the variables of a response."""
 
 
 def steady_response(
@@ -197,21 +179,22 @@ def _measured(setup: Setup, balance: HarmonicBalance, points: list[BranchPoint])
         "damper_tension": 0.5 * np.ptp(by_point("damper_tension"), axis=1),
         **{f"mount_force_{kind}": np.stack(of) for kind, of in zip(KINDS, of_mounts, strict=True)},
         "smallest_gap": _smallest_gaps(setup, motions, len(points)),
-        "first_harmonic": np.stack([point.coefficients[1:3, :6].T for point in points]),
         "damper_spin": np.stack([point.spins for point in points]),
+        "multiplier": [point.multiplier for point in points],
     }
+    harmonic = np.stack([point.coefficients[1:3, :6].T for point in points])
     return xr.Dataset(
         {
             **{
-                name: (("point", *dims.split()), values[name], {"units": unit, "long_name": words})
-                for name, (dims, unit, words) in DECLARED.items()
+                name: quantity.variable(("point", *dim.split()), values[name])
+                for name, (dim, quantity) in OF_BRANCH.items()
             },
+            "first_harmonic": (("point", "coordinate", "part"), harmonic, {"units": "rad, m"}),
             "stable": ("point", [point.stable for point in points]),
-            "multiplier": ("point", [point.multiplier for point in points]),
             "on_grid": ("point", [point.on_grid for point in points]),
         },
         {
-            "speed": ("point", [point.speed for point in points], {"units": "rad/s"}),
+            "speed": SPEED.variable("point", [point.speed for point in points]),
             "sensor": list(setup.sensors),
             "axis": list(AXES),
             "spring": list(setup.springs),

@@ -1,7 +1,6 @@
 """Study of the steady response: all loads, with and without gasket, and the influence of sweep."""
 
 import os
-import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -14,88 +13,34 @@ from wm_drake.batch import simulate_many
 from wm_drake.batch.runs import RunResult
 from wm_drake.errors import problems_at
 from wm_drake.model.machine import Machine
-from wm_drake.parameters import Load, MachineParameters, SpinProfile
+from wm_drake.parameters import Load, SpinProfile
 from wm_drake.parameters.spin import Region
-from wm_drake.parameters.types import BoolArray, FloatArray
+from wm_drake.parameters.types import FloatArray
+from wm_drake.report.quantity import SPEED
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.displacements import envelopes
 from wm_drake.simulation.records import Record
 from wm_drake.studies.response.balance import HARMONICS, SAMPLES
+from wm_drake.studies.response.quantities import (
+    AMPLITUDE,
+    DIFFERENCE,
+    RATE,
+    RUN_AMPLITUDE,
+    RUN_SPEED,
+)
 from wm_drake.studies.response.response import response_of
 
-RATES_RPM_S = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
-"""Default sweep rates. [rpm/s]"""
+RATES = tuple(RATE.to_si((1.0, 2.0, 5.0, 10.0, 20.0, 50.0)).tolist())
+"""Default sweep rates. [rad/s^2]"""
+
+GASKET = {True: "yes", False: "no"}
+"""Labels of cases with and without gasket."""
 
 HOLD = 8.0
 """Time at the first speed of a sweep, so that the start has decayed. It is not measured. [s]"""
 
 RESPONSE_SHARE, RUN_SHARE = 1.0, 3.0
 """Parts of the progress: one for each response, one for all runs of the engine."""
-
-RAD_S_PER_RPM = np.pi / 30.0
-
-
-@dataclass(frozen=True)
-class ResponseCase:
-    """Steady response to a load.
-
-    Attributes:
-        load: Name of the load.
-        gasket: Whether the gasket is in place.
-        response: As `steady_response` returns it.
-        run_up: Speed and upper and lower envelope of the run over the machine's spin profile, at
-            the speeds of the response: dataset over time with `speed`, `upper` and `lower` (time,
-            sensor). SI
-        wall_s: Time that the response took.
-    """
-
-    load: str
-    gasket: bool
-    response: xr.Dataset
-    run_up: xr.Dataset | None
-    wall_s: float
-
-    @property
-    def stable(self) -> BoolArray:
-        """Whether each motion of the branch attracts its neighbours. (points,)"""
-        return np.asarray(self.response.stable.values, dtype=bool)
-
-    @property
-    def touches(self) -> BoolArray:
-        """Whether the tub touches the housing in each motion of the branch. (points,)"""
-        return np.asarray(self.response.smallest_gap.values <= 0.0)  # false for NaN
-
-    @property
-    def reachable(self) -> BoolArray:
-        """Whether a machine moves so: in a stable motion without contact. (points,)"""
-        return self.stable & ~self.touches
-
-    def largest(self) -> tuple[FloatArray, FloatArray]:
-        """Return the largest reachable amplitude of each sensor [m], and its speed [rad/s].
-
-        Both are NaN if no motion is reachable.
-        """
-        values = np.where(self.reachable[:, None], self.response.amplitude.values, -np.inf)
-        at = values.argmax(axis=0)
-        size = values[at, np.arange(values.shape[1])]
-        none = np.isinf(size)
-        speed = self.response.speed.values[at]
-        return np.where(none, np.nan, size), np.where(none, np.nan, speed)
-
-
-@dataclass(frozen=True)
-class ResponseStudy:
-    """Results of the study.
-
-    Attributes:
-        sweeps: Largest `amplitude` and its `speed` over load, gasket, rate, direction (up, down)
-            and sensor, coordinate `rate` in rad/s^2. None if not computed.
-    """
-
-    parameters: MachineParameters
-    cases: list[ResponseCase]
-    sweeps: xr.Dataset | None
-    wall_s: float
 
 
 @dataclass(frozen=True)
@@ -106,7 +51,7 @@ class ResponseSettings:
         speeds: Rising speeds. [rad/s]
         gaskets: True for a machine with its gasket, False for one without.
         harmonics, samples: See `steady_response`.
-        rates_rpm_s: Sweep rates, up and down; none for no sweeps. [rpm/s]
+        rates: Sweep rates, up and down; none for no sweeps. [rad/s^2]
         workers: Number of threads; None for the number of cores. The results do not depend on it.
     """
 
@@ -114,7 +59,7 @@ class ResponseSettings:
     gaskets: Sequence[bool] = (True, False)
     harmonics: int = HARMONICS
     samples: int = SAMPLES
-    rates_rpm_s: Sequence[float] = RATES_RPM_S
+    rates: Sequence[float] = RATES
     workers: int | None = None
 
     @property
@@ -133,13 +78,20 @@ def run_response_study(
     loads: Mapping[str, Load],
     settings: ResponseSettings,
     progress: Callable[[float], None] = lambda fraction: None,
-) -> ResponseStudy:
+) -> tuple[list[xr.Dataset], xr.Dataset | None]:
     """Compute the steady response to loads, runs over the spin profile, and sweeps.
+
+    Returns:
+        The cases, each a dataset as of `steady_response` with the labels `load` and `gasket` (yes
+        or no), with `reachable`: whether a machine moves so, in a stable motion without contact.
+        The run over the machine's spin profile at the speeds of the response is `run_speed`
+        [rad/s], `upper` and `lower` (sensor) [m] over `time`; they are missing if it diverged.
+        The sweeps: largest `amplitude` [m] and its `speed` [rad/s] over load, gasket, rate
+        [rad/s^2], direction (up, down) and sensor; None if not computed.
 
     Raises:
         InputError: an argument is wrong, or no periodic motion is found for a load.
     """
-    begin = time.perf_counter()
     pairs = [(name, load, gasket) for gasket in settings.gaskets for name, load in loads.items()]
     setups = [machine.set_up(load, gasket=gasket) for _, load, gasket in pairs]
     done = _Progress(progress, [RESPONSE_SHARE] * len(pairs) + [RUN_SHARE])
@@ -147,17 +99,15 @@ def run_response_study(
     def run() -> tuple[list[Record | None], xr.Dataset | None]:
         cases = [Case(*pair[:2], machine.parameters.profile, pair[2]) for pair in pairs]
         runs, sweeps = _records(machine, cases, settings.run_threads), None
-        if len(settings.rates_rpm_s):
+        if len(settings.rates):
             sweeps = _sweeps(machine, loads, settings, done.of(-1))
         done.of(-1)(1.0)
         return runs, sweeps
 
-    def solve(index: int) -> tuple[xr.Dataset, float]:
-        start, name = time.perf_counter(), pairs[index][0]
+    def solve(index: int) -> xr.Dataset:
         numbers = settings.speeds, settings.harmonics, settings.samples
-        with problems_at(f"load '{name}'"):
-            response = response_of(setups[index], *numbers, done.of(index))
-        return response, time.perf_counter() - start
+        with problems_at(f"load '{pairs[index][0]}'"):
+            return response_of(setups[index], *numbers, done.of(index))
 
     # the matrices are small: several threads each would be slower
     with threadpool_limits(1, "blas"), ThreadPoolExecutor(settings.threads) as pool:
@@ -169,10 +119,52 @@ def run_response_study(
             pool.shutdown(wait=True, cancel_futures=True)
             raise
     cases = [
-        ResponseCase(name, gasket, response, _envelopes(run, settings.speeds), wall)
-        for (name, _, gasket), (response, wall), run in zip(pairs, responses, runs, strict=True)
+        case_of_response(response, name, gasket).merge(_run_up(run, settings.speeds))
+        for (name, _, gasket), response, run in zip(pairs, responses, runs, strict=True)
     ]
-    return ResponseStudy(machine.parameters, cases, sweeps, time.perf_counter() - begin)
+    return cases, sweeps
+
+
+def case_of_response(response: xr.Dataset, load: str, gasket: bool) -> xr.Dataset:
+    """Return a response with its labels, and with what a machine reaches of it."""
+    touches = response.smallest_gap.values <= 0.0  # false for NaN
+    return response.assign(reachable=("point", response.stable.values & ~touches)).assign_coords(
+        load=load, gasket=GASKET[gasket]
+    )
+
+
+def largest_of(case: xr.Dataset) -> xr.Dataset:
+    """Return the largest reachable `amplitude` of each sensor [m], and its `speed` [rad/s].
+
+    Both are NaN if no motion is reachable.
+    """
+    at = case.amplitude.where(case.reachable, -np.inf).argmax("point")
+    largest = case[["amplitude"]].isel(point=at).reset_coords("speed")
+    return largest.where(case.reachable.any())
+
+
+def peaks_of(case: xr.Dataset) -> xr.Dataset:
+    """Return the largest amplitude of each sensor and its speed: steady, and in the run.
+
+    Returns:
+        As of `largest_of`, with `run_amplitude` [m], `run_speed` [rad/s], and the relative
+        `difference` of both amplitudes; NaN without a run.
+    """
+    peaks = largest_of(case).drop_vars(("load", "gasket"))
+    size, speed = np.full((2, peaks.sizes["sensor"]), np.nan)
+    if "time" in case.sizes:
+        envelope = run_amplitude(case)
+        size, speed = envelope.max(axis=0), case.run_speed.values[envelope.argmax(axis=0)]
+    return peaks.assign(
+        run_amplitude=RUN_AMPLITUDE.variable("sensor", size),
+        run_speed=RUN_SPEED.variable("sensor", speed),
+        difference=DIFFERENCE.variable("sensor", size / peaks.amplitude.values - 1.0),
+    )
+
+
+def run_amplitude(case: xr.Dataset) -> FloatArray:
+    """Return the larger one of both envelopes of the run. (time, sensor) [m]"""
+    return np.maximum(np.abs(case.upper.values), np.abs(case.lower.values))
 
 
 class _Progress:
@@ -203,18 +195,15 @@ def _records(machine: Machine, cases: list[Case], workers: int | None) -> list[R
     return [records[index] for index in range(len(cases))]
 
 
-def _envelopes(record: Record | None, speeds: FloatArray) -> xr.Dataset | None:
-    """Return the `run_up` of a `ResponseCase`; None without samples at these speeds."""
+def _run_up(record: Record | None, speeds: FloatArray) -> xr.Dataset:
+    """Return the variables of the run of a case; none without samples at these speeds."""
     if record is None:
-        return None
-    edges = envelopes(record)
-    if np.isnan(edges.upper.values).all():
-        return None
-    speed = record.drum_speed.values
+        return xr.Dataset()
+    edges, speed = envelopes(record).reset_coords(drop=True), record.drum_speed.values
     inside = (speed >= speeds.min()) & (speed <= speeds.max())
-    if not inside.any():
-        return None
-    return edges.assign(speed=("time", speed)).isel(time=inside)
+    if not inside.any() or np.isnan(edges.upper.values).all():
+        return xr.Dataset()
+    return edges.assign(run_speed=RUN_SPEED.variable("time", speed)).isel(time=inside)
 
 
 def sweep_profile(first: float, last: float, rate: float) -> SpinProfile:
@@ -239,17 +228,17 @@ def _sweeps(
 ) -> xr.Dataset:
     """Return the largest amplitudes of sweeps and their speeds."""
     low, high = float(min(settings.speeds)), float(max(settings.speeds))
-    gaskets, rates_rpm_s = settings.gaskets, settings.rates_rpm_s
+    gaskets, rates = settings.gaskets, settings.rates
     directions = {"up": (low, high), "down": (high, low)}
     cases, places = [], []
-    for r, rate in enumerate(rates_rpm_s):
+    for r, rate in enumerate(rates):
         for d, ends in enumerate(directions.values()):
-            profile = sweep_profile(*ends, rate * RAD_S_PER_RPM)
+            profile = sweep_profile(*ends, rate)
             for g, gasket in enumerate(gaskets):
                 for k, (name, load) in enumerate(loads.items()):
                     cases.append(Case(name, load, profile, gasket))
                     places.append((k, g, r, d))
-    shape = (len(loads), len(gaskets), len(rates_rpm_s), 2, len(machine.parameters.sensors))
+    shape = (len(loads), len(gaskets), len(rates), 2, len(machine.parameters.sensors))
     amplitude, speed = np.full(shape, np.nan), np.full(shape, np.nan)
     table = simulate_many(
         machine,
@@ -265,14 +254,11 @@ def _sweeps(
             speed[place] = table.region_critical_speed.values[run, 0]
     dims = ("load", "gasket", "rate", "direction", "sensor")
     return xr.Dataset(
-        {
-            "amplitude": (dims, amplitude, {"units": "m"}),
-            "speed": (dims, speed, {"units": "rad/s"}),
-        },
+        {"amplitude": AMPLITUDE.variable(dims, amplitude), "speed": SPEED.variable(dims, speed)},
         {
             "load": list(loads),
-            "gasket": list(gaskets),
-            "rate": ("rate", np.array(rates_rpm_s) * RAD_S_PER_RPM, {"units": "rad/s^2"}),
+            "gasket": [GASKET[gasket] for gasket in gaskets],
+            "rate": RATE.variable("rate", rates),
             "direction": list(directions),
             "sensor": list(machine.parameters.sensors),
         },

@@ -347,10 +347,11 @@ def _why_not_compared(runs: SpinRuns) -> str:
 
 
 def warnings_of(runs: SpinRuns) -> list[str]:
-    """Return warnings about unusual numbers, overlaps, slack springs, the cabinet and the drive."""
+    """Return warnings about unusual numbers, runs that diverged, gaps, springs, feet and drive."""
     unusual = unusual_numbers(runs.parameters)
     return [
         *(f"{problem.key}: {problem.message}." for problem in unusual),
+        *(f"Load {text}. The results cover the time before that." for text in runs.failures()),
         *overlap_warnings(runs),
         *slack_warning(
             {c.title: slack_springs(c.measures.smallest_tension) for c in runs.results}, "load"

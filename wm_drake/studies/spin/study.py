@@ -24,7 +24,7 @@ from wm_drake.model.machine import Machine
 from wm_drake.model.scene import Scene
 from wm_drake.parameters import MachineParameters, Sensor
 from wm_drake.parameters.units import Unit
-from wm_drake.report.quantity import SPEED, TIME, Quantity
+from wm_drake.report.quantity import SPEED, STEP, TIME, Quantity
 from wm_drake.simulation.cases import Case, is_as_measured, notice_jumping_friction
 from wm_drake.simulation.displacements import band_of, largest_motion
 from wm_drake.simulation.measures import MEASURES, Measures, measure
@@ -82,7 +82,6 @@ class CaseResult:
         return float(np.interp(time, self.record.time.values, self.record.drum_speed.values))
 
 
-STEP = Quantity("step", Unit("s", "ms"), form="{:g}".format)
 GAP = Quantity("smallest gap", Unit("m", "mm"), 1)
 
 

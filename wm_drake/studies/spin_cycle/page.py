@@ -12,7 +12,7 @@ from wm_drake.parameters.unbalance_cases import UnbalanceCase
 from wm_drake.parameters.units import Share, Unit
 from wm_drake.report.formatting import MISSING, listed, slack_warning
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import SPEED, TIME, Quantity, quantity_of, text_of
+from wm_drake.report.quantity import SPEED, STEP, TIME, Quantity, quantity_of, text_of
 from wm_drake.simulation.feet import MARGINS
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.spring_tension import slack_springs
@@ -43,7 +43,6 @@ LARGE_DISAGREEMENT = 0.01
 """Relative error of integrated displacements from which on a page warns of it."""
 
 INTEGRATED = Quantity("direct vs. integrated", Share(), 2)
-TIME_BETWEEN = Quantity("time between samples", Unit("s", "ms"), form="{:g}".format)
 
 
 def spin_cycle_answer(
@@ -64,7 +63,7 @@ def spin_cycle_answer(
     sensors = [
         f"{name} (frame {frame})" for name, frame in parameters.accelerometer_frames().items()
     ]
-    period = TIME_BETWEEN.text(profile.sample_period(parameters.output_period))
+    period = STEP.text(profile.sample_period(parameters.output_period))
     return Answer(
         f"Spin cycle of machine {parameters.name}",
         summary(cases, data, engine),
@@ -180,12 +179,16 @@ def _about_measurement(data: xr.Dataset) -> str:
 
 
 def warnings_of(parameters: MachineParameters, data: xr.Dataset, period: str) -> list[str]:
-    """Return warnings about overlap, slack springs, the cabinet, integration, imperfections.
+    """Return warnings about divergence, overlap, slack springs, feet, integration, imperfections.
 
     Args:
         period: Time between samples, as text.
     """
-    texts = missing_warnings(data.rms, data.measured) if "measured" in data else []
+    texts = [
+        f"Case {text}. Regions that this run did not complete have no values."
+        for text in diverged_runs(data)
+    ]
+    texts += missing_warnings(data.rms, data.measured) if "measured" in data else []
     touching = data.case.values[data.smallest_gap.values <= 0.0].tolist()
     if touching:
         texts.append(

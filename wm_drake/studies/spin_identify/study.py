@@ -26,7 +26,7 @@ from wm_drake.parameters.units import Share
 from wm_drake.parameters.variation import number_at, range_of
 from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.cases import Case
-from wm_drake.studies.executor import RunCases
+from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.fitting.fit import Fit
 from wm_drake.studies.fitting.methods import least_squares
 from wm_drake.studies.fitting.problem import FitProblem, Measurement, Progress, Unknown
@@ -179,11 +179,11 @@ def planted_values(sought: Sequence[Sought], seed: int) -> FloatArray:
 class SpinModel:
     """RMS displacements of unbalance cases as a function of the unknowns."""
 
+    experiment: Experiment
     parameters: MachineParameters
     profile: SpinProfile
     cases: tuple[UnbalanceCase, ...]
     sought: tuple[Sought, ...]
-    regions: RunCases
 
     def displacements(self, points: FloatArray) -> FloatArray:
         """Compute the RMS displacements at points.
@@ -194,11 +194,9 @@ class SpinModel:
         Returns:
             (k, case, region, accelerometer, axis); NaN where a run diverged. [m]
         """
-        labels = labels_of(self.parameters, self.cases, self.profile)
-        table = self.regions(self._runs(points))
-        return table.region_displacement.values.reshape(
-            len(points), *(len(labels[dim]) for dim in DIMS)
-        )
+        labels = {"point": range(len(points)), "case": [case.name for case in self.cases]}
+        runs = self.experiment.over(labels, self._runs(points))
+        return np.asarray(runs.region_displacement.values)
 
     def _runs(self, points: FloatArray) -> Iterator[Case]:
         for point in points:

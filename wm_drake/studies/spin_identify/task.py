@@ -1,11 +1,11 @@
 """Check the options of the identification from a spin cycle, and run it."""
 
-from functools import partial
 from typing import Any
 
 from wm_drake.model.machine import Machine
 from wm_drake.studies.answer import Answer
 from wm_drake.studies.executor import Executor
+from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.inputs import runnable_profile
 from wm_drake.studies.spin_cycle.study import cases_of_table, measured_displacements
 from wm_drake.studies.spin_identify.options import SpinIdentifyOptions
@@ -53,9 +53,9 @@ class SpinIdentifyTask(Task):
         """Identify the unknowns, from measurements or from a virtual experiment."""
         seed, measured, planted = self.options.seed, self.measured, None
         with executor.fraction("search") as report:
-            regions = partial(executor.simulate, self.machine, ("regions",))
+            experiment = Experiment(self.machine, ("regions",), executor.simulate)
             model = SpinModel(
-                self.machine.parameters, self.profile, tuple(self.cases), self.sought, regions
+                experiment, self.machine.parameters, self.profile, tuple(self.cases), self.sought
             )
             if measured is None:
                 planted = planted_values(self.sought, seed)

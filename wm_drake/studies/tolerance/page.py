@@ -1,365 +1,454 @@
-"""What the tolerance study shows: files, JSON, terminal, page and their tables."""
+"""Show the tolerance study: how often the tub touches, distributions, causes, limits."""
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
 
 import numpy as np
-import pandas as pd
+import xarray as xr
 
-from wm_drake.report.formatting import MISSING, plain, shape_name, significant, with_interval
-from wm_drake.report.page import Picture, Section, SectionedPage, picture
-from wm_drake.report.table import Column, Table, line, table_of
-from wm_drake.studies.study import Facts, Result
+from wm_drake.parameters import MachineParameters
+from wm_drake.report.formatting import MISSING, listed
+from wm_drake.report.labelled import LabelledTable, TurnedTable
+from wm_drake.report.quantity import quantity_of, text_of
+from wm_drake.studies.answer import Answer, Part, Plot
 from wm_drake.studies.tolerance.figures import distributions_figure, gap_figure, sobol_figure
-from wm_drake.studies.tolerance.shares import PERCENTILES, percentile_of
-from wm_drake.studies.tolerance.study import ToleranceStudy
-from wm_drake.studies.tolerance.words import (
-    about_loads,
-    in_percent,
-    in_short,
-    leading,
-    measure_titles,
-    quantity_words,
-    rare_sentences,
-    summary,
-    warnings,
+from wm_drake.studies.tolerance.study import (
+    CRUDE,
+    GAP_SIZE,
+    SMALLEST_GAP,
+    SUBSET,
+    WHOLE_SHARE,
+    ToleranceTrials,
+    laundry_masses,
+    name_of,
+    statistics_of,
 )
-
-if TYPE_CHECKING:
-    from rich.table import Table as TerminalTable
 
 MOST_PANELS = 9
 """Largest number of distributions in one figure."""
 
+MOST_NAMED = 3
+"""Number of quantities that the summary names."""
 
-@dataclass(frozen=True)
-class ToleranceResult(Result):
-    """Result of the study.
+LEAST_TOTAL = 0.01
+"""Total index below which a quantity is not named."""
 
-    Attributes:
-        result: Samples and what follows from them.
-        about: Description in the tolerance file.
-        gaps_of_loads: Smallest gap of each load of the machine. [m]
-    """
+WIDE_INTERVAL = 0.2
+"""Half width of the interval of a total index above which it is called uncertain."""
 
-    result: ToleranceStudy
-    about: str
-    gaps_of_loads: Mapping[str, float] = field(default_factory=dict)
+FEW = 10
+"""Number of runs with contact below which its interval is wide."""
 
-    float_format = None
+STATISTICS = ("mean", "deviation", "p5", "p50", "p95")
+"""Statistics of a measure on the page; the file of the intervals has all."""
 
-    def tables(self) -> dict[str, pd.DataFrame]:
-        """Return samples, measures and what else was computed."""
-        frames = {
-            "samples": samples_frame(self.result),
-            "measures": measures_frame(self.result),
-            "sobol": sobol_frame(self.result),
-            "contact": contact_frame(self.result),
-            "limits": limits_frame(self.result),
-        }
-        return {name: frame for name, frame in frames.items() if len(frame.columns)}
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the result for JSON."""
-        result, contact = self.result, self.result.contact
-        names = [variable.name for variable in result.machine.variables]
-        shown = {
-            "samples": result.settings.samples,
-            "seed": result.settings.seed,
-            "runs": result.runs,
-            "failed": len(result.failed),
-            "measures": measures_frame(result).set_index("measure").to_dict("index"),
-            "contact_probability": contact
-            and {
-                "estimate": contact.estimate,
-                "lower": contact.lower,
-                "upper": contact.upper,
-                "method": contact.method,
-                "runs": contact.crude.samples,
-                "touching": contact.crude.count,
-                "pairs": {
-                    name: {"estimate": s.estimate, "lower": s.lower, "upper": s.upper}
-                    for name, s in contact.pairs.items()
-                },
-            },
-            "sobol": {
-                measure: dict(zip(names, map(vars, indices), strict=True))
-                for measure, indices in result.indices.items()
-            },
-            "smallest_gap_of_loads_mm": {n: 1e3 * g for n, g in self.gaps_of_loads.items()},
-            "sobol_refused": result.refused,
-            "limits": limits_frame(result).to_dict("records"),
-        }
-        return plain(shown)
-
-    def terminal(self) -> "Iterable[TerminalTable | str]":
-        """Yield measures, limits and a summary."""
-        samples = self.result.settings.samples
-        table = measures_table(self.result, is_short=True)
-        yield table.terminal(f"Measures of {samples} samples")
-        if self.result.verdicts:
-            yield limits_table(self.result).terminal("Limits")
-        yield from summary(self.result)
-        for word, text in facts_of(self.result, self.gaps_of_loads):
-            yield f"{word}: {text}"
-
-    def page(self, facts: Facts) -> str:
-        """Return the page: distributions, causes, limits, contact, tables."""
-        result, settings = self.result, self.result.settings
-        machine = result.machine.parameters
-        contact = result.contact
-        sections = [
-            Section("gap", "Smallest gap", _gap_picture(result, self.gaps_of_loads)),
-            Section("distributions", "Distributions", _distributions(result)),
-            Section(
-                "sensitivity", "What causes the scatter", _sobol_picture(result),
-                text=result.refused,
-            ),
-            Section("limits", "Limits", tables=[limits_table(result)] if result.verdicts else ()),
-            Section(
-                "contact", "Contact", tables=[contact_table(result)] if contact else (),
-                text=rare_sentences(contact) if contact else "",
-            ),
-            Section("measures", "Distributions in numbers", tables=[measures_table(result)]),
-            Section(
-                "indices", "Sobol indices", tables=[sobol_table(result)] if result.indices else ()
-            ),
-            Section("quantities", "Quantities", tables=[quantities_table(result)]),
-        ]  # fmt: skip
-        made = [
-            ("Machine", machine.name),
-            ("Samples", f"{settings.samples}, scrambled Sobol sequence, seed {settings.seed}"),
-            ("Runs", f"{result.runs} in {facts.wall_s:.0f} s"),
-            ("Duration of a run", f"{result.machine.case.profile.duration:g} s"),
-            *facts.rows(),
-        ]
-        return SectionedPage(
-            f"Tolerances of machine {machine.name}",
-            " ".join(summary(result)),
-            sections,
-            made,
-            warnings=[*facts.warnings, *warnings(result)],
-            about=self.about,
-            advice=Section("", "In short", facts=facts_of(result, self.gaps_of_loads)),
-        ).html()
-
-    def warnings(self) -> list[str]:
-        """Return what limits the use of the result."""
-        return warnings(self.result)
-
-    def failures(self) -> list[str]:
-        """Return one line if runs failed."""
-        count = len(self.result.failed)
-        return [f"{count} of {self.result.settings.samples} runs failed"] if count else []
+WORDS = {
+    "p5": "5 %", "p50": "median", "p95": "95 %", "p5_lower": "5 %, from", "p5_upper": "to",
+    "p50_lower": "median, from", "p50_upper": "to", "p95_lower": "95 %, from", "p95_upper": "to",
+}  # fmt: skip
 
 
-def facts_of(result: ToleranceStudy, gaps: Mapping[str, float]) -> list[tuple[str, str]]:
-    """Return the facts below the answer.
+def tolerance_answer(
+    trials: ToleranceTrials,
+    samples: xr.Dataset,
+    indices: xr.Dataset,
+    contact: xr.Dataset,
+    limits: xr.Dataset,
+) -> Answer:
+    """Return the answer of the study.
 
     Args:
-        gaps: Smallest gap of each load of the machine. [m]
+        samples, indices, contact, limits: As of `ToleranceTrials` and `judged` in
+            `wm_drake.studies.tolerance.study`.
     """
-    facts = [*in_short(result), ("Loads of the machine", about_loads(result, gaps))]
-    return [(word, text) for word, text in facts if text]
-
-
-def _gap_picture(result: ToleranceStudy, gaps: Mapping[str, float]) -> tuple[Picture, ...]:
-    """Return the distribution of the smallest gap beside the loads; nothing without a gap."""
-    name = next((str(n) for n in result.values if str(n).startswith("smallest_gap")), "")
-    if not name or result.values[name].notna().sum() < 2:
-        return ()
-    caption = (
-        "Share of the runs whose smallest gap between tub and housing is below a value; 0 and "
-        "below: contact. Shaded: 95 % band for the whole curve. Points: loads of the machine file, "
-        "at any height."
+    measures = samples[[name_of(response) for response in trials.chosen]]
+    machine, settings = trials.uncertain.parameters, trials.settings
+    count = int(np.sum(samples.failed.values != ""))
+    return Answer(
+        f"Tolerances of machine {machine.name}",
+        " ".join(summary(trials, indices, contact, limits)),
+        machine,
+        (
+            *_distributions(trials, samples, measures, limits, contact),
+            _causes(trials, indices),
+            Part("Limits", _limits(trials, limits)),
+            _contact(contact),
+            Part("Distributions in numbers", _statistics(measures)),
+            Part("Sobol indices", _indices(trials, indices)),
+            Part("Quantities", (_quantities(trials),)),
+        ),
+        (
+            ("Tolerances", trials.about),
+            ("Samples", f"{settings.samples}, scrambled Sobol sequence, seed {settings.seed}"),
+            ("Duration of a run", f"{trials.uncertain.case.profile.duration:g} s"),
+        ),
+        warned=tuple(warnings(trials, samples, indices, contact)),
+        short=Part("In short", facts=facts_of(trials, samples, indices, contact)),
+        diverged=(f"{count} of {settings.samples} runs failed",) if count else (),
     )
-    figure = gap_figure(result, name, gaps)
-    return (picture(figure, f"Distribution of the smallest gap. {caption}", caption),)
 
 
-def _distributions(result: ToleranceStudy) -> tuple[Picture, ...]:
-    titles = {name: ", ".join(text) for name, text in measure_titles(result).items()}
-    names = [str(name) for name in result.values if not str(name).startswith("smallest_gap")]
+def summary(
+    trials: ToleranceTrials, indices: xr.Dataset, contact: xr.Dataset, limits: xr.Dataset
+) -> list[str]:
+    """Return the findings, one sentence each."""
+    sentences = ["The SDF has no shapes on both tub and housing, so contact cannot be judged."]
+    if contact:
+        sentences = contact_sentences(contact)
+    words = limits.verdict.values.tolist() if limits else []
+    parts = [f"{words.count(w)} {w}" for w in ("pass", "fail", "undecided") if w in words]
+    judged = [f"Limits: {', '.join(parts)}."] if parts else []
+    return [*sentences, *judged, *_sensitivity_sentences(trials, indices)]
+
+
+def contact_sentences(contact: xr.Dataset) -> list[str]:
+    """Return sentences about how often the tub touches, and where."""
+    if contact.probability == 0.0:
+        sentence = (
+            f"The tub touches the housing in none of {contact.attrs['samples']} runs, so in at "
+            f"most {text_of(contact.probability_upper)} of all such runs (with 95 % confidence)."
+        )
+    else:
+        sentence = f"The tub touches the housing in {probability(contact)}."
+    return [sentence, *_where(contact)]
+
+
+def probability(contact: xr.Dataset) -> str:
+    """Return the probability of contact in percent, with its interval and how it is known."""
+    if contact.probability == 0.0:
+        upper = text_of(contact.probability_upper)
+        return f"0 to {upper} of the runs (95 % confidence; none was seen)"
+    how = "estimated by a search for rare contact"
+    if contact.method == CRUDE:
+        how = f"{text_of(contact.touching)} of {contact.attrs['samples']} runs"
+    ends = f"{text_of(contact.probability_lower)} to {text_of(contact.probability_upper)}"
+    return f"{text_of(contact.probability)} of the runs (95 % interval {ends}; {how})"
+
+
+def _where(contact: xr.Dataset) -> list[str]:
+    """Return a sentence on the place of contact, or of the smallest gap without contact."""
+    if contact.method == SUBSET and contact.rare_touches.any():
+        share, begin = contact.rare_touches, "of the runs that touch do so"
+    elif contact.touches.any():
+        share = contact.touches * contact.attrs["samples"] / contact.touching
+        begin = "of the runs that touch do so"
+    else:
+        share, begin = contact.nearest, "of the runs have the smallest gap"
+    if not share.any():
+        return []
+    at = int(share.argmax("pair"))
+    return [f"{WHOLE_SHARE.text(share[at])} {begin} at {pair_words(contact.isel(pair=at))}."]
+
+
+def pair_words(pair: xr.Dataset) -> str:
+    """Return a pair of shapes in words: tub shell and wall left."""
+    return f"{pair.moving.item()} and {pair.fixed.item()}"
+
+
+def rare_sentences(contact: xr.Dataset) -> str:
+    """Return how the subset simulation went; nothing if there was none."""
+    if "threshold" not in contact:
+        return ""
+    steps = ", ".join(map(GAP_SIZE.number, contact.threshold.values))
+    text = (
+        f"Of {contact.attrs['samples']} samples {text_of(contact.touching)} touch, too few to "
+        f"count. Subset simulation took {text_of(contact.rare_runs)} runs in "
+        f"{contact.sizes['level'] + 1} levels. Each level holds the tenth of the runs with the "
+        f"smallest gaps of the level before: at most {steps} mm"
+    )
+    if not np.isfinite(contact.rare_deviation):
+        return (
+            f"{text}. The smallest gap of the last level is {text_of(contact.rare_smallest)}; "
+            "without contact the simulation gives no probability, and the bound is that of the "
+            "samples alone (rule of three)."
+        )
+    touching = contact.isel(pair=np.argsort(-contact.rare_touches.values, kind="stable"))
+    pairs = (touching.isel(pair=at) for at in range(int((touching.rare_touches > 0.0).sum())))
+    places = ", ".join(f"{pair_words(pair)} {text_of(pair.rare_touches)}" for pair in pairs)
+    return (
+        f"{text}, then contact. Coefficient of variation: {text_of(contact.rare_deviation)}. "
+        f"Contacts of the last level: {places}."
+    )
+
+
+def leading(indices: xr.Dataset) -> xr.Dataset | None:
+    """Return the indices of the measure that the summary explains, the largest total first.
+
+    The measure is the smallest gap if there is one, else the first measure; None without indices.
+    """
+    if not indices.sizes.get("measure", 0):
+        return None
+    names = indices["measure"].values.tolist()
+    of = indices.sel(measure=SMALLEST_GAP if SMALLEST_GAP in names else names[0])
+    return of.isel(quantity=np.argsort(-of.total.values, kind="stable"))
+
+
+def _sensitivity_sentences(trials: ToleranceTrials, indices: xr.Dataset) -> list[str]:
+    of = leading(indices)
+    if of is None:
+        return [indices.attrs["refused"]] if indices.attrs["refused"] else []
+    parts = [v.name for v in trials.uncertain.variables if not v.is_of_load]
+    tightened = _named(trials, of.sel(quantity=of["quantity"].isin(parts)))
+    what = "nothing; only the load scatters in this file"
+    if parts:
+        what = tightened or "nothing; no part causes as much as 1 % of this variance"
+    return [
+        f"Shares of the variance of the {_title(trials, of)}, alone and together with others: "
+        f"{_named(trials, of)}.",
+        f"To tighten: {what}.",
+    ]
+
+
+def _named(trials: ToleranceTrials, of: xr.Dataset) -> str:
+    """Return the quantities with the largest total indices, and these; "" if all are small."""
+    words = {v.name: v.quantity.words for v in trials.uncertain.variables}
+    of = of.isel(quantity=of.total.values >= LEAST_TOTAL).isel(quantity=slice(MOST_NAMED))
+    pairs = zip(of["quantity"].values.tolist(), of.total.values, strict=True)
+    return ", ".join(f"{words[name]} ({WHOLE_SHARE.text(total)})" for name, total in pairs)
+
+
+def _title(trials: ToleranceTrials, of: xr.Dataset) -> str:
+    """Return the words of the measure of some indices."""
+    return _titles(trials)[of["measure"].item()]
+
+
+def _titles(trials: ToleranceTrials) -> dict[str, str]:
+    """Return the words of the measures by their names."""
+    return {name_of(response): response.title.replace("_", " ") for response in trials.chosen}
+
+
+def facts_of(
+    trials: ToleranceTrials, samples: xr.Dataset, indices: xr.Dataset, contact: xr.Dataset
+) -> list[tuple[str, str]]:
+    """Return the facts below the answer: probability, gap, what decides it, loads."""
+    facts, count = [], trials.settings.samples
+    if contact:
+        facts.append(("Probability of contact", probability(contact)))
+    if SMALLEST_GAP in samples and samples.smallest_gap.notnull().any():
+        gaps = samples.smallest_gap
+        low, median = (GAP_SIZE.text(gaps.quantile(share)) for share in (0.05, 0.5))
+        facts.append((
+            "Smallest gap",
+            f"{GAP_SIZE.text(gaps.min())} in {count} runs; 1 run in 20 is below {low}, half of "
+            f"them are below {median}",
+        ))  # fmt: skip
+    of = leading(indices)
+    if of is not None and _named(trials, of):
+        facts.append((f"What decides the {_title(trials, of)}", _named(trials, of)))
+    if "gap_of_load" in contact:
+        gaps = contact.gap_of_load.dropna("load")
+        facts.append(("Loads of the machine", about_loads(trials, samples, gaps)))
+    return facts
+
+
+def about_loads(trials: ToleranceTrials, samples: xr.Dataset, gaps: xr.DataArray) -> str:
+    """Return why the loads of a machine give other gaps than the samples.
+
+    Args:
+        gaps: Smallest gap over `load`. [m]
+    """
+    loads = gaps["load"].values.tolist()
+    each = ", ".join(f"{load} {GAP_SIZE.text(gap)}" for load, gap in zip(loads, gaps, strict=True))
+    masses, compared = laundry_masses(samples), ""
+    if masses:
+        compared = masses_text(trials.uncertain.parameters, loads, masses) + " "
+    return (
+        f"The samples leave out the loads of the machine file: {each}. {compared}The file of this "
+        "study says what scatters and why; 'wm-drake verdict' judges both together."
+    )
+
+
+def masses_text(
+    parameters: MachineParameters, loads: Sequence[str], masses: tuple[float, float]
+) -> str:
+    """Return how the masses of loads compare with the laundry of samples.
+
+    Args:
+        loads: Names of loads of the machine.
+        masses: Smallest and largest mass of the laundry. [kg]
+    """
+    of_load = {name: parameters.loads[name].mass for name in loads}
+    ends = f"{masses[0]:.2g} to {masses[1]:.2g} kg"
+    heavier = [f"{load} ({mass:.3g} kg)" for load, mass in of_load.items() if mass > masses[1]]
+    if not heavier:
+        return f"The laundry of the samples, {ends}, is as heavy as any of these loads."
+    verb = "is" if len(heavier) == 1 else "are"
+    return f"{listed(heavier)} {verb} heavier than all laundry of the samples, {ends}."
+
+
+def warnings(
+    trials: ToleranceTrials, samples: xr.Dataset, indices: xr.Dataset, contact: xr.Dataset
+) -> list[str]:
+    """Return what limits the use of the results."""
+    texts, failed = [], samples.isel(sample=samples.failed.values != "")
+    if failed.sizes["sample"]:
+        first = failed.isel(sample=0)
+        texts.append(
+            f"{failed.sizes['sample']} of {trials.settings.samples} runs failed and count as "
+            f"contact (sample {first['sample'].item()}: {first.failed.item()})."
+        )
+    if contact and contact.method == CRUDE and 0 < contact.touching < FEW:
+        texts.append(
+            f"Only {text_of(contact.touching)} runs touch; more samples, or --subset, make the "
+            "interval narrower."
+        )
+    if indices.attrs["refused"] and trials.settings.sensitivity:
+        texts.append(indices.attrs["refused"])
+    if indices:
+        wide = (indices.total_upper - indices.total_lower > 2.0 * WIDE_INTERVAL).any("quantity")
+        if wide.any():
+            texts.append(
+                f"Total indices of {int(wide.sum())} of {wide.size} measures are uncertain by more "
+                f"than ±{WIDE_INTERVAL:g}; more samples (--sensitivity) make them sharper."
+            )
+    return texts
+
+
+def _distributions(
+    trials: ToleranceTrials,
+    samples: xr.Dataset,
+    measures: xr.Dataset,
+    limits: xr.Dataset,
+    contact: xr.Dataset,
+) -> tuple[Part, Part]:
+    """Return the smallest gap beside the loads of the machine, and the other measures."""
+    numbers, pictures = limits.attrs.get("numbers", {}), []
+    gap: list[Plot | LabelledTable] = []
+    if SMALLEST_GAP in measures and measures.smallest_gap.notnull().sum() > 1:
+        caption = (
+            "Share of the runs whose smallest gap between tub and housing is below a value; 0 and "
+            "below: contact. Shaded: 95 % band for the whole curve. Points: loads of the machine "
+            "file, at any height."
+        )
+        figure = gap_figure(
+            measures.smallest_gap, numbers.get(SMALLEST_GAP, ()), contact.get("gap_of_load")
+        )
+        gap.append(Plot(figure, f"Distribution of the smallest gap. {caption}", caption))
+    if "gap_of_load" in contact:
+        gap.append(LabelledTable("loads", contact[["gap_of_load"]]))
+    names = [str(name) for name in measures if name != SMALLEST_GAP]
     caption = (
         "Distribution functions of the measures: share of the runs below a value. Shaded: 95 % "
         "band for the whole curve (Dvoretzky, Kiefer, Wolfowitz). Dashed: limits."
     )
-    pictures = []
     for first in range(0, len(names), MOST_PANELS):
-        panels = {name: titles[name] for name in names[first : first + MOST_PANELS]}
-        words = f"Distribution functions of {'; '.join(panels.values())}."
-        pictures.append(picture(distributions_figure(result, panels), words, caption))
-    return tuple(pictures)
+        panels = measures[names[first : first + MOST_PANELS]]
+        words = "; ".join(quantity_of(column).label for column in panels.values())
+        figure = distributions_figure(panels, numbers)
+        pictures.append(Plot(figure, f"Distribution functions of {words}.", caption))
+    drawn = [variable.name for variable in trials.uncertain.variables]
+    table = LabelledTable("samples", samples[[*drawn, *measures, "failed"]], is_in_json=False)
+    return Part("Smallest gap", gap), Part("Distributions", [*pictures, table])
 
 
-def _sobol_picture(result: ToleranceStudy) -> tuple[Picture, ...]:
-    """Return the indices of the leading measure; nothing if there are none."""
-    key, indices = leading(result)
-    if not indices:
+def _causes(trials: ToleranceTrials, indices: xr.Dataset) -> Part:
+    """Return the indices of the leading measure as a picture."""
+    of, plots = leading(indices), []
+    if of is not None:
+        caption = (
+            f"Sobol indices of the {_title(trials, of)}. Bars: estimates, lines: 95 % bootstrap "
+            "intervals. A total index above the first-order index is an effect together with "
+            "other quantities."
+        )
+        words = {v.name: v.quantity.words for v in trials.uncertain.variables}
+        names = [words[name] for name in of["quantity"].values.tolist()]
+        each = zip(names, of.total, strict=True)
+        texts = ", ".join(f"{name} {text_of(total)}" for name, total in each)
+        plots = [Plot(sobol_figure(of, names), f"Total indices: {texts}.", caption)]
+    return Part("What causes the scatter", plots, indices.attrs["refused"])
+
+
+def _limits(trials: ToleranceTrials, limits: xr.Dataset) -> tuple[LabelledTable, ...]:
+    """Return the verdict on each limit; nothing without limits."""
+    if not limits:
         return ()
-    caption = (
-        f"Sobol indices of the {measure_titles(result)[key][0]}. Bars: estimates, lines: 95 % "
-        "bootstrap intervals. A total index above the first-order index is an effect together with "
-        "other quantities."
-    )
-    named = [(quantity_words(variable.name), index) for variable, index in indices]
-    listed = ", ".join(f"{name} {index.total:.2f}" for name, index in named)
-    return (picture(sobol_figure(named), f"Total indices: {listed}.", caption),)
-
-
-KINDS = {"pass": "ours", "fail": "alarm", "undecided": ""}
-"""Style of the row of a limit by its verdict."""
-
-
-def samples_frame(result: ToleranceStudy) -> pd.DataFrame:
-    """Return quantities and measures of each sample, and the reason if its run failed."""
-    columns: dict[str, Any] = {"sample": range(1, len(result.values) + 1)}
-    values = result.machine.joint.values(result.scores)
-    for variable, column in zip(result.machine.variables, values.T, strict=True):
-        unit = variable.variation.unit
-        columns[f"{variable.name} [{unit.label}]"] = unit.from_si(1.0) * column
-    failed = [result.failed.get(i, "") for i in range(len(result.values))]
-    return pd.concat([pd.DataFrame(columns), result.values], axis=1).assign(failed=failed)
-
-
-def measures_frame(result: ToleranceStudy) -> pd.DataFrame:
-    """Return mean, deviation and percentiles of each measure, with intervals of the percentiles."""
-    rows = []
-    for name, column in result.values.items():
-        good = column.dropna().to_numpy()
-        row: dict[str, Any] = {"measure": name, "mean": np.mean(good), "deviation": np.std(good)}
-        for percent in PERCENTILES:
-            percentile = percentile_of(good, percent)
-            row[f"p{percent}"] = percentile.value
-            row |= {f"p{percent}_{end}": getattr(percentile, end) for end in ("lower", "upper")}
-        rows.append(row)
-    return pd.DataFrame(rows)
-
-
-MEASURES = {
-    "measure": Column("measure"),
-    "unit": Column("unit"),
-    "mean": Column("mean"),
-    "deviation": Column("deviation"),
-    "p5": Column("5 %"),
-    "p50": Column("median"),
-    "p95": Column("95 %"),
-}
-"""Columns of the table of measures."""
-
-
-def measures_table(result: ToleranceStudy, *, is_short: bool = False) -> Table:
-    """Return the measures with words and unit; the short form has percentiles alone."""
-    frame, titles = measures_frame(result), measure_titles(result)
-    words = [titles[str(name)] for name in frame["measure"]]
-    frame["measure"], frame["unit"] = ([pair[index] for pair in words] for index in (0, 1))
-    names = [name for name in MEASURES if not (is_short and name in ("mean", "deviation"))]
-    for name in [f"p{percent}" for percent in PERCENTILES if not is_short]:
-        ends = frame[[name, f"{name}_lower", f"{name}_upper"]].itertuples(index=False)
-        frame[name] = [with_interval(*each) for each in ends]
-    caption = "Measures over all samples; percentiles with 95 % intervals of order statistics."
-    return table_of(frame[names], caption, MEASURES)
-
-
-def sobol_frame(result: ToleranceStudy) -> pd.DataFrame:
-    """Return the Sobol indices: one row for each measure and quantity."""
-    return pd.DataFrame(
-        {"measure": name, "quantity": variable.name, **vars(index)}
-        for name, indices in result.indices.items()
-        for variable, index in zip(result.machine.variables, indices, strict=True)
-    )
-
-
-def sobol_table(result: ToleranceStudy) -> Table:
-    """Return the total Sobol indices, a column for each quantity."""
-    names = (quantity_words(variable.name) for variable in result.machine.variables)
-    titles = measure_titles(result)
-    caption = (
-        "Total Sobol indices of all measures. First-order indices and 95 % intervals are in "
-        "sobol.csv."
-    )
-    groups = (
-        line(titles[name][0], [index.total for index in indices])
-        for name, indices in result.indices.items()
-    )
-    columns = tuple(Column(name, decimals=2) for name in names)
-    return Table(caption, ("measure", *columns), tuple(groups))
-
-
-def contact_frame(result: ToleranceStudy) -> pd.DataFrame:
-    """Return the share of the samples in which each pair of shapes touches or is nearest."""
-    rows, contact = [], result.contact
-    if contact:
-        for name in dict.fromkeys([*contact.pairs, *contact.nearest]):
-            share = contact.pairs.get(name)
-            ends = (share.estimate, share.lower, share.upper) if share else (0.0, 0.0, np.nan)
-            rows.append((*name.split("|"), *ends, contact.nearest.get(name, 0)))
-    names = ["moving", "fixed", "touches", "lower", "upper", "nearest_in"]
-    return pd.DataFrame(rows, columns=names)
-
-
-def contact_table(result: ToleranceStudy) -> Table:
-    """Return how often each pair of shapes touches and is nearest."""
-    rows = []
-    for moving, fixed, share, low, high, count in contact_frame(result).to_numpy().tolist():
-        ends = f"{in_percent(low)} to {in_percent(high)}" if share else MISSING
-        nearest = 100.0 * count / result.settings.samples
-        cells = (shape_name(fixed), in_percent(share), ends, nearest)
-        rows.append(line(shape_name(moving), cells))
-    caption = (
-        "Contact by pair of shapes among the samples. A run may touch at several places. Last "
-        "column: share of the runs in which the pair has the smallest gap. Intervals: 95 %, "
-        "Clopper and Pearson."
-    )
-    header = ("moves with the tub", "housing", "touch", "interval")
-    return Table(caption, (*header, Column("nearest", "%", 1)), tuple(rows), text_columns=2)
-
-
-def limits_frame(result: ToleranceStudy) -> pd.DataFrame:
-    """Return the verdict on each limit."""
-    return pd.DataFrame(
-        {
-            "quantity": v.limit.quantity,
-            "side": "at_least" if v.limit.at_least is not None else "at_most",
-            "limit": v.limit.text,
-            "allowed_share": v.allowed,
-            "share": v.broken.estimate,
-            "lower": v.broken.lower,
-            "upper": v.broken.upper,
-            "verdict": v.word,
-        }
-        for v in result.verdicts
-    )
-
-
-def limits_table(result: ToleranceStudy) -> Table:
-    """Return the verdict on each limit with the words of its quantity."""
-    titles, rows = measure_titles(result), []
-    for v in result.verdicts:
-        side = "at least" if v.limit.at_least is not None else "at most"
-        ends = " to ".join(significant(100.0 * x, 3) for x in (v.broken.lower, v.broken.upper))
-        share = significant(100.0 * v.broken.estimate, 3)
-        cells = (f"{side} {v.limit.text}", 100.0 * v.allowed, share, ends, v.word)
-        rows.append(line(titles[v.key][0], cells, KINDS[v.word]))
     caption = (
         "Limits: share of the runs that break each one. The verdict is pass if the whole 95 % "
         "interval is allowed, fail if none of it is, else undecided: more samples decide it."
     )
-    header = ("quantity", "limit", "allowed, %", "break it, %", "interval, %", "verdict")
-    return Table(caption, header, tuple(rows), text_columns=2)
-
-
-def quantities_table(result: ToleranceStudy) -> Table:
-    """Return what scatters."""
-    rows = (
-        line(
-            quantity_words(v.name),
-            (", ".join(v.variation.keys) or "load", v.text, v.source or MISSING),
-        )
-        for v in result.machine.variables
+    data = limits.assign(is_broken=limits.verdict == "fail")
+    words = {r.name: _titles(trials)[name_of(r)] for r in trials.chosen} | _titles(trials)
+    return (
+        LabelledTable(
+            "limits",
+            data,
+            "Limits",
+            caption,
+            marked=("is_broken", "alarm"),
+            words=words,
+            is_in_terminal=True,
+        ),
     )
-    caption = "What scatters. Percents are of the machine's number."
-    return Table(
-        caption, ("quantity", "keys", "distribution", "source"), tuple(rows), text_columns=4
+
+
+def _contact(contact: xr.Dataset) -> Part:
+    """Return how often each pair of shapes touches and is nearest, and the rare contacts."""
+    if not contact:
+        return Part("Contact")
+    caption = (
+        "Contact by pair of shapes among the samples. A run may touch at several places. Nearest: "
+        "share of the runs in which the pair has the smallest gap. Intervals: 95 %, Clopper and "
+        "Pearson."
+    )
+    names = ("moving", "fixed", "touches", "lower", "upper", "nearest")
+    of = ("probability", "probability_lower", "probability_upper", "method", "touching")
+    tables = [
+        LabelledTable("contact", contact[[*names]].drop_vars("pair"), "Contact", caption),
+        LabelledTable("contact_probability", contact[[*of]]),
+    ]
+    return Part("Contact", tables, rare_sentences(contact))
+
+
+def _statistics(measures: xr.Dataset) -> tuple[TurnedTable, ...]:
+    """Return statistics of the measures, and the intervals of the percentiles."""
+    statistics = statistics_of(measures)
+    ends = [name for name in statistics["statistic"].values if name not in ("mean", "deviation")]
+    return (
+        TurnedTable(
+            "measures",
+            statistics.sel(statistic=[*STATISTICS]),
+            "Measures of the samples",
+            "Measures over all samples.",
+            words=WORDS,
+            is_in_terminal=True,
+        ),
+        TurnedTable(
+            "percentiles",
+            statistics.sel(statistic=ends),
+            "Percentiles",
+            "Percentiles with 95 % intervals of order statistics.",
+            words=WORDS,
+        ),
+    )
+
+
+def _indices(trials: ToleranceTrials, indices: xr.Dataset) -> tuple[LabelledTable, ...]:
+    """Return the Sobol indices; on the page the total ones, a column for each quantity."""
+    if not indices:
+        return ()
+    words = {v.name: v.quantity.words for v in trials.uncertain.variables} | _titles(trials)
+    caption = (
+        "Total Sobol indices of all measures. First-order indices and 95 % intervals are in "
+        "sobol.csv."
+    )
+    totals = indices[["total"]]
+    return (
+        LabelledTable("sobol", indices),
+        LabelledTable("total_indices", totals, "Total indices", caption, "quantity", words=words),
+    )
+
+
+def _quantities(trials: ToleranceTrials) -> LabelledTable:
+    """Return what scatters."""
+    variables = trials.uncertain.variables
+    texts = {
+        "what": [v.quantity.words for v in variables],
+        "keys": [", ".join(v.variation.keys) or "load" for v in variables],
+        "distribution": [v.text for v in variables],
+        "source": [v.source or MISSING for v in variables],
+    }
+    return LabelledTable(
+        "quantities",
+        xr.Dataset({name: ("quantity", column) for name, column in texts.items()}),
+        "Quantities",
+        "What scatters. Percents are of the machine's number.",
     )

@@ -1,26 +1,32 @@
 """The tolerance study: samples of an uncertain machine, contact, Sobol indices, limits."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from functools import cached_property
 
 import numpy as np
-import pandas as pd
 import xarray as xr
 
 from wm_drake.errors import InputError, Problem, input_error
-from wm_drake.parameters.tolerances import Limit, fraction
+from wm_drake.parameters.tolerances import LAUNDRY, Limit, fraction
 from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import Share, Unit
+from wm_drake.report.formatting import shape_name, significant
+from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures.responses import GAP, Response
+from wm_drake.studies.experiment import Experiment, responses
 from wm_drake.studies.tolerance.distributions import base_samples
 from wm_drake.studies.tolerance.rare import RareEvent, subset_simulation
-from wm_drake.studies.tolerance.sensitivity import Index, exchanged, sobol_indices
-from wm_drake.studies.tolerance.shares import SampleShare, bound_if_none, share_of
+from wm_drake.studies.tolerance.sensitivity import exchanged, sobol_indices
+from wm_drake.studies.tolerance.shares import (
+    PERCENTILES,
+    SampleShare,
+    bound_if_none,
+    percentile_of,
+    share_of,
+)
 from wm_drake.studies.tolerance.variables import UncertainMachine
-
-RunSamples: TypeAlias = Callable[[Iterable[Case], str], xr.Dataset]
-"""Function that runs cases and returns their table, given a word for what they are."""
 
 RARE = 1e-3
 """Share of runs with contact below which it is estimated by subset simulation."""
@@ -82,100 +88,38 @@ class ToleranceSettings:
             )
 
 
-@dataclass(frozen=True)
-class Contact:
-    """How often the tub group touches the housing.
+SMALLEST_GAP = "smallest_gap"
+"""Name of the smallest gap among the measures."""
 
-    Attributes:
-        estimate: Probability of contact.
-        lower, upper: Ends of its 95 % interval. If nothing touches, upper is the bound of the rule
-            of three.
-        method: CRUDE or SUBSET; CRUDE if the subset simulation ended without contact.
-        crude: Share of the samples.
-        pairs: Share of the samples by pair of shapes, the most frequent first; pairs that never
-            touch are left out.
-        nearest: Number of samples in which each pair has the smallest gap.
-        rare: Subset simulation; None if there was none.
-        rare_pairs: Share of the contacts that it found by pair, the most frequent first.
-    """
+PLACES = ("nearest_pair", "contact_gap")
+"""Variables of the table of runs that tell where the tub touches."""
 
-    estimate: float
-    lower: float
-    upper: float
-    method: str
-    crude: SampleShare
-    pairs: dict[str, SampleShare]
-    nearest: dict[str, int]
-    rare: RareEvent | None
-    rare_pairs: dict[str, float]
+PERCENT = Share()
+SHARE = Quantity("share", PERCENT, form=lambda value: significant(value, 3 if value >= 10.0 else 2))
+"""Share of runs, with two significant digits, three from 10 % on."""
+LIMIT_SHARE = Quantity("share", PERCENT, form=lambda value: significant(value, 3))
+WHOLE_SHARE = Quantity("share", PERCENT, 0)
+COUNT = Quantity("runs", decimals=0)
+INDEX = Quantity("index", decimals=2)
+GAP_SIZE = Quantity("smallest gap", Unit("m", "mm"), 1)
 
 
-@dataclass(frozen=True)
-class LimitVerdict:
-    """Judgement of a limit.
-
-    Attributes:
-        key: Name of the measure with its unit.
-        number: The limit. [unit of the measure]
-        allowed: Allowed share. [0 to 1]
-        broken: Share of runs that break it.
-        word: "pass" if the whole interval is allowed, "fail" if none of it is, else "undecided".
-    """
-
-    limit: Limit
-    key: str
-    number: float
-    allowed: float
-    broken: SampleShare
-    word: str
-
-
-@dataclass(frozen=True)
-class ToleranceStudy:
-    """Result of a tolerance study.
-
-    Attributes:
-        chosen: What is measured of each run.
-        scores: Scores of the samples. (samples, variables)
-        values: Measures of the samples by the names of `measure_key`; NaN where a run failed.
-        failed: Reason of each failed run, by number of the sample from 0.
-        contact: Contact; None if the SDF has no shapes.
-        indices: Sobol indices of each variable, by measure.
-        refused: Why there are no Sobol indices of some or all measures; "" if there are all.
-        verdicts: Judgements of limits.
-        runs: Number of all runs.
-    """
-
-    machine: UncertainMachine
-    settings: ToleranceSettings
-    chosen: tuple[Response, ...]
-    scores: FloatArray
-    values: pd.DataFrame
-    failed: dict[int, str]
-    contact: Contact | None
-    indices: dict[str, list[Index]]
-    refused: str
-    verdicts: tuple[LimitVerdict, ...]
-    runs: int
-
-
-def measure_key(response: Response) -> str:
-    """Return the name of a measure with its unit, such as smallest_gap_mm."""
-    name = "smallest_gap" if response.name == GAP else response.name
-    return f"{name}_{response.unit.shown.replace('*', '')}"
+def name_of(response: Response) -> str:
+    """Return the name of a measure in the datasets."""
+    return SMALLEST_GAP if response.name == GAP else response.name
 
 
 def limits_of(
     limits: Iterable[Limit], chosen: Sequence[Response]
 ) -> list[tuple[Limit, Response, float]]:
-    """Return each limit with its response and its number in the unit of the response.
+    """Return each limit with its response and its number. [SI]
 
     Raises:
         InputError: a limit names a response that is not measured, or has a wrong unit.
     """
     resolved, problems = [], []
     names = {response.name: response for response in chosen}
-    names |= {"smallest_gap": names[GAP]} if GAP in names else {}
+    names |= {SMALLEST_GAP: names[GAP]} if GAP in names else {}
     for place, limit in enumerate(limits):
         key = f"limits.{place}"
         response = names.get(limit.quantity)
@@ -188,8 +132,7 @@ def limits_of(
             problems.append(Problem("", f"{key}.quantity", message))
             continue
         try:
-            value = response.unit.from_si(response.unit.number(limit.text))
-            resolved.append((limit, response, value))
+            resolved.append((limit, response, response.unit.number(limit.text)))
         except ValueError as error:
             problems.append(Problem("", key, str(error)))
     if problems:
@@ -197,162 +140,293 @@ def limits_of(
     return resolved
 
 
-def run_tolerances(
-    machine: UncertainMachine,
-    chosen: tuple[Response, ...],
-    run: RunSamples,
-    settings: ToleranceSettings,
-    limits: Sequence[tuple[Limit, Response, float]] = (),
-) -> ToleranceStudy:
-    """Run a tolerance study.
-
-    Args:
-        limits: From `limits_of`.
-    """
-    trials = _Trials(machine, chosen, run, settings)
-    a, b = base_samples(machine.joint.size, settings.samples, settings.seed)
-    table = run(machine.cases(a), "samples")
-    values = _measures(table, chosen)
-    indices, refused, more = trials.indices(a, b, values)
-    contact = trials.contact(table)
-    rare = contact.rare.evaluations if contact and contact.rare else 0
-    return ToleranceStudy(
-        machine,
-        settings,
-        chosen,
-        a,
-        values,
-        _failed(table),
-        contact,
-        indices,
-        refused,
-        tuple(judged(values, *limit) for limit in limits),
-        settings.samples + more + rare,
-    )
-
-
-def judged(values: pd.DataFrame, limit: Limit, response: Response, number: float) -> LimitVerdict:
-    """Return the verdict on a limit. A run that failed breaks every limit.
-
-    Args:
-        values: Measures of the samples.
-        number: The limit. [unit of the response]
-    """
-    values_of_limit = values[measure_key(response)].to_numpy()
-    kept = values_of_limit >= number if limit.at_least is not None else values_of_limit <= number
-    broken, allowed = share_of(np.asarray(~kept)), fraction(limit.allowed_share, "allowed_share")
-    word = "pass" if broken.upper <= allowed else "fail" if broken.lower > allowed else "undecided"
-    return LimitVerdict(limit, measure_key(response), number, allowed, broken, word)
-
-
-def _failed(table: xr.Dataset) -> dict[int, str]:
-    return {i: str(reason) for i, reason in enumerate(table.diverged.values) if reason}
-
-
-def _measures(table: xr.Dataset, chosen: Sequence[Response]) -> pd.DataFrame:
-    """Return the measures of runs; NaN where a run failed."""
-    frame = pd.DataFrame({measure_key(r): r.values(table) for r in chosen})
-    frame.loc[list(_failed(table))] = np.nan
-    return frame
-
-
 @dataclass(frozen=True)
-class _Trials:
+class ToleranceTrials:
     """Runs of an uncertain machine.
 
     Attributes:
-        machine, chosen, run, settings: As for `run_tolerances`.
+        chosen: What is measured of each run.
+        about: Description in the tolerance file.
     """
 
-    machine: UncertainMachine
+    uncertain: UncertainMachine
     chosen: tuple[Response, ...]
-    run: RunSamples
+    experiment: Experiment
     settings: ToleranceSettings
+    about: str = ""
 
-    def indices(
-        self, a: FloatArray, b: FloatArray, values: pd.DataFrame
-    ) -> tuple[dict[str, list[Index]], str, int]:
-        """Return the Sobol indices by measure, why some are missing, and the number of runs.
+    @cached_property
+    def scores(self) -> tuple[FloatArray, FloatArray]:
+        """Independent scores A of the samples, and B for the Sobol indices. (samples, size)"""
+        size = self.uncertain.joint.size
+        return base_samples(size, self.settings.samples, self.settings.seed)
+
+    def runs(self, scores: FloatArray, what: str) -> xr.Dataset:
+        """Return the measures of samples over `sample`, numbers from 1; NaN if a run failed.
 
         Args:
-            a, b: Independent samples. (n, variables)
-            values: Measures at `a`.
+            scores: (n, size)
         """
-        count = self.settings.sensitivity
-        if not count:
-            return {}, "Sobol indices were not requested (--sensitivity 0).", 0
-        if self.machine.joint.factor is not None:
-            return {}, CORRELATED, 0
-        cases = self.machine.cases(exchanged(a[:count], b[:count]), self.settings.samples + 1)
-        at_others = _measures(self.run(cases, "sensitivity"), self.chosen)
-        estimated = {
-            str(name): sobol_indices(
-                values[name].to_numpy()[:count], at_others[name].to_numpy(), seed=self.settings.seed
-            )
-            for name in values
-        }
-        missing = ", ".join(name for name, indices in estimated.items() if indices is None)
-        reason = f"No Sobol indices of {missing}: a run failed, or the measure does not vary."
-        known = {name: indices for name, indices in estimated.items() if indices is not None}
-        return known, reason if missing else "", len(cases)
+        labels = {"sample": np.arange(1, len(scores) + 1)}
+        return self.experiment.over(labels, self.uncertain.cases(scores), what)
 
-    def contact(self, table: xr.Dataset) -> Contact | None:
-        """Return how often the tub touches. A run that failed counts as contact."""
-        if "contact_gap" not in table or not table.sizes.get("pair", 0):
-            return None
-        has_failed = table.diverged.values != ""
-        touches = (table.smallest_gap.values <= 0.0) | has_failed
-        crude = share_of(touches)
-        names = [str(name) for name in table.pair.values]
-        nearest = pd.Series(table.nearest_pair.values).dropna().astype(int).value_counts()
-        rare = None
-        if crude.estimate < RARE and self.settings.subset:
-            rare = subset_simulation(
-                self._gaps,
-                self.machine.joint.size,
-                samples=self.settings.subset,
-                seed=self.settings.seed,
-            )
-        if rare and rare.probability:
-            ends, method = (rare.probability, rare.lower, rare.upper), SUBSET
-        else:
-            upper = crude.upper if crude.count else bound_if_none(crude.samples)
-            ends, method = (crude.estimate, crude.lower, upper), CRUDE
-        return Contact(
-            *ends,
-            method,
-            crude,
-            touching_pairs(table),
-            {names[int(str(i))]: int(count) for i, count in nearest.items()},
-            rare,
-            self._rare_pairs(rare),
+    def samples(self) -> xr.Dataset:
+        """Run the samples.
+
+        Returns:
+            Over `sample`: the uncertain quantities and the chosen measures by their names,
+            `failed`, the reason if the run failed; with shapes `nearest_pair`, and over `pair` too
+            `contact_gap`, NaN where a pair does not touch. SI.
+        """
+        data = self.runs(self.scores[0], "samples")
+        values = self.uncertain.joint.values(self.scores[0])
+        pairs = zip(self.uncertain.variables, values.T, strict=True)
+        drawn = {v.name: v.quantity.variable("sample", column) for v, column in pairs}
+        places = data[[name for name in PLACES if name in data]]
+        return places.assign(drawn).assign(self.measures(data)).assign(failed=data.diverged)
+
+    def measures(self, data: xr.Dataset) -> dict[str, xr.DataArray]:
+        """Return the chosen measures of runs by their names."""
+        named = responses(data, self.chosen)
+        return {name_of(response): named[response.name] for response in self.chosen}
+
+    def indices(self, samples: xr.Dataset) -> xr.Dataset:
+        """Return the Sobol indices of each measure.
+
+        Args:
+            samples: As of `samples`.
+
+        Returns:
+            Over `measure` and `quantity`: `first`, the share of the variance that the quantity
+            causes alone, `total`, alone and together with others, and the ends of their 95 %
+            intervals, `first_lower` and so on. Attribute `refused`: why those of some or all
+            measures are missing, "" if none is.
+        """
+        count, (a, b) = self.settings.sensitivity, self.scores
+        if not count or self.uncertain.joint.factor is not None:
+            why = CORRELATED if count else "Sobol indices were not requested (--sensitivity 0)."
+            return xr.Dataset(attrs={"refused": why})
+        names = [variable.name for variable in self.uncertain.variables]
+        scores = exchanged(a[:count], b[:count]).reshape(len(names) + 1, count, -1)
+        # runs of one sample follow each other: those that differ in the laundry share a machine
+        cases = self.uncertain.cases(scores.swapaxes(0, 1).reshape(-1, len(names)), len(a) + 1)
+        labels = {"sample": range(count), "exchanged": ["all", *names]}
+        data = self.measures(self.experiment.over(labels, cases, "sensitivity"))
+        estimated = {}
+        for name, at_others in data.items():
+            at_a = samples[name].values[:count]
+            indices = sobol_indices(at_a, at_others.values.T.ravel(), seed=self.settings.seed)
+            if indices is not None:
+                estimated[name] = [vars(index) for index in indices]
+        missing = ", ".join(name for name in data if name not in estimated)
+        reason = f"No Sobol indices of {missing}: a run failed, or the measure does not vary."
+        return xr.Dataset(
+            {
+                part: INDEX.named(words).variable(
+                    ("measure", "quantity"), [[i[part] for i in of] for of in estimated.values()]
+                )
+                for part, words in INDICES.items()
+                if estimated
+            },
+            {"measure": list(estimated), "quantity": names},
+            {"refused": reason if missing else ""},
         )
 
-    def _rare_pairs(self, rare: RareEvent | None) -> dict[str, float]:
-        """Return the share of the contacts of the subset simulation by pair; its runs are repeated.
+    def contact(self, samples: xr.Dataset) -> xr.Dataset:
+        """Return how often the tub touches. A run that failed counts as contact.
 
-        A ledger has these runs, so that they cost nothing.
+        Args:
+            samples: As of `samples`.
+
+        Returns:
+            Over no dimension: `probability` of contact with the ends of its 95 % interval,
+            `probability_lower` and `probability_upper`, which is the bound of the rule of three if
+            nothing touches; `method`, `CRUDE` or `SUBSET`; `touching`, number of such samples.
+            Over `pair`, the most frequent first: as of `pairs_of`. With a subset simulation: over
+            `level`, its `threshold` [m]; `rare_runs`, `rare_smallest` gap of the last level [m],
+            `rare_deviation`, the coefficient of variation, and over `pair` `rare_touches`, share of
+            its contacts. Attribute `samples`: their number. Empty without shapes.
         """
-        if rare is None or not len(rare.failures):
-            return {}
-        table = self.run(self.machine.cases(rare.failures), "places of contact")
-        return {name: share.estimate for name, share in touching_pairs(table).items()}
+        if not samples.sizes.get("pair", 0):
+            return xr.Dataset()
+        has_failed = samples.failed.values != ""
+        crude = share_of((samples.smallest_gap.values <= 0.0) | has_failed)
+        ends, method, more = crude_ends(crude), CRUDE, {}
+        if crude.estimate < RARE and self.settings.subset:
+            settings, size = self.settings, self.uncertain.joint.size
+            rare = subset_simulation(self._gaps, size, samples=settings.subset, seed=settings.seed)
+            more = self._of_rare(rare, samples["pair"].values)
+            if rare.probability:
+                ends, method = (rare.probability, rare.lower, rare.upper), SUBSET
+        named = {
+            "probability": ("probability of contact", ends[0]),
+            "probability_lower": ("95 % from", ends[1]),
+            "probability_upper": ("to", ends[2]),
+        }
+        pairs = xr.Dataset(
+            {
+                **{name: SHARE.named(w).variable((), v) for name, (w, v) in named.items()},
+                "method": ((), method),
+                "touching": COUNT.named("samples that touch").variable((), crude.count),
+                **pairs_of(samples),
+                **more,
+            },
+            {"pair": samples["pair"].values},
+            {"samples": samples.sizes["sample"]},
+        )
+        seen = pairs.touches + pairs.nearest + pairs.get("rare_touches", 0.0) > 0.0
+        order = np.lexsort((-pairs.nearest.values, -pairs.touches.values))
+        return pairs.isel(pair=order[seen.values[order]])
+
+    def gaps_of_loads(self) -> xr.DataArray:
+        """Return the smallest gap of each load of the machine over `load`. [m]"""
+        loads, profile = self.uncertain.parameters.loads, self.uncertain.case.profile
+        cases = (Case(name, load, profile) for name, load in loads.items())
+        gaps = self.experiment.over({"load": list(loads)}, cases, "loads").smallest_gap
+        return gaps.assign_attrs(GAP_SIZE.attributes())
 
     def _gaps(self, scores: FloatArray) -> FloatArray:
         """Return the smallest gap at scores; NaN where a run failed. [m]"""
-        table = self.run(self.machine.cases(scores), "rare contact")
-        gap = np.asarray(table.smallest_gap.values)
-        return np.where(table.diverged.values != "", np.nan, gap)
+        return np.asarray(self.runs(scores, "rare contact").smallest_gap.values)
+
+    def _of_rare(self, rare: RareEvent, pairs: FloatArray) -> Mapping[str, xr.Variable]:
+        """Return what `contact` has of a subset simulation.
+
+        The runs that touch are repeated for the places of contact. A ledger has these runs, so that
+        they cost nothing.
+        """
+        touches = np.zeros(len(pairs))
+        if len(rare.failures):
+            data = self.runs(rare.failures, "places of contact")
+            touches = np.isfinite(data.contact_gap.values).mean(axis=0)
+        words = "share of the contacts of the last level"
+        return {
+            "threshold": GAP_SIZE.named("threshold").variable("level", rare.thresholds),
+            "rare_runs": COUNT.named("runs of the subset simulation").variable(
+                (), rare.evaluations
+            ),
+            "rare_smallest": GAP_SIZE.variable((), rare.smallest),
+            "rare_deviation": WHOLE_SHARE.named("coefficient of variation").variable(
+                (), rare.deviation
+            ),
+            "rare_touches": WHOLE_SHARE.named(words).variable("pair", touches),
+        }
 
 
-def touching_pairs(table: xr.Dataset) -> dict[str, SampleShare]:
-    """Return the share of runs in which each pair touches, the most frequent first.
+INDICES = {
+    "first": "first order",
+    "first_lower": "first order, from",
+    "first_upper": "first order, to",
+    "total": "total",
+    "total_lower": "total, from",
+    "total_upper": "total, to",
+}
+"""Words of the Sobol indices and of the ends of their intervals."""
 
-    Pairs that never touch are left out.
+
+def crude_ends(share: SampleShare) -> tuple[float, float, float]:
+    """Return a share with the ends of its interval; if it is 0, the end of the rule of three."""
+    upper = share.upper if share.count else bound_if_none(share.samples)
+    return share.estimate, share.lower, upper
+
+
+def pairs_of(samples: xr.Dataset) -> dict[str, xr.Variable]:
+    """Return over `pair` how often each pair of shapes touches and is the nearest one.
+
+    Returns:
+        `moving` and `fixed`, names of the shapes; `touches` and the ends of its 95 % interval,
+        `lower` and `upper`, NaN if it never touches; `nearest`.
     """
-    shares = {
-        str(name): share_of(np.isfinite(column))
-        for name, column in zip(table.pair.values, table.contact_gap.values.T, strict=True)
+    shares = [share_of(np.isfinite(column)) for column in samples.contact_gap.values.T]
+    ends = [(s.lower, s.upper) if s.count else (np.nan, np.nan) for s in shares]
+    lower, upper = np.array(ends).T
+    number = samples.nearest_pair.values
+    counts = np.bincount(number[np.isfinite(number)].astype(int), minlength=len(shares))
+    moving, fixed = zip(*(name.split("|") for name in samples["pair"].values.tolist()), strict=True)
+    numbers = {
+        "touches": ("touch", [share.estimate for share in shares]),
+        "lower": ("95 % from", lower),
+        "upper": ("to", upper),
+        "nearest": ("nearest", counts / len(number)),
     }
-    often = sorted((n for n in shares if shares[n].count), key=lambda n: -shares[n].count)
-    return {name: shares[name] for name in often}
+    texts = {"moving": ("moves with the tub", moving), "fixed": ("housing", fixed)}
+    return {
+        **{
+            name: xr.Variable("pair", list(map(shape_name, of)), Quantity(words).attributes())
+            for name, (words, of) in texts.items()
+        },
+        **{name: SHARE.named(w).variable("pair", values) for name, (w, values) in numbers.items()},
+    }
+
+
+def statistics_of(measures: xr.Dataset) -> xr.Dataset:
+    """Return mean, deviation and percentiles of measures, without runs that failed.
+
+    Returns:
+        The measures over `statistic`: `mean`, `deviation`, and percentiles such as `p5` with the
+        ends of their 95 % intervals, `p5_lower` and `p5_upper`.
+    """
+    columns: dict[str, xr.Variable] = {}
+    names: list[str] = []
+    for name, column in measures.items():
+        good = column.values[np.isfinite(column.values)]
+        numbers = {"mean": np.mean(good), "deviation": np.std(good)}
+        for percent in PERCENTILES:
+            of = percentile_of(good, percent)
+            ends = {"": of.value, "_lower": of.lower, "_upper": of.upper}
+            numbers |= {f"p{percent}{end}": value for end, value in ends.items()}
+        names = list(numbers)
+        columns[str(name)] = xr.Variable("statistic", list(numbers.values()), column.attrs)
+    return xr.Dataset(columns, {"statistic": names})
+
+
+def judged(measures: xr.Dataset, limits: Sequence[tuple[Limit, Response, float]]) -> xr.Dataset:
+    """Return the verdict on each limit. A run that failed breaks every limit.
+
+    Args:
+        measures: Measures over the samples; NaN where a run failed.
+        limits: As of `limits_of`.
+
+    Returns:
+        Over `row`: `quantity`, `limit`, `allowed` share, share that `breaks` it with the ends of
+        its 95 % interval, `lower` and `upper`, and `verdict`: "pass" if the whole interval is
+        allowed, "fail" if none of it is, else "undecided". Attribute `numbers`: limits by measure.
+        [SI]
+    """
+    rows, numbers = [], dict[str, list[float]]()
+    for limit, response, number in limits:
+        values, allowed = (
+            measures[name_of(response)].values,
+            fraction(limit.allowed_share, "allowed_share"),
+        )
+        side = "at least" if limit.at_least is not None else "at most"
+        kept = values >= number if limit.at_least is not None else values <= number
+        broken = share_of(~kept)
+        word = (
+            "pass" if broken.upper <= allowed else "fail" if broken.lower > allowed else "undecided"
+        )
+        words = (limit.quantity, f"{side} {limit.text}", word)
+        rows.append((*words, allowed, broken.estimate, broken.lower, broken.upper))
+        numbers.setdefault(name_of(response), []).append(number)
+    if not rows:
+        return xr.Dataset()
+    quantity, limit, verdict, *shares = zip(*rows, strict=True)
+    words = ("allowed", "break it", "95 % from", "to")
+    named = zip(("allowed", "breaks", "lower", "upper"), words, shares, strict=True)
+    return xr.Dataset(
+        {
+            "quantity": ("row", list(quantity)),
+            "limit": ("row", list(limit)),
+            **{name: LIMIT_SHARE.named(word).variable("row", share) for name, word, share in named},
+            "verdict": ("row", list(verdict)),
+        },
+        attrs={"numbers": numbers},
+    )
+
+
+def laundry_masses(samples: xr.Dataset) -> tuple[float, float] | None:
+    """Return the smallest and largest mass of the laundry of samples [kg]; None without it."""
+    if f"{LAUNDRY}.mass" not in samples:
+        return None
+    masses = samples[f"{LAUNDRY}.mass"]
+    return float(masses.min()), float(masses.max())

@@ -1,7 +1,6 @@
 """The task of the tolerance study: options and files checked, and runs."""
 
 from collections.abc import Sequence
-from functools import partial
 from typing import Any
 
 from wm_drake.engines.compiled.step_check import check_step
@@ -20,19 +19,21 @@ from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.measures.responses import Response, chosen_responses, has_gap, measures_of
 from wm_drake.simulation.steps import checked_step
+from wm_drake.studies.answer import Answer
 from wm_drake.studies.executor import Executor
+from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.inputs import existing_file, problems_of_file, profile_of
 from wm_drake.studies.run import machine_text
 from wm_drake.studies.study import Task
 from wm_drake.studies.tolerance.options import ToleranceOptions
-from wm_drake.studies.tolerance.page import ToleranceResult
+from wm_drake.studies.tolerance.page import tolerance_answer
 from wm_drake.studies.tolerance.study import (
     CONTACTS,
     DEFAULT,
     ToleranceSettings,
-    ToleranceStudy,
+    ToleranceTrials,
+    judged,
     limits_of,
-    run_tolerances,
 )
 from wm_drake.studies.tolerance.variables import UncertainMachine, uncertain_machine
 
@@ -89,27 +90,21 @@ class ToleranceTask(Task):
             "seed": str(self.settings.seed),
         }
 
-    def run(self, executor: Executor) -> ToleranceResult:
+    def trials(self, executor: Executor) -> ToleranceTrials:
+        """Return the runs of the uncertain machine."""
+        experiment = Experiment(self.machine, self.measures, executor.simulate)
+        about = self.tolerances.about
+        return ToleranceTrials(self.uncertain, self.responses, experiment, self.settings, about)
+
+    def run(self, executor: Executor) -> Answer:
         """Run samples, Sobol indices and rare contact, and the loads of the machine."""
-        result = self.sampled(executor)
-        return ToleranceResult(result, self.tolerances.about, self._gaps_of_loads(executor))
-
-    def sampled(self, executor: Executor) -> ToleranceStudy:
-        """Run samples, Sobol indices and rare contact."""
-        run = partial(executor.simulate, self.machine, self.measures)
-        return run_tolerances(self.uncertain, self.responses, run, self.settings, self.limits)
-
-    def _gaps_of_loads(self, executor: Executor) -> dict[str, float]:
-        """Return the smallest gap of each load of the machine; empty without shapes. [m]"""
-        if CONTACTS not in self.measures:
-            return {}
-        profile = self.uncertain.case.profile
-        loads = self.uncertain.parameters.loads
-        cases = [Case(name, load, profile) for name, load in loads.items()]
-        table = executor.simulate(self.machine, self.measures, cases, "loads")
-        good = table.diverged.values == ""
-        gaps = table.smallest_gap.values
-        return {n: float(g) for n, g, kept in zip(loads, gaps, good, strict=True) if kept}
+        trials = self.trials(executor)
+        samples = trials.samples()
+        indices, contact = trials.indices(samples), trials.contact(samples)
+        if contact:
+            contact = contact.assign(gap_of_load=trials.gaps_of_loads())
+        limits = judged(samples, self.limits)
+        return tolerance_answer(trials, samples, indices, contact, limits)
 
 
 def _measures(

@@ -3,7 +3,7 @@
 import dataclasses
 import itertools
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -26,6 +26,8 @@ from wm_drake.parameters.tolerances import LAUNDRY, TRUNCATED, Laundry, Spread, 
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Share, Unit
 from wm_drake.parameters.variation import change_of, changes_of, number_at, owned_twice
+from wm_drake.report.formatting import shape_name
+from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.tolerance.distributions import (
     Joint,
@@ -36,18 +38,19 @@ from wm_drake.studies.tolerance.distributions import (
     uniform,
 )
 
-KEPT_MACHINES = 2048
-"""How many machines are cached."""
+KEPT_MACHINES = 64
+"""How many machines are cached; samples with the same parts follow each other."""
 
-_LAUNDRY_UNITS: dict[str, Unit] = {
-    "mass": Unit("kg", "g"),
-    "angle": Unit("rad", "deg"),
-    "y": Unit("m", "mm"),
-    "radius": Unit("m", "mm"),
-    "second_share": Share(),
-    "second_angle": Unit("rad", "deg"),
-    "second_y": Unit("m", "mm"),
+_LAUNDRY = {
+    "mass": Quantity("mass of the laundry", Unit("kg", "g")),
+    "angle": Quantity("angle of the laundry", Unit("rad", "deg")),
+    "y": Quantity("axial place of the laundry", Unit("m", "mm")),
+    "radius": Quantity("radius of the laundry", Unit("m", "mm")),
+    "second_share": Quantity("share of the second lump", Share()),
+    "second_angle": Quantity("angle of the second lump", Unit("rad", "deg")),
+    "second_y": Quantity("axial place of the second lump", Unit("m", "mm")),
 }
+"""Quantities of the laundry by the fields of `Laundry`."""
 
 _TYPES = {
     "spring_types": (("springs", "type"),),
@@ -82,6 +85,14 @@ class UncertainVariable:
         return self.variation.name
 
     @property
+    def quantity(self) -> Quantity:
+        """Words and unit."""
+        kind, _, field = self.name.partition(".")
+        if kind == LAUNDRY and field in _LAUNDRY:
+            return _LAUNDRY[field]
+        return Quantity(shape_name(self.name.replace(".", " ")), self.variation.unit)
+
+    @property
     def is_laundry(self) -> bool:
         """Whether it is a quantity of the laundry."""
         return not self.variation.numbers
@@ -111,16 +122,8 @@ class UncertainMachine:
         default_factory=dict, init=False, repr=False, compare=False
     )
 
-    def laundry_masses(self, scores: FloatArray) -> tuple[float, float] | None:
-        """Return the smallest and largest mass of the laundry of samples [kg]; None without it."""
-        names = [variable.name for variable in self.variables]
-        if f"{LAUNDRY}.mass" not in names:
-            return None
-        masses = self.joint.values(scores)[:, names.index(f"{LAUNDRY}.mass")]
-        return float(masses.min()), float(masses.max())
-
-    def cases(self, scores: FloatArray, first: int = 1) -> list[Case]:
-        """Return the case of each sample.
+    def cases(self, scores: FloatArray, first: int = 1) -> Iterator[Case]:
+        """Yield the case of each sample.
 
         Args:
             scores: Independent standard normal scores. (n, variables)
@@ -129,11 +132,10 @@ class UncertainMachine:
         Raises:
             InputError: a sample is not a machine.
         """
-        cases = []
         for number, values in enumerate(self.joint.values(scores), start=first):
             with problems_at(f"sample {number}"):
-                cases.append(self._case(f"sample {number}", values.tolist()))
-        return cases
+                case = self._case(f"sample {number}", values.tolist())
+            yield case
 
     def _case(self, name: str, values: Sequence[float]) -> Case:
         pairs = list(zip(self.variables, values, strict=True))
@@ -319,7 +321,7 @@ def with_types_apart(
 def _laundry_variables(laundry: Laundry) -> tuple[list[UncertainVariable], list[Problem]]:
     variables, problems = [], []
     for field, spread in laundry.spreads().items():
-        name, unit = f"{LAUNDRY}.{field}", _LAUNDRY_UNITS[field]
+        name, unit = f"{LAUNDRY}.{field}", _LAUNDRY[field].unit
         variation = Variation(name, (), Change.VALUE, unit)
         try:
             change, values = changes_of(_places(spread), unit, name)

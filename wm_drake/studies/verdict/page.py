@@ -1,41 +1,28 @@
-"""What the verdict shows: terminal, JSON, files, and a page whose first screen is the answer."""
-
-from dataclasses import dataclass
-from typing import Any
+"""Show the verdict: a page whose first screen is the answer."""
 
 import numpy as np
-import pandas as pd
+import xarray as xr
 
-from wm_drake.parameters import MachineParameters
 from wm_drake.report import figure as fig
-from wm_drake.report.formatting import (
-    MM_PER_M,
-    RPM_PER_RAD_S,
-    listed,
-    number,
-    percent,
-    plain,
-    shape_name,
+from wm_drake.report.formatting import listed, percent, shape_name
+from wm_drake.report.labelled import LabelledTable, TurnedTable
+from wm_drake.report.quantity import SPEED, Quantity, shown, text_of
+from wm_drake.studies.answer import Answer, Part, Plot
+from wm_drake.studies.tolerance.page import masses_text
+from wm_drake.studies.verdict.study import (
+    FACTOR,
+    SMALLEST_GAP,
+    VerdictQuestion,
+    smallest,
+    words_of,
+    worst_of,
 )
-from wm_drake.report.page import Picture, Section, SectionedPage, picture
-from wm_drake.report.table import Column, Table, table_of
-from wm_drake.report.terminal import Printed
-from wm_drake.simulation.measures.responses import GAP, Response
-from wm_drake.studies.study import Facts, Result
-from wm_drake.studies.tolerance.words import masses_text
-from wm_drake.studies.verdict.study import Influence, LaundryGaps, Outcome
 
 MOST_NAMED = 3
 """Number of quantities that the answer names."""
 
 MOST_DRAWN = 12
 """Number of influences that the figure shows."""
-
-PARTS = {
-    "spring_types": "springs",
-    "damper_types": "dampers",
-    "bushing_types": "bushings of the dampers",
-}
 
 HOW_OTHERS_DIFFER = (
     "'wm-drake spin' runs the loads of the machine only and shows the motion over time. 'wm-drake "
@@ -45,400 +32,328 @@ HOW_OTHERS_DIFFER = (
 )
 """How the commands that also show a smallest gap differ."""
 
-
-@dataclass(frozen=True)
-class VerdictResult(Result):
-    """Result of a verdict.
-
-    Attributes:
-        clearance: Gap that must remain. [m]
-        change: Change of a part that was tried. [%]
-        base: Runs of the machine as it is.
-        influences: Of each part, the strongest first.
-        single: Best single change; None if none helps.
-        combination: Best combination of at least two changes; None if none is better.
-        laundry: Random laundry in the machine as it is.
-        laundry_changed: The same laundry with the best change; None without one.
-        about: Description of the laundry.
-        responses: Responses of the tables, with words and unit.
-        command: Command that gives a verdict on the machine again.
-    """
-
-    machine: MachineParameters
-    loads: tuple[str, ...]
-    clearance: float
-    change: float
-    base: Outcome
-    influences: tuple[Influence, ...]
-    single: Outcome | None
-    combination: Outcome | None
-    laundry: LaundryGaps
-    laundry_changed: LaundryGaps | None
-    about: str
-    responses: tuple[Response, ...]
-    command: str
-    runs: int
-
-    @property
-    def best(self) -> Outcome | None:
-        """Return the best change; None if none helps."""
-        return self.combination or self.single
-
-    @property
-    def is_clear(self) -> bool:
-        """Return whether all loads and all samples of the laundry keep the clearance."""
-        return self.smallest > self.clearance
-
-    @property
-    def smallest(self) -> float:
-        """Return the smallest gap of all loads and all samples of the laundry. [m]"""
-        return min(self.base.gap, float(self.laundry.gaps.min()))
-
-    @property
-    def word(self) -> str:
-        """Return the verdict in one or two words."""
-        if self.is_clear:
-            return "clear"
-        return "touches" if self.smallest <= 0.0 else "too near"
-
-    def tables(self) -> dict[str, pd.DataFrame]:
-        """Return gaps of the loads, influences, and the samples of the laundry."""
-        return {
-            "loads": loads_frame(self),
-            "influences": influences_frame(self),
-            "laundry": pd.DataFrame({"smallest_gap_mm": MM_PER_M * self.laundry.gaps}),
-        }
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the verdict for JSON."""
-        estimate, lower, upper = self.laundry.probability
-        changes = {"best_single_change": self.single, "best_combination": self.combination}
-        shown = {
-            "machine": self.machine.name,
-            "verdict": self.word,
-            "clearance_mm": MM_PER_M * self.clearance,
-            "smallest_gap_mm": MM_PER_M * self.base.gap,
-            "margin_mm": MM_PER_M * (self.base.gap - self.clearance),
-            "loads": loads_frame(self).to_dict("records"),
-            "laundry": {
-                "samples": len(self.laundry.gaps),
-                "probability": estimate,
-                "lower": lower,
-                "upper": upper,
-                "smallest_gap_mm": MM_PER_M * float(self.laundry.gaps.min()),
-            },
-            "deciding": influences_frame(self)[:MOST_NAMED].to_dict("records"),
-            **{
-                name: outcome
-                and {"set": dict(outcome.changes), "smallest_gap_mm": MM_PER_M * outcome.gap}
-                for name, outcome in changes.items()
-            },
-            "line_to_copy": line_to_copy(self),
-            "runs": self.runs,
-        }
-        return plain(shown)
-
-    def terminal(self) -> Printed:
-        """Yield the answer, then the loads."""
-        yield answer(self)
-        for word, text in facts_of(self):
-            yield f"{word}: {text}"
-        yield loads_table(self).terminal("Smallest gap of each load")
-
-    def page(self, facts: Facts) -> str:
-        """Return the page."""
-        made = [
-            ("Machine", self.machine.name),
-            ("Runs", f"{self.runs} in {facts.wall_s:.0f} s"),
-            ("Laundry", f"{self.about}; {len(self.laundry.gaps)} samples"),
-            *facts.rows(),
-        ]
-        return SectionedPage(
-            f"Verdict on machine {self.machine.name}",
-            answer(self),
-            [
-                Section("gaps", "Smallest gaps", (gaps_picture(self),)),
-                Section("influences", "What decides the gap", (influences_picture(self),)),
-                Section("loads", "Each load", tables=(loads_table(self),)),
-                Section("cost", "What the changes cost", tables=(cost_table(self),)),
-                Section("others", "Other commands with a smallest gap", text=HOW_OTHERS_DIFFER),
-            ],
-            made,
-            self.machine,
-            facts.warnings,
-            advice=Section("answer", "In short", facts=list(facts_of(self))),
-        ).html()
-
-    def failures(self) -> list[str]:
-        """Return one line if the tub touches, which makes the exit code 1."""
-        if self.is_clear:
-            return []
-        return [f"verdict: {self.word}"]
-
-
 LINE = "Line to copy"
 """Words before the command that runs the machine with the best change."""
 
+LAUNDRY = "random laundry"
 
-def answer(findings: VerdictResult) -> str:
+
+def verdict_answer(
+    question: VerdictQuestion,
+    states: xr.Dataset,
+    tried: xr.Dataset,
+    laundry: xr.Dataset,
+    masses: tuple[float, float] | None,
+) -> Answer:
+    """Return the answer.
+
+    Args:
+        states, tried, laundry: As of `states_of`, `influences` and `laundry_of` in
+            `wm_drake.studies.verdict.study`.
+        masses: Smallest and largest mass of the laundry [kg]; None if loads scatter in its place.
+    """
+    word = word_of(question, states, laundry)
+    samples = f"{laundry.sizes['sample']} samples"
+    return Answer(
+        f"Verdict on machine {question.machine.name}",
+        answer(question, states, laundry),
+        question.machine,
+        (
+            Part("Smallest gaps", (gaps_plot(question, states, laundry), *_laundry(laundry))),
+            Part("What decides the gap", influences_shown(question, states, tried)),
+            Part("Each load", (loads_table(question, states),)),
+            Part("What the changes cost", (cost_table(question, states),)),
+            Part("Other commands with a smallest gap", text=HOW_OTHERS_DIFFER),
+        ),
+        (("Laundry", f"{question.laundry}; {samples}"),),
+        short=Part(
+            "In short",
+            (LabelledTable("numbers", numbers_of(question, states, word)), changes_table(states)),
+            facts=facts_of(question, states, tried, laundry, masses),
+        ),
+        diverged=() if word == "clear" else (f"verdict: {word}",),
+    )
+
+
+def word_of(question: VerdictQuestion, states: xr.Dataset, laundry: xr.Dataset) -> str:
+    """Return the verdict in one or two words."""
+    least = min(smallest(states)[0].item(), laundry.smallest_gap[0].item())
+    if least > question.clearance:
+        return "clear"
+    return "touches" if least <= 0.0 else "too near"
+
+
+def answer(question: VerdictQuestion, states: xr.Dataset, laundry: xr.Dataset) -> str:
     """Return the answer in a sentence or two."""
-    base, laundry = findings.base, findings.laundry
-    if not np.isfinite(base.gap):
-        index = int(np.argmin(base.gaps))
-        return (
-            f"No verdict: the run of load {findings.loads[index]} failed, which counts as contact."
-        )
-    text = f"{_where(findings, base)}."
-    if base.gap <= 0.0:
+    base, gap = states.isel(state=0), smallest(states)[0].item()
+    nearest = base.isel(load=int(base.smallest_gap.fillna(-np.inf).argmin("load")))
+    load = nearest["load"].item()
+    if not np.isfinite(gap):
+        return f"No verdict: the run of load {load} failed, which counts as contact."
+    size = f"smallest gap {mm(gap)}" if gap > 0.0 else f"overlap of {mm(-gap)}"
+    text = f"{size}, between {_pair(nearest)}, with load {load} at {SPEED.text(nearest.gap_speed)}."
+    if gap <= 0.0:
         return f"The tub touches the housing: {text}"
-    count = int(np.sum(laundry.gaps <= 0.0))
-    if count:
+    gaps = laundry.gap[0].values
+    if count := int(np.sum(gaps <= 0.0)):
         return (
-            f"The tub touches the housing in {count} of {len(laundry.gaps)} runs with random "
-            f"laundry. With the loads of the machine it does not: {text}"
+            f"The tub touches the housing in {count} of {len(gaps)} runs with random laundry. With "
+            f"the loads of the machine it does not: {text}"
         )
     opening = "The tub does not touch the housing"
-    if not findings.is_clear:
-        opening += f", but it comes nearer than {_mm(findings.clearance)}"
+    if word_of(question, states, laundry) != "clear":
+        opening += f", but it comes nearer than {mm(question.clearance)}"
     return f"{opening}: {text}"
 
 
-def _where(findings: VerdictResult, outcome: Outcome) -> str:
-    """Return the smallest gap of all loads with its place, load and speed."""
-    index = int(np.argmin(outcome.gaps))
-    pair, speed = outcome.place(index)
-    size = f"smallest gap {_mm(outcome.gap)}"
-    if outcome.gap <= 0.0:
-        size = f"overlap of {_mm(-outcome.gap)}"
-    return (
-        f"{size}, between {_pair(pair)}, with load {findings.loads[index]} at "
-        f"{number(RPM_PER_RAD_S * speed, 0)} rpm"
-    )
+def _pair(run: xr.Dataset) -> str:
+    """Return the shapes of the smallest gap of a run in words; "" if it has none."""
+    number = run.nearest_pair.item()
+    if not np.isfinite(number):
+        return ""
+    return " and ".join(map(shape_name, run["pair"].values[int(number)].split("|")))
 
 
-def _pair(name: str) -> str:
-    return " and ".join(map(shape_name, name.split("|")))
+def mm(value: float) -> str:
+    """Return a length as text, without line breaks. [m]"""
+    return SMALLEST_GAP.text(value).replace(" ", "\u00a0")
 
 
-def _mm(value: float) -> str:
-    """Return a length as text; `value` in m."""
-    return f"{number(MM_PER_M * value)}\u00a0mm"
-
-
-def facts_of(findings: VerdictResult) -> list[tuple[str, str]]:
-    """Return the rest of the answer as pairs of word and text."""
-    f, named_influences = findings, findings.influences[:MOST_NAMED]
-    margin = f.base.gap - f.clearance
-    rows = [("Random laundry", laundry_text(f.laundry, f.about))]
-    heaviest = max(f.machine.loads[name].mass for name in f.loads)
-    if f.laundry.masses and f.laundry.masses[1] < heaviest:
-        compared = masses_text(f.machine, f.loads, f.laundry.masses)
+def facts_of(
+    question: VerdictQuestion,
+    states: xr.Dataset,
+    tried: xr.Dataset,
+    laundry: xr.Dataset,
+    masses: tuple[float, float] | None,
+) -> list[tuple[str, str]]:
+    """Return the rest of the answer as pairs of word and text; arguments as `verdict_answer`."""
+    loads, machine, clearance = states["load"].values.tolist(), question.machine, question.clearance
+    margin = smallest(states)[0].item() - clearance
+    rows = [("Random laundry", laundry_text(question, laundry.isel(state=0), question.laundry))]
+    if masses and masses[1] < max(machine.loads[name].mass for name in loads):
+        compared = masses_text(machine, loads, masses)
         rows.append(("Its mass", f"{compared} --laundry names a file with other laundry"))
-    if f.clearance:
+    if clearance:
         kept = "more" if margin > 0.0 else "less"
-        rows.append(("Margin", f"{_mm(abs(margin))} {kept} than the clearance, {_mm(f.clearance)}"))
+        rows.append(("Margin", f"{mm(abs(margin))} {kept} than the clearance, {mm(clearance)}"))
     else:
-        rows.append(("Margin", f"{_mm(margin)} to contact; --clearance '10 mm' sets another limit"))
-    if named_influences:
-        rows.append(("What decides it", "; ".join(map(influence_text, named_influences))))
-    if f.single is None:
-        none = f"no change of one part by {f.change:g} % makes the smallest gap larger"
+        rows.append(("Margin", f"{mm(margin)} to contact; --clearance '10 mm' sets another limit"))
+    if tried.sizes["key"]:
+        rows.append(("What decides it", _strongest(tried)))
+    if states.sizes["state"] == 1:
+        change = FACTOR.text(question.change)
+        none = f"no change of one part by {change} makes the smallest gap larger"
         return [*rows, ("What to change", none)]
-    rows.append(("Best single change", change_text(f, f.single)))
-    if f.combination:
-        rows.append(("Best combination", change_text(f, f.combination)))
-    else:
-        rows.append(("Best combination", "none is better than the best single change"))
-    if f.laundry_changed:
-        rows.append(("Random laundry then", laundry_text(f.laundry_changed)))
-    return [*rows, (LINE, line_to_copy(f))]
+    rows.append(("Best single change", change_text(question, states, tried, 1)))
+    best = "none is better than the best single change"
+    if states.sizes["state"] > 2:
+        best = change_text(question, states, tried, 2)
+    rows += [
+        ("Best combination", best),
+        ("Random laundry then", laundry_text(question, laundry.isel(state=1))),
+    ]
+    return [*rows, (LINE, line_to_copy(question, states))]
 
 
-def laundry_text(laundry: LaundryGaps, about: str = "") -> str:
+def laundry_text(question: VerdictQuestion, laundry: xr.Dataset, about: str = "") -> str:
     """Return probability and smallest gap of the samples."""
-    estimate, lower, upper = laundry.probability
-    what = "touch" if not laundry.clearance else f"keep less than {_mm(laundry.clearance)}"
-    count = int(np.sum(laundry.gaps <= laundry.clearance))
+    clearance = question.clearance
+    what = f"keep less than {mm(clearance)}" if clearance else "touch"
     of_what = f" ({about})" if about else ""
-    smallest = float(laundry.gaps.min())
-    gap = f"smallest gap {_mm(smallest)}" if np.isfinite(smallest) else "a run failed"
+    gap = laundry.smallest_gap.item()
+    least = f"smallest gap {mm(gap)}" if np.isfinite(gap) else "a run failed"
     return (
-        f"{count or 'none'} of {len(laundry.gaps)} runs{of_what} {what}; probability "
-        f"{100.0 * estimate:.2g} % (95 % interval {100.0 * lower:.2g} to {100.0 * upper:.2g} %); "
-        f"{gap}"
+        f"{int(laundry['count']) or 'none'} of {laundry.sizes['sample']} runs{of_what} {what}; "
+        f"probability {text_of(laundry.probability)} (95 % interval {text_of(laundry.lower)} to "
+        f"{text_of(laundry.upper)}); {least}"
     )
 
 
-def words_of(key: str) -> str:
-    """Return a number in words: `gasket.stiffness_x` becomes `stiffness along x of the gasket`."""
-    table, *middle, last = key.split(".")
-    field, _, axis = last.rpartition("_")
-    is_along = field and axis in ("x", "y", "z")
-    name = shape_name(field if is_along else last)
-    if is_along:
-        turns = "rotational" in name or "torque" in name
-        name = f"{name} {'about' if turns else 'along'} {axis}"
-    if table == "bodies":
-        return f"{name} of the {shape_name(middle[0])}"
-    if table == "gasket":
-        return f"{name} of the gasket"
-    of_part = f"{shape_name(middle[1])}s, " if len(middle) > 1 else ""
-    return f"{name} of the {of_part}{PARTS[table]} '{middle[0]}'"
+def _strongest(tried: xr.Dataset) -> str:
+    """Return what more and less of the strongest numbers do to the gap."""
+    of = tried.isel(key=slice(MOST_NAMED))
+    each = zip(of["key"].values.tolist(), smallest(of).values.tolist(), strict=True)
+    return "; ".join(
+        f"{words_of(key)} ({mm(less)} with less, {mm(more)} with more)"
+        for key, (less, more) in each
+    )
 
 
-def influence_text(influence: Influence) -> str:
-    """Return what more and less of a number do to the gap."""
-    ends = f"{_mm(influence.less.gap)} with less, {_mm(influence.more.gap)} with more"
-    return f"{words_of(influence.key)} ({ends})"
+def change_text(
+    question: VerdictQuestion, states: xr.Dataset, tried: xr.Dataset, state: int
+) -> str:
+    """Return a change with what it does to the smallest gap of all loads.
 
-
-def change_text(findings: VerdictResult, outcome: Outcome) -> str:
-    """Return a change with what it does to the smallest gap of all loads."""
+    Args:
+        state: Number of the state with the change.
+    """
     parts = []
-    for key, text in outcome.changes.items():
-        less = next(i.less for i in findings.influences if i.key == key)
-        change = -findings.change if less.changes[key] == text else findings.change
+    for key, text in states.attrs["changes"][state].items():
+        is_less = tried.text.sel(key=key, side="less").item() == text
+        change = percent(FACTOR.values(-question.change if is_less else question.change).item())
         new = "" if text.endswith("%") else f" to {text.replace('*', ' ')}"
-        parts.append(f"{words_of(key)} {percent(change)}{new}")
-    gap = f"{_mm(findings.base.gap)} becomes {_mm(outcome.gap)}"
+        parts.append(f"{words_of(key)} {change}{new}")
+    before, *after = smallest(states).values.tolist()
+    gap = f"{mm(before)} becomes {mm(after[state - 1])}"
     return f"{listed(parts)}: {gap}, verified by runs of all loads"
 
 
-def line_to_copy(findings: VerdictResult) -> str:
+def line_to_copy(question: VerdictQuestion, states: xr.Dataset) -> str:
     """Return the command that runs the machine with the best change; "" without one."""
-    if findings.best is None:
-        return ""
-    changes = [f'--set "{key}={text}"' for key, text in findings.best.changes.items()]
-    return " ".join([findings.command, *changes])
+    best = states.attrs["changes"][-1]
+    return " ".join([question.command, *_sets(best)]) if best else ""
 
 
-def loads_frame(findings: VerdictResult) -> pd.DataFrame:
-    """Return gap, place and speed of each load, before and after the best change."""
-    best = findings.best
-    rows = []
-    for index, load in enumerate(findings.loads):
-        pair, speed = findings.base.place(index)
-        changed = MM_PER_M * float(best.gaps[index]) if best else np.nan
-        row = {
-            "load": load,
-            "between": _pair(pair),
-            "speed_rpm": RPM_PER_RAD_S * speed,
-            "smallest_gap_mm": MM_PER_M * float(findings.base.gaps[index]),
-            "changed_gap_mm": changed,
+def _sets(changes: dict[str, str]) -> list[str]:
+    """Return the options of changes."""
+    return [f'--set "{key}={text}"' for key, text in changes.items()]
+
+
+def numbers_of(question: VerdictQuestion, states: xr.Dataset, word: str) -> xr.Dataset:
+    """Return the verdict, the gap and what is wanted, as single values."""
+    gap = smallest(states)[0].item()
+    lengths = {
+        "clearance": ("clearance", question.clearance),
+        "smallest_gap": ("smallest gap of all loads", gap),
+        "margin": ("margin", gap - question.clearance),
+    }
+    return xr.Dataset(
+        {
+            "verdict": ((), word),
+            **{n: SMALLEST_GAP.named(w).variable((), v) for n, (w, v) in lengths.items()},
+            "line_to_copy": ((), line_to_copy(question, states)),
         }
-        rows.append(row)
-    return pd.DataFrame(rows)
+    )
 
 
-def loads_table(findings: VerdictResult) -> Table:
-    """Return gap, place and speed of each load."""
-    caption = (
+def changes_table(states: xr.Dataset) -> LabelledTable:
+    """Return the best changes with the smallest gap of all loads; a file and JSON have it."""
+    changed = states.isel(state=slice(1, None))
+    sets = [" ".join(_sets(changes)) for changes in states.attrs["changes"][1:]]
+    gap = SMALLEST_GAP.variable("state", smallest(changed))
+    data = xr.Dataset({"sets": ("state", sets), "smallest_gap": gap})
+    return LabelledTable("changes", data.assign_coords(state=changed["state"].values))
+
+
+def loads_table(question: VerdictQuestion, states: xr.Dataset) -> LabelledTable:
+    """Return gap, place and speed of each load, before and after the best change."""
+    base, best = states.isel(state=0, drop=True), states.isel(state=-1)
+    runs = [base.isel(load=at) for at in range(base.sizes["load"])]
+    gaps = base.smallest_gap.fillna(-np.inf)
+    data = xr.Dataset(
+        {
+            "between": ("load", [_pair(run) for run in runs]),
+            "speed": SPEED.named("at").variable("load", base.gap_speed),
+            "smallest_gap": SMALLEST_GAP.variable("load", gaps),
+        },
+        {"load": base["load"].values},
+    )
+    if states.sizes["state"] > 1:
+        changed = SMALLEST_GAP.named("after the best change")
+        data["changed_gap"] = changed.variable("load", best.smallest_gap.fillna(-np.inf))
+    return LabelledTable(
+        "loads",
+        data.assign(is_too_small=gaps.drop_attrs() <= question.clearance),
+        "Smallest gap of each load",
         "Smallest gap between the parts that move with the tub and the housing. 0 and below: "
-        "contact; the model has no contact forces."
-    )
-    columns = {
-        "speed_rpm": Column("at", "rpm", 0),
-        "smallest_gap_mm": Column("smallest gap", "mm", 1),
-        "changed_gap_mm": Column("after the best change", "mm", 1),
-    }
-    alarm = ["alarm" if gap <= findings.clearance else "" for gap in findings.base.gaps]
-    return table_of(loads_frame(findings), caption, columns, alarm)
-
-
-def influences_frame(findings: VerdictResult) -> pd.DataFrame:
-    """Return the smallest gap of all loads with less and more of each number."""
-    return pd.DataFrame(
-        [
-            {
-                "quantity": words_of(influence.key),
-                "key": influence.key,
-                "gap_with_less_mm": MM_PER_M * influence.less.gap,
-                "gap_with_more_mm": MM_PER_M * influence.more.gap,
-            }
-            for influence in findings.influences
-        ],
-        columns=["quantity", "key", "gap_with_less_mm", "gap_with_more_mm"],
+        "contact; the model has no contact forces.",
+        marked=("is_too_small", "alarm"),
+        is_in_terminal=True,
     )
 
 
-def cost_table(findings: VerdictResult) -> Table:
-    """Return the largest values of all loads, before and after the changes."""
-    outcomes = {
-        "as it is": findings.base,
-        "best single change": findings.single,
-        "best combination": findings.combination,
-    }
-    rows = []
-    for response in findings.responses:
-        worst = np.min if response.name == GAP else np.max
-        values = [
-            float(worst(response.values(outcome.table))) if outcome else np.nan
-            for outcome in outcomes.values()
-        ]
-        rows.append([f"{response.title}, {response.unit_text}", *values])
-    caption = (
+def cost_table(question: VerdictQuestion, states: xr.Dataset) -> TurnedTable:
+    """Return the smallest gap and the largest other responses of all loads in each state."""
+    return TurnedTable(
+        "cost",
+        worst_of(question, states),
+        "Smallest gap and largest loads",
         "Smallest gap and largest displacements, forces of the gasket and forces of the mounts of "
-        "all loads. A change that keeps the tub away from the housing may load it more."
+        "all loads. A change that keeps the tub away from the housing may load it more.",
     )
-    columns = {name: Column(name, decimals=1) for name in outcomes}
-    return table_of(pd.DataFrame(rows, columns=["quantity", *outcomes]), caption, columns)
 
 
-def gaps_picture(findings: VerdictResult) -> Picture:
+def _laundry(laundry: xr.Dataset) -> tuple[LabelledTable, LabelledTable]:
+    """Return the samples and their probability of too small a gap; files have them."""
+    before = laundry[["gap"]].isel(state=0, drop=True).rename(gap="smallest_gap")
+    return (
+        LabelledTable("laundry", before, is_in_json=False),
+        LabelledTable("laundry_probability", laundry.drop_vars("gap")),
+    )
+
+
+def gaps_plot(question: VerdictQuestion, states: xr.Dataset, laundry: xr.Dataset) -> Plot:
     """Return the gaps of the loads and of the laundry, before and after the best change."""
-    f, best = findings, findings.best
-    sets = [(f.base, f.laundry, fig.OURS, "as it is", 0.13)]
-    if best and f.laundry_changed:
-        sets.append((best, f.laundry_changed, fig.QUIET, "after the best change", -0.13))
-    names = [*f.loads, "random laundry"]
-    largest = MM_PER_M * f.clearance
+    styles = ((0, fig.OURS, "as it is", 0.13), (-1, fig.QUIET, "after the best change", -0.13))
+    names = [*states["load"].values.tolist(), LAUNDRY]
+    clearance = SMALLEST_GAP.values(question.clearance).item()
     marks: list[fig.Mark] = [fig.Rule(0.0, "y", color=fig.MARK)]
-    if f.clearance:
-        marks.append(fig.Rule(largest, "y", color=fig.MEASURED, dash="dashed"))
-    for outcome, laundry, color, key, shift in sets:
-        gaps = MM_PER_M * np.array([*outcome.gaps, laundry.gaps.min()])
+    if clearance:
+        marks.append(fig.Rule(clearance, "y", color=fig.MEASURED, dash="dashed"))
+    largest = clearance
+    for state, color, key, shift in styles[: laundry.sizes["state"]]:
+        of_loads, of_laundry = states.smallest_gap[state].values, laundry.smallest_gap[state].item()
+        gaps = SMALLEST_GAP.values([*of_loads, of_laundry])
         at = np.arange(len(gaps), dtype=float)[::-1] + shift
-        shown = np.isfinite(gaps)
-        ends = (np.zeros(shown.sum()), at[shown]), (gaps[shown], at[shown])
+        known = np.isfinite(gaps)
+        ends = (np.zeros(known.sum()), at[known]), (gaps[known], at[known])
         marks.append(fig.segments(*ends, color=color, width=4.0))
-        marks.append(fig.Points(gaps[shown], at[shown], color=color, size=9.0, key=key))
-        for gap, place in zip(gaps[shown], at[shown], strict=True):
-            end, text = max(float(gap), 0.0), f"{number(float(gap))} mm"
-            marks.append(fig.Text(end, float(place), text, across="left", shift=(10.0, 0.0)))
+        marks.append(fig.Points(gaps[known], at[known], color=color, size=9.0, key=key))
+        for gap, place in zip(gaps[known].tolist(), at[known].tolist(), strict=True):
+            end, text = max(gap, 0.0), SMALLEST_GAP.text(SMALLEST_GAP.to_si(gap))
+            marks.append(fig.Text(end, place, text, across="left", shift=(10.0, 0.0)))
             largest = max(largest, end)
     y = fig.Axis(
         ticks=fig.named(names, np.arange(len(names))[::-1]), has_grid=False, has_line=False
     )
-    x = fig.Axis(label="smallest gap, mm (0: the parts touch)", range=(None, 1.12 * largest))
+    x = fig.Axis(label=f"{SMALLEST_GAP.label} (0: the parts touch)", range=(None, 1.12 * largest))
     figure = fig.Figure(panels=(fig.Panel(marks=tuple(marks), x=x, y=y),), height=46.0 * len(names))
-    caption = (
+    return Plot(
+        figure,
+        f"Smallest gaps; the smallest one is {mm(smallest(states)[0].item())}.",
         "Smallest gap of each load of the machine, and of all samples of random laundry. Dashed: "
-        "the clearance wanted."
+        "the clearance wanted.",
     )
-    return picture(figure, f"Smallest gaps; the smallest one is {_mm(f.base.gap)}.", caption)
 
 
-def influences_picture(findings: VerdictResult) -> Picture:
+def influences_shown(
+    question: VerdictQuestion, states: xr.Dataset, tried: xr.Dataset
+) -> tuple[Plot, LabelledTable]:
     """Return the smallest gap of all loads with less and more of each part."""
-    drawn = findings.influences[:MOST_DRAWN]
-    at = np.arange(len(drawn), dtype=float)[::-1]
-    less, more = (
-        MM_PER_M * np.array([getattr(influence, end).gap for influence in drawn])
-        for end in ("less", "more")
-    )
+    gaps, keys = smallest(tried), tried["key"].values.tolist()
+    sides = {
+        side: SMALLEST_GAP.named(f"gap with {side}").variable("key", gaps.sel(side=side))
+        for side in ("less", "more")
+    }
+    drawn = {side: shown(xr.DataArray(column))[:MOST_DRAWN] for side, column in sides.items()}
+    at = np.arange(len(drawn["less"]), dtype=float)[::-1]
+    change = FACTOR.text(question.change)
+    base = SMALLEST_GAP.values(smallest(states)[0]).item()
+    less, more = drawn["less"], drawn["more"]
     marks = (
-        fig.Rule(MM_PER_M * findings.base.gap, "y", color=fig.MARK),
+        fig.Rule(base, "y", color=fig.MARK),
         fig.segments((less, at), (more, at), color=fig.QUIET, width=3.0),
-        fig.Points(less, at, color=fig.MEASURED, size=9.0, key=f"{findings.change:g} % less"),
-        fig.Points(more, at, color=fig.OURS, size=9.0, key=f"{findings.change:g} % more"),
+        fig.Points(less, at, color=fig.MEASURED, size=9.0, key=f"{change} less"),
+        fig.Points(more, at, color=fig.OURS, size=9.0, key=f"{change} more"),
     )
-    y = fig.Axis(ticks=fig.named([words_of(i.key) for i in drawn], at), has_grid=False)
-    panel = fig.Panel(marks=marks, x=fig.Axis(label="smallest gap of all loads, mm"), y=y)
-    figure = fig.Figure(panels=(panel,), height=28.0 * len(drawn) + 30.0)
-    caption = (
-        f"Smallest gap of all loads if one number of a part is {findings.change:g} % smaller or "
-        "larger; line: the machine as it is. Springs, dampers, bushings, gasket and "
-        "counterweights are tried; a curve of forces is scaled. influences.csv has all of them."
+    words = [words_of(key) for key in keys]
+    panel = fig.Panel(
+        marks=marks,
+        x=fig.Axis(label=SMALLEST_GAP.named("smallest gap of all loads").label),
+        y=fig.Axis(ticks=fig.named(words[:MOST_DRAWN], at), has_grid=False),
     )
-    named_first = "; ".join(map(influence_text, drawn[:MOST_NAMED]))
-    return picture(figure, f"Influence of the parts. Strongest: {named_first}.", caption)
+    plot = Plot(
+        fig.Figure(panels=(panel,), height=28.0 * len(at) + 30.0),
+        f"Influence of the parts. Strongest: {_strongest(tried)}.",
+        f"Smallest gap of all loads if one number of a part is {change} smaller or larger; line: "
+        "the machine as it is. Springs, dampers, bushings, gasket and counterweights are tried; a "
+        "curve of forces is scaled. influences.csv has all of them.",
+    )
+    data = xr.Dataset(
+        {
+            "quantity": ("key", words, Quantity("quantity").attributes()),
+            **{f"gap_with_{side}": column for side, column in sides.items()},
+        },
+        {"key": keys},
+    )
+    return plot, LabelledTable("influences", data)

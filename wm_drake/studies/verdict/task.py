@@ -2,8 +2,6 @@
 
 from typing import Any
 
-import numpy as np
-
 from wm_drake.errors import input_error, problems_at
 from wm_drake.model.bodies import with_sdf_values
 from wm_drake.model.build import build_machine
@@ -12,15 +10,28 @@ from wm_drake.model.sdf_names import sdf_names
 from wm_drake.parameters import with_values
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.measures.responses import GAP, has_gap, known_responses, measures_of
+from wm_drake.studies.answer import Answer
 from wm_drake.studies.executor import Executor
+from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.inputs import profile_of, selected_cases
-from wm_drake.studies.study import Result, Task
+from wm_drake.studies.study import Task
 from wm_drake.studies.tolerance.options import ToleranceOptions
-from wm_drake.studies.tolerance.study import CONTACTS
+from wm_drake.studies.tolerance.study import CONTACTS, laundry_masses
 from wm_drake.studies.tolerance.task import ToleranceTask
 from wm_drake.studies.verdict.options import VerdictOptions
-from wm_drake.studies.verdict.page import VerdictResult
-from wm_drake.studies.verdict.study import COUNTERWEIGHT, MM, LaundryGaps, VerdictTrials, changeable
+from wm_drake.studies.verdict.page import verdict_answer
+from wm_drake.studies.verdict.study import (
+    COUNTERWEIGHT,
+    FACTOR,
+    SMALLEST_GAP,
+    STATES,
+    VerdictQuestion,
+    changeable,
+    combined,
+    influences,
+    laundry_of,
+    states_of,
+)
 
 NO_SHAPES = "the SDF has no shapes on both tub and housing, so no verdict can be given"
 
@@ -70,43 +81,31 @@ class VerdictTask(Task):
         """Return what determines the runs."""
         return {**self.laundry.identity, "change": f"{self.options.change:g} %"}
 
-    def run(self, executor: Executor) -> Result:
+    def run(self, executor: Executor) -> Answer:
         """Run the loads, the changes, and the laundry before and after the best change."""
-        parameters = self.machine.parameters
-        trials = VerdictTrials(self.machine, self.cases, self.measures, executor)
-        (base,) = trials.outcomes([{}], "loads")
-        laundry = self._samples(self.laundry, executor)
-        influences = trials.influences(changeable(parameters), self.options.change)
-        steps = trials.combined(base, influences)
-        changed = None
+        parameters, change = self.machine.parameters, FACTOR.to_si(self.options.change).item()
+        experiment = Experiment(self.machine, self.measures, executor.simulate, tuple(self.cases))
+        base = experiment.at(STATES[:1], [parameters], "loads").isel(point=0, drop=True)
+        samples = [self.laundry.trials(executor).samples()]
+        tried = influences(experiment, changeable(parameters), change)
+        steps = combined(experiment, base, tried)
         if steps:
-            better = build_machine(with_values(parameters, steps[-1].changes))
-            changed = self._samples(self._laundry(better), executor)
-        return VerdictResult(
+            better = build_machine(with_values(parameters, steps[-1].attrs["changes"]))
+            samples.append(self._laundry(better).trials(executor).samples())
+        question = VerdictQuestion(
             parameters,
-            tuple(case.name for case in self.cases),
             self.clearance,
-            self.options.change,
-            base,
-            tuple(influences),
-            steps[0] if steps else None,
-            steps[-1] if len(steps) > 1 else None,
-            laundry,
-            changed,
-            self.laundry.tolerances.about,
+            change,
             self.responses,
+            self.laundry.tolerances.about,
             self._command,
-            executor.runs,
         )
-
-    def _samples(self, task: ToleranceTask, executor: Executor) -> LaundryGaps:
-        """Return the gaps of the samples of a tolerance study."""
-        result = task.sampled(executor)
-        (gaps,) = (column for _, column in result.values.items())
-        return LaundryGaps(
-            np.nan_to_num(1e-3 * gaps.to_numpy(), nan=-np.inf),
-            self.clearance,
-            result.machine.laundry_masses(result.scores),
+        return verdict_answer(
+            question,
+            states_of(base, steps),
+            tried,
+            laundry_of(samples, self.clearance),
+            laundry_masses(samples[0]),
         )
 
 
@@ -114,7 +113,7 @@ def _length(text: str) -> float:
     """Return a clearance. [m]"""
     with problems_at("--clearance", ""):
         try:
-            clearance = MM.number(text)
+            clearance = SMALLEST_GAP.unit.number(text)
         except ValueError as error:
             raise input_error(str(error)) from None
         if not 0.0 <= clearance < 1.0:

@@ -162,7 +162,7 @@ async function runPicture(number) {
     refused = '';
     showPicture();
     showProblems([], found.warnings);
-    status(`${fixed(performance.now() - begin, 0)} ms · ${found.stepping.integrator}, ${digits(found.stepping.step_ms, 3)} ms steps`);
+    status(`${fixed(performance.now() - begin, 0)} ms · ${found.stepping.integrator}, steps of ${found.stepping.step}`);
   } catch (error) {
     if (number === asked) showRefusal(error);
   } finally {
