@@ -45,7 +45,11 @@ class Quantity:
     @property
     def unit_text(self) -> str:
         """Unit for reading, without line breaks: `N m`."""
-        return self.unit.label.replace(" ", "\u00a0")
+        return self._unit.replace(" ", "\u00a0")
+
+    @property
+    def _unit(self) -> str:
+        return self.unit.label.replace("^2", "²").replace("^3", "³")
 
     @property
     def label(self) -> str:
@@ -81,7 +85,7 @@ class Quantity:
 
     def text(self, value: Any) -> str:
         """Return an SI value as text with its unit."""
-        return f"{self.number(value)} {self.unit.label}".rstrip()
+        return f"{self.number(value)} {self._unit}".rstrip()
 
     def variable(self, dims: str | Sequence[str], values: Any) -> "xr.Variable":
         """Return values in SI as a variable that carries this quantity."""
