@@ -32,7 +32,14 @@ from wm_drake.studies.calibrate.tables import (
     responses_shown,
 )
 from wm_drake.studies.modes.natural import natural_modes
-from wm_drake.studies.spin.data import OURS, amplitudes_of, differences_of, experiment_of, gaps_of
+from wm_drake.studies.spin.data import (
+    OURS,
+    amplitudes_of,
+    differences_of,
+    experiment_of,
+    gaps_of,
+    row_of,
+)
 from wm_drake.studies.spin.figures import envelopes_figure
 from wm_drake.studies.spin.page import amplitude_tables, gaps_table, sensors_table
 from wm_drake.studies.spin.study import (
@@ -437,9 +444,8 @@ def _errors_picture(best: SpinRuns, amplitudes: xr.Dataset) -> Picture:
     others = [name for name in dict.fromkeys(differences.source.values.tolist()) if name != OURS]
 
     def errors(case: CaseResult, source: str) -> np.ndarray | None:
-        labels = {"load": case.case.name, "gasket": case.record.attrs["gasket"], "source": source}
-        found = np.logical_and.reduce([differences[n].values == of for n, of in labels.items()])
-        return shown(differences.difference[int(found.argmax())]) if found.any() else None
+        row = row_of(differences, case, source)
+        return None if row is None else shown(row.difference)
 
     rows = []
     for case in best.results:

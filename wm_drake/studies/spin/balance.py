@@ -40,8 +40,11 @@ BALLS = (
 def balances(runs: SpinRuns) -> list[tuple[str, CaseResult, Balance]]:
     """Return label, case and balance of the cases of a machine with rings that have samples."""
     every = zip(runs.labels, runs.results, strict=True)
-    found = [(n, c, balance_of(c.case, runs.parameters, c.record)) for n, c in every]
-    return [(name, case, balance) for name, case, balance in found if balance is not None]
+    return [
+        (name, case, balance)
+        for name, case in every
+        if (balance := balance_of(case.case, runs.parameters, case.record))
+    ]
 
 
 def balance_parts(runs: SpinRuns) -> tuple[Part, Part]:
@@ -72,15 +75,15 @@ def of_planes(label: str, balance: Balance) -> xr.Dataset:
     """Return the unbalance in each plane: of the load, largest, and at the end of the run."""
     planes = len(balance.planes)
     at = balance.size.argmax(axis=0)
-    end, alone = balance.at_end, balance.load_size
+    end, of_load = balance.at_end, balance.load_size
     return rows_of(
         {"load": [label] * planes, "plane": balance.rings},
-        load_alone=UNBALANCE.named("load alone").variable("row", alone),
+        load_alone=UNBALANCE.named("load alone").variable("row", of_load),
         largest=UNBALANCE.named("largest").variable("row", balance.size.max(axis=0)),
         speed=SPEED.named("at").variable("row", balance.speed[at]),
         end=REMAINING.variable("row", end),
         smaller_from=SPEED.named("smaller from").variable("row", [balance.balanced_from] * planes),
-        is_worse=("row", (end > alone) & (end > SMALLEST)),
+        is_worse=("row", (end > of_load) & (end > SMALLEST)),
     )
 
 

@@ -387,9 +387,9 @@ def _measured(variants: Variants, cases: Mapping[str, CaseResult]) -> dict[str, 
     """Return the measured amplitudes of cases by variant; equal ones only once. [m]"""
     different: dict[str, xr.DataArray] = {}
     for name, case in cases.items():
-        found = experiment_of(amplitudes_of(variants[name]), case)
-        if found is not None and not any(found.equals(other) for other in different.values()):
-            different[name] = found.drop_vars(["load", "gasket", "source"])
+        size = experiment_of(amplitudes_of(variants[name]), case)
+        if size is not None and not any(size.equals(other) for other in different.values()):
+            different[name] = size
     return different
 
 

@@ -64,15 +64,23 @@ def amplitudes_of(runs: SpinRuns) -> xr.Dataset:
     return data.assign_coords(sensor=sensors)
 
 
+def row_of(data: xr.Dataset, case: CaseResult, source: str) -> xr.Dataset | None:
+    """Return the row of a case and source of `amplitudes_of` or `differences_of`; None without."""
+    labels = {"load": case.case.name, "gasket": case.record.attrs["gasket"], "source": source}
+    rows = np.logical_and.reduce([data[name].values == label for name, label in labels.items()])
+    if not rows.any():
+        return None
+    return data.isel(row=int(rows.argmax())).drop_vars(list(labels))
+
+
 def experiment_of(amplitudes: xr.Dataset, case: CaseResult) -> xr.DataArray | None:
     """Return the measured amplitudes (sensor) of a case; None if there are none. [m]
 
     Args:
         amplitudes: As of `amplitudes_of`.
     """
-    labels = {"load": case.case.name, "gasket": case.record.attrs["gasket"], "source": EXPERIMENT}
-    found = np.logical_and.reduce([amplitudes[name].values == of for name, of in labels.items()])
-    return amplitudes.amplitude[int(found.argmax())] if found.any() else None
+    row = row_of(amplitudes, case, EXPERIMENT)
+    return None if row is None else row.amplitude
 
 
 def differences_of(amplitudes: xr.Dataset) -> xr.Dataset:
@@ -123,8 +131,7 @@ def of_sensors(runs: SpinRuns) -> xr.Dataset:
 def gaps_of(runs: SpinRuns) -> xr.Dataset:
     """Return the smallest gap of each load that has one: parts, size, speed, time and place."""
     every = zip(runs.labels, runs.results, strict=True)
-    found = [(label, case, case.measures.smallest_gap) for label, case in every]
-    known = [(label, case, gap) for label, case, gap in found if gap is not None]
+    known = [(name, case, gap) for name, case in every if (gap := case.measures.smallest_gap)]
     gaps = [gap for _, _, gap in known]
     size = of_measure("smallest_gap").variable("load", [gap.distance for gap in gaps])
     speeds = [case.speed_at(gap.time) for _, case, gap in known]

@@ -38,6 +38,7 @@ from wm_drake.studies.spin.data import (
     mounts_of,
     of_sensors,
     profiles_of,
+    row_of,
     rows_of,
 )
 from wm_drake.studies.spin.drive import capture_warnings, drive_in_short, drive_parts
@@ -308,25 +309,21 @@ def _case_facts(case: CaseResult) -> str:
 def _agreement(runs: SpinRuns, cases: list[CaseResult], amplitudes: xr.Dataset) -> str:
     """Return how far the computed amplitudes are from measured ones, or why that is not known."""
     changes = differences_of(amplitudes)
-    names = {(case.case.name, case.record.attrs["gasket"]) for case in cases}
-    keys = zip(changes["load"].values, changes.gasket.values, changes.source.values, strict=True)
-    ours = [(name, gasket) in names and source == OURS for name, gasket, source in keys]
-    found = changes.difference[np.array(ours, dtype=bool)].stack(place=("row", "sensor"))
-    found = found[np.isfinite(found.values)]
-    if not found.size:
+    rows = {case.title: row_of(changes, case, OURS) for case in cases}
+    of_cases = {title: row.difference for title, row in rows.items() if row is not None}
+    if not of_cases:
         return _why_not_compared(runs)
-    worst = found[int(np.abs(found.values).argmax())]
-    mean = Quantity("", CHANGE.unit, 0).text(abs(found).mean())
-    title = next(
-        case.title
-        for case in cases
-        if case.case.name == worst["load"].item()
-        and case.record.attrs["gasket"] == worst.gasket.item()
-    )
+    joined = xr.concat([*of_cases.values()], xr.Variable("case", [*of_cases]))
+    places = joined.stack(place=("case", "sensor"))
+    compared = places[np.isfinite(places.values)]
+    if not compared.size:
+        return _why_not_compared(runs)
+    worst = compared[int(np.abs(compared.values).argmax())]
+    mean = Quantity("", CHANGE.unit, 0).text(abs(compared).mean())
     return (
-        f"{found.size} amplitudes can be compared with the experiment. The mean absolute "
+        f"{compared.size} amplitudes can be compared with the experiment. The mean absolute "
         f"difference is {mean}. The largest difference is {CHANGE.text(worst)}, at sensor "
-        f"{worst.sensor.item()} with load {title}."
+        f"{worst.sensor.item()} with load {worst.case.item()}."
     )
 
 
