@@ -120,14 +120,17 @@ class TurnedTable(LabelledTable):
 
 def _rows(data: xr.Dataset) -> pd.DataFrame:
     """Return a row for each place of a dataset that has a value, in units for reading."""
-    values = data.map(_in_reading_unit).assign_coords(
-        {name: _in_reading_unit(coordinate) for name, coordinate in data.coords.items()}
-    )
-    if not values.sizes:
-        values = values.expand_dims("place")
-    frame = values.to_dataframe(dim_order=list(values.sizes)).dropna(how="all").reset_index()
-    unnamed = [str(name) for name in values.sizes if name not in data.coords]
-    return frame[[*_labels_first(frame.drop(columns=unnamed), data)]]
+    dims = [str(dim) for dim in data.sizes]
+    names = [dim for dim in dims if dim in data.coords]
+    others = [str(name) for name in data.variables if name not in data.sizes]
+    # many times as fast as `Dataset.to_dataframe`
+    columns = {
+        name: _in_reading_unit(data[name]).variable.set_dims(data.sizes).transpose(*dims).values
+        for name in (*names, *others)
+    }
+    frame = pd.DataFrame({name: values.ravel() for name, values in columns.items()})
+    frame = frame.dropna(how="all", subset=others).reset_index(drop=True)
+    return frame[[*_labels_first(frame, data)]]
 
 
 def _labels_first(frame: pd.DataFrame, data: xr.Dataset) -> Sequence[str]:

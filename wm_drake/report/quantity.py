@@ -122,20 +122,27 @@ def quantity_of(array: "xr.DataArray") -> Quantity:
     if "quantity" in array.attrs:
         quantity: Quantity = array.attrs["quantity"]
         return quantity
-    return _of_measures().get(str(array.name)) or Quantity(str(array.name).replace("_", " "))
+    return _of_measure(str(array.name)) or Quantity(str(array.name).replace("_", " "))
 
 
 def of_measure(name: str) -> Quantity:
-    """Return the quantity of a variable of a measure by its name."""
-    return _of_measures()[name]
+    """Return the quantity of a variable of a measure by its name.
+
+    Raises:
+        KeyError: no measure has the variable.
+    """
+    quantity = _of_measure(name)
+    if quantity is None:
+        raise KeyError(name)
+    return quantity
 
 
-def _of_measures() -> dict[str, Quantity]:
-    """Return the quantities of all measures by the names of their variables."""
+def _of_measure(name: str) -> Quantity | None:
     from wm_drake.simulation.measures import MEASURES  # registered ones too, so at each call
 
-    variables = [variable for measure in MEASURES.values() for variable in measure.variables]
-    return {v.name: Quantity(v.kind, v.unit, v.studio) for v in variables}
+    variables = (variable for measure in MEASURES.values() for variable in measure.variables)
+    known = next((variable for variable in variables if variable.name == name), None)
+    return known and Quantity(known.kind, known.unit, known.studio)
 
 
 def shown(array: "xr.DataArray") -> FloatArray:
