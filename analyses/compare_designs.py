@@ -101,8 +101,8 @@ def main() -> None:
             | errors
         )
     text = pd.DataFrame(rows).round(2).to_string(index=False)
-    least = f"{100.0 * SMALLEST_SHARE:g} %"
-    print(f"contributions above {least}, largest error in percentage points\n{text}")
+    smallest = 100.0 * SMALLEST_SHARE
+    print(f"contributions above {smallest:g} %, largest error in percentage points\n{text}")
     if arguments.out:
         arguments.out.write_text(text + "\n")
 

@@ -55,7 +55,11 @@ class Quantity:
     @property
     def unit_text(self) -> str:
         """Unit for reading, without line breaks: `N m`."""
-        return self.reading.label.replace(" ", "\u00a0")
+        return self._unit.replace(" ", "\u00a0")
+
+    @property
+    def _unit(self) -> str:
+        return self.reading.label.replace("^2", "²").replace("^3", "³")
 
     @property
     def label(self) -> str:
@@ -92,7 +96,7 @@ class Quantity:
 
     def text(self, value: Any) -> str:
         """Return an SI value as text with its unit."""
-        return f"{self.number(value)} {self.reading.label}".rstrip()
+        return f"{self.number(value)} {self._unit}".rstrip()
 
     @property
     def _decimals(self) -> int | None:
@@ -157,6 +161,18 @@ def quantity_of(array: "xr.DataArray") -> Quantity:
         quantity: Quantity = array.attrs["quantity"]
         return quantity
     return _of_measure(str(array.name)) or Quantity(str(array.name).replace("_", " "))
+
+
+def of_measure(name: str) -> Quantity:
+    """Return the quantity of a variable of a measure by its name.
+
+    Raises:
+        KeyError: no measure has the variable.
+    """
+    quantity = _of_measure(name)
+    if quantity is None:
+        raise KeyError(name)
+    return quantity
 
 
 def _of_measure(name: str) -> Quantity | None:
