@@ -20,26 +20,28 @@ from pathlib import Path
 import pandas as pd
 from analysis_tools.gasket_study import LOADS, agreement, screening_of
 from analysis_tools.sdf_text import sdf_with
+from analysis_tools.study_targets import study_targets
 
 from wm_drake.batch.ledger import open_ledger
 from wm_drake.model.bodies import sdf_path
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import MachineParameters, load_machine, machine_file_with, machine_path
 from wm_drake.parameters.free import FreeFile, load_free
-from wm_drake.parameters.measured import EXPERIMENT, measured_amplitudes, measured_responses
+from wm_drake.parameters.measured import EXPERIMENT, measured_amplitudes
 from wm_drake.parameters.published import published_results
+from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.progress import progress_bar
 from wm_drake.studies.calibrate.computed import PointRunner
-from wm_drake.studies.calibrate.prediction import Prediction, predict
+from wm_drake.studies.calibrate.prediction import FITS, Prediction, predict
 from wm_drake.studies.calibrate.response_targets import with_deviations
-from wm_drake.studies.calibrate.solutions import Solution, percents_of, solved_machine
+from wm_drake.studies.calibrate.results import predictions_of
+from wm_drake.studies.calibrate.solutions import Solution, sizes_text, solved_machine
 from wm_drake.studies.calibrate.study import (
     Calibration,
     SearchPlan,
     calibrate,
     identity_of,
 )
-from wm_drake.studies.calibrate.tables import FITS, prediction_table
 from wm_drake.studies.calibrate.targets import Targets, targets_of
 from wm_drake.studies.gasket.screening import published_for
 
@@ -91,7 +93,7 @@ def main() -> None:
                 done(number)
         ledger.mark_finished()
     tables = {
-        "held_out": prediction_table(predictions),
+        "held_out": LabelledTable("held_out", predictions_of(predictions)).frame(),
         "held_out_study": _study_table(predictions) if arguments.predict else pd.DataFrame(),
     }
     for name, table in tables.items():
@@ -125,10 +127,8 @@ def adams_targets(parameters: MachineParameters) -> Targets:
     table = measured_amplitudes(parameters)
     table = table.sort_values("source", key=lambda source: source != ADAMS_SOURCE, kind="stable")
     table = table.drop_duplicates(["load", "gasket"]).assign(source=EXPERIMENT)
-    of_study = parameters.model_copy(update={"measured": parameters.published})
-    targets = targets_of(parameters, table, responses=measured_responses(of_study))
-    responses = with_deviations(targets.responses, DEVIATIONS)
-    return replace(targets, responses=responses)
+    responses = with_deviations(study_targets(parameters), DEVIATIONS)
+    return replace(targets_of(parameters, table), responses=responses)
 
 
 def _arguments() -> argparse.Namespace:
@@ -177,7 +177,7 @@ def _lines(calibration: Calibration, predictions: list[Prediction]) -> list[str]
             f"{load:8s} {'with' if gasket else 'without':7s} gasket, difference in %: {shown}"
         )
     with_gasket = [gasket for _, gasket in targets.loads]
-    lines += [f"all: {percents_of(errors)}", f"with gasket: {percents_of(errors[with_gasket])}"]
+    lines += [f"all: {sizes_text(errors)}", f"with gasket: {sizes_text(errors[with_gasket])}"]
     if targets.responses:
         lines += _lines_of_study(best)
     lines += [
@@ -186,7 +186,7 @@ def _lines(calibration: Calibration, predictions: list[Prediction]) -> list[str]
     ]
     for prediction in predictions:
         for kind in prediction.kinds():
-            texts = [str(percents_of(getattr(kind, fit))) for fit in FITS]
+            texts = [sizes_text(getattr(kind, fit)) for fit in FITS]
             lines.append(
                 f"{', '.join(prediction.loads)}, {kind.name}: calibrated {texts[0]}; held out "
                 f"{texts[1]} (other loads: {texts[2]}); 95 % intervals contain "
@@ -204,7 +204,7 @@ def _study_table(predictions: list[Prediction]) -> pd.DataFrame:
         for fit, solution in fits.items() if loads else ():
             machine = solved_machine(solution)
             screening = screening_of(machine, loads=loads)
-            published = published_for(published_results(machine.published), screening.tables)
+            published = published_for(published_results(machine.published), screening)
             row = {"held_out": " ".join(loads), "fit": fit}
             rows.append(row | agreement(screening, published).row())
     return pd.DataFrame(rows)
@@ -217,7 +217,7 @@ def _lines_of_study(best: Solution) -> list[str]:
             f"{target.load:8s} {target.response.name} ({target.of}), difference in %: {value:+5.1f}"
             for target, value in zip(best.targets.responses, 100.0 * errors, strict=True)
         ),
-        f"results of the gasket study: {percents_of(errors)}",
+        f"results of the gasket study: {sizes_text(errors)}",
     ]
 
 

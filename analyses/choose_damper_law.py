@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from analysis_tools import validation_page as page
+from analysis_tools.goals import sizes_text
 from calibrate_reference import PLAN, REFERENCE, adams_targets
 
 from wm_drake.batch.ledger import open_ledger
@@ -25,7 +26,7 @@ from wm_drake.parameters.files import read_yaml, yaml_text
 from wm_drake.parameters.free import FreeFile
 from wm_drake.report.progress import progress_bar
 from wm_drake.studies.calibrate.computed import PointRunner
-from wm_drake.studies.calibrate.solutions import Solution, percents_of
+from wm_drake.studies.calibrate.solutions import Solution
 from wm_drake.studies.calibrate.study import calibrate, identity_of
 
 FREE = Path(__file__).with_name(f"{REFERENCE}_free.yaml")
@@ -111,9 +112,9 @@ def quantity_of(name: str) -> dict[str, Any]:
     return {key: entry[key] for key in ("bounds", "prior", "source")}
 
 
-def free_of(law: str) -> FreeFile:
-    """Return the free quantities of the reference machine with the numbers of a law."""
-    tree = read_yaml(FREE)
+def free_tree_of(law: str) -> dict[str, Any]:
+    """Return the free file of the reference machine with the numbers of a law, as a tree."""
+    tree: dict[str, Any] = read_yaml(FREE)
     quantities = tree["quantities"]
     del quantities[VELOCITY]
     if law not in DASHPOT:
@@ -121,7 +122,12 @@ def free_of(law: str) -> FreeFile:
     quantities["damper_friction"]["bounds"] = FRICTION
     for name in NUMBERS[law]:
         quantities[name] = quantity_of(name) | {"sets": {f"{KEY}.{name}": 1}}
-    return FreeFile.model_validate(tree)
+    return tree
+
+
+def free_of(law: str) -> FreeFile:
+    """Return the free quantities of the reference machine with the numbers of a law."""
+    return FreeFile.model_validate(free_tree_of(law))
 
 
 def row_of(law: str, best: Solution) -> dict[str, Any]:
@@ -129,20 +135,17 @@ def row_of(law: str, best: Solution) -> dict[str, Any]:
     targets = best.targets.responses
     errors = best.response_errors
     row: dict[str, Any] = {"law": law, "cost": round(best.cost)}
-    row["amplitudes, %"] = percents_of(best.errors)
+    row["amplitudes, %"] = sizes_text(best.errors)
     for kind, unit in (("means", "%"), ("effects", "%"), ("contributions", "points")):
         chosen = [target.kind_of_value == kind for target in targets]
-        row[f"{kind}, {unit}"] = percents_of(errors[chosen])
+        row[f"{kind}, {unit}"] = sizes_text(errors[chosen])
     names = best.parameter_map.names
     values = dict(zip(names, best.parameter_map.in_units(best.point), strict=True))
     row["friction, N"] = f"{values['damper_friction']:.1f}"
     others = [name for name in (*NUMBERS[law], "damper_damping") if name in values]
     row["others"] = ", ".join(f"{name} {values[name]:.3g}" for name in others)
     row["at bounds"] = best.verdicts().count("bound")
-    return {
-        key: f"{value.mean:.1f} / {value.largest:.0f}" if hasattr(value, "largest") else value
-        for key, value in row.items()
-    }
+    return row
 
 
 def main() -> None:

@@ -13,15 +13,17 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 
 from wm_drake import build_machine, load_machine, progress_bar, simulate_many
 from wm_drake.parameters import GASKET_FACTORS, SpinProfile, at_levels, levels_of, load_factors
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.doe.design import Design, make_design
-from wm_drake.studies.gasket.screening import Responses, analyse, contributions
+from wm_drake.studies.experiment import Experiment
+from wm_drake.studies.gasket.screening import analyse
 from wm_drake.studies.gasket.study import LOADS, GasketTrials
 
-SMALLEST_PERCENT = 1.0
+SMALLEST_SHARE = 0.01
 """Smallest contribution to a response of the full factorial with which a term is compared."""
 
 
@@ -43,14 +45,10 @@ def designs(names: tuple[str, ...], trials: int) -> dict[str, tuple[Design, floa
     return made
 
 
-def part_of(full: Responses, design: Design) -> Responses:
+def part_of(full: xr.Dataset, design: Design) -> xr.Dataset:
     """Return the responses of a design, taken from the runs of the full factorial."""
     places = (design.levels.astype(int) + 1) @ 3 ** np.arange(len(design.factors) - 1, -1, -1)
-    return Responses(
-        {load: values.iloc[places].reset_index(drop=True) for load, values in full.values.items()},
-        full.units,
-        {},
-    )
+    return full.isel(trial=places)
 
 
 def main() -> None:
@@ -75,19 +73,23 @@ def main() -> None:
     *_, (full, _) = made.values()
     begin = time.perf_counter()
     with progress_bar(full.trials * len(LOADS)) as progress:
-        runs = study.responses(
-            full,
-            lambda cases: simulate_many(machine, cases, measures=("extremes",), progress=progress),
+        experiment = Experiment(
+            machine,
+            ("extremes",),
+            lambda machine, measures, cases, _: simulate_many(
+                machine, cases, measures=measures, progress=progress
+            ),
+            tuple(study.loads),
         )
+        runs = study.responses(full, experiment)
     each_s = (time.perf_counter() - begin) / full.trials
-    reference, rows = contributions(analyse(full, runs)), []
+    reference, rows = analyse(full, runs).share, []
     for name, (design, made_s) in made.items():
         begin = time.perf_counter()
-        error = (contributions(analyse(design, part_of(runs, design))) - reference)[
-            reference > SMALLEST_PERCENT
-        ].abs()
+        error = np.abs(analyse(design, part_of(runs, design)).share - reference)
+        largest = 100.0 * error.where(reference > SMALLEST_SHARE).max(["response", "term"])
         seconds = made_s + design.trials * each_s + time.perf_counter() - begin
-        errors = {f"largest error, {load}": error[load].max(axis=None) for load in LOADS}
+        errors = {f"largest error, {load}": largest.sel(load=load).item() for load in LOADS}
         efficiency = design.efficiency()
         rows.append(
             {
@@ -99,7 +101,7 @@ def main() -> None:
             | errors
         )
     text = pd.DataFrame(rows).round(2).to_string(index=False)
-    print(f"contributions above {SMALLEST_PERCENT:g} %, largest error in percentage points\n{text}")
+    print(f"contributions above {SMALLEST_SHARE:.0%}, largest error in percentage points\n{text}")
     if arguments.out:
         arguments.out.write_text(text + "\n")
 

@@ -6,7 +6,8 @@ has k1 = 176 N/mm, c1 = 0.09 N s/mm, c2 = 0.4 N s/mm, and an f_max that is not p
 model is right, Coulomb fits to its loops drift in the same way. This drift is the only printed
 result that depends on f_max. Assumptions: both models have the same f_max and the same c2 ([C] Eq.
 (3) holds for all laws). The script prints the agreement for each f_max, and the fits beside the
-printed values for the f_max with the best agreement. It takes about two minutes.
+printed values for the f_max with the best agreement. It takes about two minutes. It also prints how
+the peak force of the MSTV model changes with frequency, which [C] section 4.1 says falls.
 """
 
 import argparse
@@ -14,15 +15,16 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from scipy.stats import spearmanr
-
-from wm_drake.rigs import Harmonic
-from wm_drake.studies.identify.table2 import (
+from analysis_tools.coulomb_table import (
     coulomb_fits,
     mstv_motions,
     mstv_of_c,
     printed_table,
+    trend_text,
 )
+from scipy.stats import spearmanr
+
+from wm_drake.rigs import Harmonic
 
 F_MAX = (20.0, 30.0, 35.0, 40.0, 45.0, 50.0, 60.0, 80.0, 120.0)  # N
 MM = 1e-3
@@ -71,13 +73,14 @@ def main() -> None:
         action="store_true",
         help="use only four corners of the table and two values of f_max",
     )
+    parser.add_argument("--f-max", type=float, action="append", help="in place of several [N]")
     parser.add_argument("--out", type=Path, help="also write the result to this file")
     arguments = parser.parse_args()
     table = printed_table()
-    candidates = F_MAX
+    candidates = tuple(arguments.f_max or F_MAX)
     if arguments.quick:
         table = table[table.frequency_hz.isin([1.0, 10.0]) & table.amplitude_mm.isin([0.3, 1.0])]
-        candidates = (40.0, 80.0)
+        candidates = candidates[:2]
     fitted = {f_max: fits_of(table, f_max) for f_max in candidates}
     scores = pd.DataFrame({f"{f_max:g} N": agreement(fits) for f_max, fits in fitted.items()}).T
     best = candidates[int(np.argmax(scores["rank correlation c1"]))]
@@ -88,6 +91,7 @@ def main() -> None:
         f"The drift of c1 agrees best for f_max = {best:g} N. Its fits beside the printed values "
         "(k1 in N/mm, c1 in N s/mm):",
         shown.round(3).to_string(index=False),
+        trend_text(),
     ]
     print("\n".join(text))
     if arguments.out:

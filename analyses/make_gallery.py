@@ -189,7 +189,6 @@ ENTRIES = (
             for axis in ("radial", "axial")
         ),
     ),
-    Entry("table2", "Table 2 of [C]", "wm-drake identify table2"),
 )
 
 

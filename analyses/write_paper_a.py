@@ -1,8 +1,9 @@
 """What does [A] print, statement by statement, and what do its own models give?
 
 The script runs the components of [A] through its test matrices, checks the arithmetic of its
-tables, compares the spin cycle of the machine `free_stroke` with its sentences, and computes how
-much its three causes of error change that machine. It renews docs/paper-a.md between its marks:
+tables, and compares the spin cycle of the machine `free_stroke` with its sentences. Its three
+causes of error are compared by compare_error_causes.py. It renews docs/paper-a.md between its
+marks:
 
     python analyses/write_paper_a.py --page docs/paper-a.md
 
@@ -12,7 +13,6 @@ much its three causes of error change that machine. It renews docs/paper-a.md be
 import argparse
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -22,7 +22,6 @@ from analysis_tools.validation_rows import spin_cycle_rows
 
 from wm_drake import build_machine, load_machine, load_profile
 from wm_drake.parameters import MachineParameters, SpinProfile, with_values
-from wm_drake.parameters.machine import Imperfections
 from wm_drake.parameters.unbalance_cases import UnbalanceCase, load_unbalance_cases
 from wm_drake.rigs import (
     JIG_ARM,
@@ -35,7 +34,7 @@ from wm_drake.rigs import (
     measures_of,
 )
 from wm_drake.studies.rig.study import printed_table
-from wm_drake.studies.spin_cycle.study import average_errors, compiled_runs, run_spin_cycle
+from wm_drake.studies.spin_cycle.study import compiled_runs, run_spin_cycle
 
 MM = 1e-3
 FIG_16 = 5.0, 0.8
@@ -53,24 +52,6 @@ RIG = "`wm-drake rig {} --machine free_stroke --matrix A`"
 CYCLE = "`wm-drake study spin-cycle`"
 SCRIPT, ARITHMETIC = "this script", "numbers of the table"
 HEADS = ["", "[A]", "ours", "verdict", "command"]
-CAUSES: dict[str, dict[str, Any]] = {
-    "whirl: a compliant bearing": {
-        "bearing": {
-            "radial_stiffness": "10 kN/mm",
-            "axial_stiffness": "8 kN/mm",
-            "tilting_stiffness": "100 kN m/rad",
-            "radial_damping": "1 N s/mm",
-            "axial_damping": "1 N s/mm",
-            "tilting_damping": "10 N m s/rad",
-            "y": "170 mm",
-        }
-    },
-    "residual imbalance, 20 g": {
-        "residual_imbalance": {"mass": "20 g", "radius": "240 mm", "y": "0 mm"}
-    },
-    "phase error, 5 deg": {"phase_error": "5 deg"},
-}
-"""Causes of error that [A] names in section 4.2; their sizes are assumptions."""
 GROUPS: dict[str, Callable[[UnbalanceCase], bool]] = {
     "one mass": lambda case: not (case.front and case.rear),
     "two, 0 deg": lambda case: bool(case.front and case.rear) and case.phase == 0.0,
@@ -417,48 +398,12 @@ def displacements(
     return run_spin_cycle(machine, cases, profile, compiled_runs(build_machine(machine))).rms
 
 
-def begin_of(profile: SpinProfile) -> SpinProfile:
-    """Return the first region of a profile."""
-    end = profile.regions[0].end
-    return SpinProfile(
-        time=(0.0, end), speed=(0.0, float(profile.speed_at(end))), regions=profile.regions[:1]
-    )
-
-
-def cause_lines(
-    machine: MachineParameters,
-    cases: list[UnbalanceCase],
-    profile: SpinProfile,
-    perfect: xr.DataArray,
-) -> list[list[str]]:
-    """Return lines for the three causes of error: mean change of the RMS displacements by group.
-
-    Args:
-        machine: The machine without these causes.
-        perfect: Its RMS displacements.
-    """
-    published = {case.name: case.published_error_percent for case in cases}
-    changes = {}
-    for name, imperfections in CAUSES.items():
-        imperfect = machine.model_copy(
-            update={"imperfections": Imperfections.model_validate(imperfections)}
-        )
-        changes[name] = average_errors(displacements(imperfect, cases, profile), perfect)
-    lines = []
-    for group, belongs in GROUPS.items():
-        names = [case.name for case in cases if belongs(case)]
-        theirs = np.mean([published[name] for name in names])
-        ours = (100.0 * float(change.sel(case=names).mean()) for change in changes.values())
-        lines.append([group, f"{theirs:.1f} %", *(f"{value:.1f} %" for value in ours)])
-    return lines
-
-
 def main() -> None:
     """Run benches and spin cycles and write the page."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--quick", action="store_true", help="five cases, causes before 10 s")
+    parser.add_argument("--quick", action="store_true", help="five cases")
     parser.add_argument("--page", type=Path, help="page to renew between its marks")
     parser.add_argument("--out", type=Path, help="also write the text to this file")
     arguments = parser.parse_args()
@@ -466,19 +411,12 @@ def main() -> None:
     cases = [case for case in every if case.name in CASES or not arguments.quick]
     cycle = load_profile("spin_cycle")
     perfect = displacements(machine, cases, cycle)
-    part = begin_of(cycle) if arguments.quick else cycle
-    begun = displacements(machine, cases, part) if arguments.quick else perfect
     text = page.origin("python analyses/write_paper_a.py --page docs/paper-a.md", [])
     text += page.table_text("Component tests: section 2", HEADS, test_lines(machine))
     text += page.table_text("Errors of the models: section 3", HEADS, model_lines())
     text += page.table_text("A tenth of the largest force: section 3", HEADS, tenth_lines(machine))
     text += page.table_text("Table 9", HEADS, table_9_lines(every))
     text += page.table_text("Spin cycle in words: section 4.2", HEADS, cycle_lines(perfect))
-    text += page.table_text(
-        "Three causes of error: section 4.2",
-        ["cases", "[A]: error of its model", *CAUSES],
-        cause_lines(machine, cases, part, begun),
-    )
     print(text)
     page.write(text, arguments.out, arguments.page)
 

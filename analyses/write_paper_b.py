@@ -13,6 +13,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+import xarray as xr
 from analysis_tools import validation_page as page
 from analysis_tools.claims import (
     FAILS,
@@ -36,10 +37,11 @@ from wm_drake.parameters import (
 )
 from wm_drake.parameters.free import FreeFile
 from wm_drake.parameters.measured import EXPERIMENT
+from wm_drake.report.quantity import quantity_of, shown
 from wm_drake.studies.calibrate.computed import PointRunner
 from wm_drake.studies.calibrate.study import SearchPlan, calibrate, identity_of
 from wm_drake.studies.calibrate.targets import targets_of
-from wm_drake.studies.gasket.screening import Published, Screening, published_for
+from wm_drake.studies.gasket.screening import at, labels_of, published_for, sign_differs
 
 REFERENCE = "reference"
 MACHINES = (REFERENCE,)
@@ -128,47 +130,51 @@ def resonance_line(machine: MachineParameters) -> list[str]:
 
 
 def study_lines(
-    screenings: dict[str, Screening], published: Published
+    screenings: dict[str, xr.Dataset], published: xr.Dataset
 ) -> tuple[list[list[str]], list[list[str]]]:
     """Return the lines of Tables 4 and 5: what is printed, then that of each machine."""
     sums, terms = [], []
-    first = next(iter(screenings.values()))
-    for label, table in first.tables.items():
-        what, unit = ", ".join(label), first.responses.units[label[1]]
-        ours = [screening.tables[label] for screening in screenings.values()]
-        for name, known, values in zip(
-            ("main effects", "interactions"),
-            published.sums(label),
-            ([t.main_percent for t in ours], [t.interaction_percent for t in ours]),
-            strict=True,
-        ):
-            cells = [f"{value:.1f} %" for value in values]
-            sums.append([f"{what}: {name}", f"{known:g} %", *cells])
-        mean = published.mean(label)
-        cells = [f"{t.constant:.3g} {unit}" for t in ours]
-        terms.append([f"{what}: mean", f"{mean:g} {unit}", *cells])
-        if limits := published.range(label):
-            frames = [s.responses.values[label[0]][label[1]] for s in screenings.values()]
-            cells = [f"{frame.min():.1f} to {frame.max():.1f} {unit}" for frame in frames]
-            terms.append([f"{what}: range", f"{limits[0]:g} to {limits[1]:g} {unit}", *cells])
-        for index, term in enumerate(table.terms):
-            percent, effects = published.percent(label, term), published.effects(label, term)
-            if percent is None:
-                continue
-            values = [t.terms[index] for t in ours]
-            cells = [f"{value.percent:.0f} %" for value in values]
-            terms.append([f"{what}: {term.name}", f"{percent:g} %", *cells])
-            for level in (-1, 0) if effects else ():
-                cells = [
-                    f"{value.effects[(level,)]:.2g}"
-                    + (" **sign**" if level < 0 and published.sign_differs(label, value) else "")
-                    for value in values
-                ]
-                terms.append([f"effect at {level}", f"{effects[(level,)]:.3g}", *cells])
+    for label in labels_of(published):
+        what, known = ", ".join(label), at(published, label)
+        ours = [at(screening, label) for screening in screenings.values()]
+        for name, words in (("main", "main effects"), ("interaction", "interactions")):
+            cells = [f"{float(shown(of[name])):.1f} %" for of in ours]
+            sums.append([f"{what}: {words}", f"{float(shown(known[name])):g} %", *cells])
+        unit = quantity_of(known["mean"]).unit.label
+        cells = [f"{float(shown(of['mean'])):.3g} {unit}" for of in ours]
+        terms.append([f"{what}: mean", f"{float(shown(known['mean'])):g} {unit}", *cells])
+        if known.smallest.notnull():
+            low, high = (float(shown(known[name])) for name in ("smallest", "largest"))
+            cells = [
+                f"{float(shown(of.smallest)):.1f} to {float(shown(of.largest)):.1f} {unit}"
+                for of in ours
+            ]
+            terms.append([f"{what}: range", f"{low:g} to {high:g} {unit}", *cells])
+        terms += term_lines(what, known, ours)
     return sums, terms
 
 
-def summary(name: str, screening: Screening, published: Published) -> list[str]:
+def term_lines(what: str, known: xr.Dataset, ours: list[xr.Dataset]) -> list[list[str]]:
+    """Return the lines of the terms of a response: contributions and effects."""
+    lines = []
+    for term in known.term.values[known.share.notnull().values].tolist():
+        cells = [f"{float(shown(of.share.sel(term=term))):.0f} %" for of in ours]
+        printed = f"{float(shown(known.share.sel(term=term))):g} %"
+        lines.append([f"{what}: {term}", printed, *cells])
+        effect, *others = (data.effect.sel(term=term, other_level="") for data in (known, *ours))
+        for level in (-1, 0) if effect.notnull().all() else ():
+            cells = [
+                f"{float(shown(other.sel(level=level))):.2g}"
+                + (" **sign**" if level < 0 and sign_differs(of, known).sel(term=term) else "")
+                for other, of in zip(others, ours, strict=True)
+            ]
+            lines.append(
+                [f"effect at {level}", f"{float(shown(effect.sel(level=level))):.3g}", *cells]
+            )
+    return lines
+
+
+def summary(name: str, screening: xr.Dataset, published: xr.Dataset) -> list[str]:
     """Return the numbers that sum up a machine."""
     found = agreement(screening, published)
     return [
@@ -200,9 +206,10 @@ def damping_line(machine: MachineParameters, is_quick: bool) -> list[str]:
             found = calibrate(PointRunner(built, ledger), free, targets, plan)
     best, known = found.solutions[0], found.parameter_map
     misses = float(np.sqrt(np.nanmean(np.log1p(best.errors) ** 2)))
-    spread = np.sqrt(np.diag(best.posterior.covariance(misses / DEVIATION)))
+    spread = np.sqrt(np.diag(best.posterior.spread_matrix(misses / DEVIATION)))
     spread = known.in_units(spread * known.deviation)
-    values = zip(known.in_units(best.point), spread, known.units, strict=True)
+    units = (unknown.unit.shown for unknown in known.unknowns)
+    values = zip(known.in_units(best.point), spread, units, strict=True)
     cells = [
         f"{value:.3g} ± {float(f'{deviation:.1g}'):g} {unit}" for value, deviation, unit in values
     ]
@@ -213,7 +220,7 @@ def study_text(machines: dict[str, MachineParameters], trials: int) -> tuple[str
     """Return the summary of the gasket studies, and Tables 4 and 5 with section 4."""
     screenings = {name: screening_of(machine, trials) for name, machine in machines.items()}
     first = screenings[MACHINES[0]]
-    published = published_for(published_results(machines[MACHINES[0]].published), first.tables)
+    published = published_for(published_results(machines[MACHINES[0]].published), first)
     of_each = [summary(name, s, published) for name, s in screenings.items()]
     curved = screening_of(machines[REFERENCE], trials, "scaled")
     of_each.append(summary(f"{REFERENCE}, its stiffening curves scaled", curved, published))

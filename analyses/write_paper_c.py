@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 from analysis_tools import validation_page as page
+from analysis_tools.coulomb_table import coulomb_fits, mstv_motions, mstv_of_c, printed_table
 from analysis_tools.validation_page import NOT_COMPARABLE, listed, verdict
 from analysis_tools.validation_rows import coulomb_rows
 
@@ -24,12 +25,6 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.rigs import ForceLoop, Harmonic, damper_bench, force_loops, measures_of
 from wm_drake.rigs.loops import steady_deformations
 from wm_drake.rigs.run import MATRICES, slider_friction_curves
-from wm_drake.studies.identify.table2 import (
-    coulomb_fits,
-    mstv_motions,
-    mstv_of_c,
-    printed_table,
-)
 
 MM = 1e-3
 STV = 0.1 * MM
@@ -277,7 +272,13 @@ def fit_lines(damper: DamperNumbers, quick: bool) -> list[list[str]]:
     f_max, damping = getattr(damper, "friction_force"), getattr(damper, "slider_damping")  # noqa: B009
     fits = coulomb_fits(mstv_motions(damper, motions), f_max, damping)
     return [
-        [r.quantity, r.published, r.ours, r.verdict, "`wm-drake identify table2`"]
+        [
+            r.quantity,
+            r.published,
+            r.ours,
+            r.verdict,
+            "`python analyses/fit_coulomb_to_mstv.py --f-max 45`",
+        ]
         for r in coulomb_rows(fits)
     ]
 

@@ -25,6 +25,7 @@ from xml.etree import ElementTree
 import pandas as pd
 from analysis_tools import validation_page as page
 from analysis_tools import validation_rows as rows
+from analysis_tools.coulomb_table import coulomb_fits, mstv_motions, mstv_of_c, printed_table
 from analysis_tools.gasket_study import ORTHOGONAL, screening_of
 from ruamel.yaml import YAML
 
@@ -33,12 +34,6 @@ from wm_drake.parameters import MachineParameters, published_results
 from wm_drake.parameters.files import read_yaml
 from wm_drake.parameters.unbalance_cases import load_unbalance_cases
 from wm_drake.rigs import Harmonic
-from wm_drake.studies.identify.table2 import (
-    coulomb_fits,
-    mstv_motions,
-    mstv_of_c,
-    printed_table,
-)
 from wm_drake.studies.spin.comparison import differences_of
 from wm_drake.studies.spin.study import run_spin
 from wm_drake.studies.spin_cycle.study import compiled_runs, run_spin_cycle

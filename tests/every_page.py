@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 
 FREE = """quantities:
   friction: {bounds: "(10, 60) N", prior: "(30, 10) N", sets: damper_types.friction.friction_force, source: test}
@@ -30,7 +31,8 @@ class Kind:
     Attributes:
         template: Template of the page in `wm_drake/report`.
         commands: Commands that write it, one after the other, in one folder. The last one writes
-            to the folder `out`. `*` stands for the loops of the folder `bench`.
+            to the folder `out`. `*` stands for the loops of the folder `bench`, `recording` for its
+            record as a recorded file.
         page: Its path in the folder `out`.
     """
 
@@ -67,7 +69,6 @@ KINDS = {
         "damper", "*", "--law", "mstv,stv,coulomb",
     ),
     "identify_static": _one("sections.html", "identify", "gasket", "--static", "radial=r.csv", "axial=a.csv"),
-    "identify_table2": _one("sections.html", "identify", "table2"),
     "calibration": _one(
         "sections.html", "calibrate", "--machine", "short.yaml", "--free", "free.yaml",
         "--targets", "measured.csv", "--starts", "1", "--iterations", "3",
@@ -105,6 +106,23 @@ KINDS = {
         "--harmonics", "3", "--rate", "20 rpm/s", "--rate", "50 rpm/s",
     ),
     "orders": Kind("sections.html", (("spin", "--load", "middle", "--out", "bench"), ("record", "orders", "record"))),
+    "compare": Kind(
+        "sections.html",
+        (
+            ("spin", "--load", "middle", "--profile", "short_cycle.yaml", "--out", "bench"),
+            ("record", "compare", "recording", "--load", "middle", "--profile", "short_cycle.yaml"),
+        ),
+    ),
+    "record_calibrate": Kind(
+        "sections.html",
+        (
+            ("spin", "--load", "middle", "--profile", "short_cycle.yaml", "--out", "bench"),
+            (
+                "record", "calibrate", "recording", "--load", "middle", "--profile", "short_cycle.yaml",
+                "--unknown", "damper_types.friction.friction_force",
+            ),
+        ),
+    ),
     "tolerance": _one(
         "sections.html", "study", "tolerance", "laundry", "--samples", "64",
         "--sensitivity", "16", "--subset", "100", "--limits", "limits.yaml",
@@ -139,9 +157,22 @@ def _with_files(command: tuple[str, ...], folder: Path) -> list[str]:
             words += [str(path) for path in sorted((folder / "bench").glob("loop_*.csv"))]
         elif word == "record":
             words.append(str(next((folder / "bench").glob("*.nc"))) if words else word)
+        elif word == "recording":
+            words.append(str(_write_recording(folder / "bench")))
         else:
             words.append(word)
     return words if {"--out", "--page"} & set(words) else [*words, "--out", "out"]
+
+
+def _write_recording(folder: Path) -> Path:
+    """Write the displacements and the speed of the record in a folder as a recorded file."""
+    record, path = xr.load_dataset(next(folder.glob("*.nc"))), folder / "recording.csv"
+    names = record.sensor.values.tolist()
+    table = pd.DataFrame(1.1 * record.displacement.values, columns=[f"{n} [m]" for n in names])
+    table.insert(0, "time [s]", record.time.values)
+    table["speed [rad/s]"] = record.drum_speed.values
+    table.to_csv(path, index=False)
+    return path
 
 
 def _run(words: list[str]) -> None:

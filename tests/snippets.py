@@ -11,9 +11,12 @@ from documents import CHECKOUT, MANUAL, README, name_of, text_of
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import load_machine, load_profile
 from wm_drake.parameters.components import load_component
+from wm_drake.parameters.recorded_sensors import load_recorded_test
 from wm_drake.parameters.unbalance_cases import load_unbalance_cases
 from wm_drake.rigs import Harmonic, bushing_bench, damper_bench, force_loops
+from wm_drake.simulation.recorded_signal import recorded_signal
 from wm_drake.simulation.runs import simulate
+from wm_drake.studies.compare.task import sensor_points
 from wm_drake.studies.spin_cycle.page import rms_table
 from wm_drake.studies.spin_cycle.study import compiled_runs, run_spin_cycle
 
@@ -57,6 +60,7 @@ BLOCKS = [block for path in PAGES for block in blocks_of(path)]
 
 FILES = {  # what a block with a file is called in the commands of its page
     "README.md": ["mine.yaml"],
+    "docs/how-to/accelerometers.md": ["test.yaml"],
     "docs/how-to/bench-to-machine.md": ["mine.yaml"],
     "docs/how-to/calibrate.md": ["free.yaml", "responses.csv", "relation.yaml"],
     "docs/how-to/compliant-bearing.md": ["whirling.yaml"],
@@ -100,8 +104,32 @@ def prepare(folder, page, chosen):
     files = [block for block in BLOCKS if block.page == page and block.language in ("yaml", "csv")]
     for name, block in zip(FILES.get(page, []), files, strict=True):
         (folder / name).write_text("\n".join(block.lines) + "\n", encoding="utf-8")
+    if "run_1.mf4" in " ".join(chosen):
+        write_runs(folder, CHECKOUT / "docs" / "how-to" / "accelerometers.md")
     if page == "docs/how-to/commands.md":
         write_commands_page(folder, " ".join(chosen))
+
+
+def write_runs(folder, page):
+    """Write three recordings of the test that a page declares, with gains that scatter by 1 %."""
+    from lab_writers import write_mdf
+
+    block = next(block for block in blocks_of(page) if block.language == "yaml")
+    (folder / "test.yaml").write_text("\n".join(block.lines) + "\n", encoding="utf-8")
+    test, machine = load_recorded_test(folder / "test.yaml"), build_machine(load_machine())
+    record = simulate(machine, test.load)
+    time, angle = record.time.values, record.drum_angle.values
+    fine = np.arange(0.0, time[-1], 2.5e-4)
+    turns = test.speed.pulses_per_turn * test.speed.ratio * np.interp(fine, time, angle)
+    points = sensor_points(machine, test)
+    generator = np.random.default_rng(1)
+    for number in (1, 2, 3):
+        channels = {"Tacho": (5.0 * (np.sin(turns) > 0.0), "V")}
+        for name, sensor in test.sensors.items():
+            signal = recorded_signal(record, sensor, points[name])
+            signal *= generator.normal(1.0, 0.01)
+            channels[sensor.channel] = (signal, sensor.signal_unit.si.replace("*", " "))
+        write_mdf(folder / f"run_{number}.mf4", time, channels)
 
 
 def write_laboratory(folder):

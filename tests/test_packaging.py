@@ -116,7 +116,6 @@ wm-drake rig bushing --machine free_stroke --axis axial -f '1,5 Hz' -a '0.4 mm' 
 wm-drake identify bushing bushing/loop_*.csv --machine free_stroke --axis axial --law voigt --out bushing_fit
 wm-drake rig gasket --axis axial -f '1,5 Hz' -a '1 mm' --out ring
 wm-drake identify gasket ring/loop_*.csv --axis axial --law voigt --out ring_fit
-wm-drake identify table2 --quick --out table2
 wm-drake gasket curves folded --points 2 --elements 6 --around 3 --axial '1 mm' --radial '1 mm' --tilt '1 deg' --twist '1 deg' --out curves
 wm-drake spin --load middle --out spin
 wm-drake record channels spin/record_middle.nc
@@ -124,6 +123,7 @@ wm-drake record orders spin/record_middle.nc --out orders
 wm-drake calibrate --machine short.yaml --free free.yaml --targets measured.csv --quick --out calibrate
 wm-drake verdict short.yaml --samples 16 --out verdict
 wm-drake export fmu --load middle --out machine.fmu
+wm-drake export page --load middle --out machine.html
 wm-drake study balancer --quick --place '0 mm' --damping '100 %' --release '80 rpm' --to '110 rpm' --rate '80 rpm/s' --out balancer
 wm-drake study design gasket --quick --profile short_cycle.yaml --out design
 wm-drake study drive --quick --load middle --out drive

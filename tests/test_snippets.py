@@ -39,6 +39,7 @@ NOT_RUN = {  # beginning of a command, and why this test does not run it
     "python analyses/": "tests/analyses runs it with --quick",
     "sphinx-build": "builds the manual: .ci/run",
     "wm-drake export fmu": "compiles for a minute: tests/export",
+    "wm-drake export page": "compiles for a minute: tests/browser",
     "wm-drake studio": "serves until it is stopped: tests/studio",
     "wm-drake study gasket --cluster": "needs a cluster: tests/batch/test_cluster.py and a tutorial",
     "wm-drake study tolerance laundry_and_parts": "minutes: as laundry",
@@ -51,10 +52,10 @@ HOURS = (  # commands of more than ten seconds of processor time; the marker `ho
     "wm-drake verdict", "wm-drake gasket curves folded",
     "wm-drake study tolerance", "wm-drake study spin-cycle", "wm-drake study spin-identify",
     "wm-drake study gasket", "wm-drake study drive", "wm-drake study balancer", "wm-drake study design",
-    "wm-drake study modes", "wm-drake study response", "wm-drake calibrate",
+    "wm-drake study modes", "wm-drake study response", "wm-drake calibrate", "wm-drake record calibrate",
     "wm-drake spin --engine drake", "wm-drake identify gasket rubber/*.csv --axis radial --method",
     "wm-drake identify damper bench/*.csv --law coulomb", "wm-drake identify damper fit/*.csv",
-    "wm-drake identify table2", "wm-drake spin --compare-gasket --out", "wm-drake spin --machine ball_rings",
+    "wm-drake spin --compare-gasket --out", "wm-drake spin --machine ball_rings",
 )  # fmt: skip
 OVERVIEWS = ("README.md", "docs/how-to/commands.md")
 """Pages whose commands another page may run."""

@@ -24,7 +24,7 @@ elements/, engines/compiled/, solid/: compiled functions on flat arrays. An obje
 unpacked at each call from Python, and each of its types compiles another form.
 """
 
-FUNCTIONS_LEFT = 28
+FUNCTIONS_LEFT = 26
 
 
 def sources():

@@ -3,10 +3,16 @@
 from collections.abc import Callable, Mapping
 from typing import TypeAlias
 
-import numpy as np
+import xarray as xr
 
-from wm_drake.studies.doe.anova import Term
-from wm_drake.studies.gasket.screening import LEADING_MAIN_PERCENT, Label, Published, Screening
+from wm_drake.studies.gasket.screening import (
+    LEADING_MAIN,
+    Label,
+    at,
+    compared_terms,
+    labels_of,
+    mains,
+)
 
 HOLDS, FAILS = "holds", "**does not hold**"
 
@@ -14,38 +20,47 @@ Amplitudes: TypeAlias = Mapping[tuple[str, bool], Mapping[str, float]]
 """Amplitude of each sensor, by load and whether the gasket is in. [mm]"""
 
 
-def _mains(screening: Screening, label: Label) -> dict[str, Term]:
-    return {t.name: t for t in screening.tables[label].terms if len(t.factors) == 1}
+def _share(screening: xr.Dataset, label: Label, factor: str) -> float:
+    return float(at(screening, label).share.sel(term=factor))
 
 
-def _leader(screening: Screening, label: Label) -> str:
-    mains = _mains(screening, label)
-    return max(mains, key=lambda name: mains[name].percent)
+def _leader(screening: xr.Dataset, label: Label) -> str:
+    return str(mains(at(screening, label)).term.values[0])
 
 
-def _leading(screening: Screening, factor: str) -> set[Label]:
+def _leading(screening: xr.Dataset, factor: str) -> set[Label]:
     """Return the responses of which a factor explains more than the threshold of [B]."""
-    labels = screening.tables
-    limit = LEADING_MAIN_PERCENT
-    return {label for label in labels if _mains(screening, label)[factor].percent > limit}
+    labels = labels_of(screening)
+    return {label for label in labels if _share(screening, label, factor) > LEADING_MAIN}
 
 
-def _low(screening: Screening, load: str, name: str, factor: str) -> float:
-    return _mains(screening, (load, name))[factor].effects[(-1,)]
+def _low(screening: xr.Dataset, load: str, name: str, factor: str) -> float:
+    """Return the effect of a factor at its lowest level. [SI]"""
+    effect = at(screening, (load, name)).effect.sel(term=factor, other_level="", level=-1)
+    return float(effect)
 
 
-def _spread(screening: Screening, load: str, name: str) -> float:
-    values = screening.responses.values[load][name]
-    return float(values.max() - values.min())
+def _spread(screening: xr.Dataset, load: str, name: str) -> float:
+    of = at(screening, (load, name))
+    return float(of.largest - of.smallest)
 
 
-def _mean(screening: Screening, load: str, name: str) -> float:
-    return screening.tables[load, name].constant
+def _mean(screening: xr.Dataset, load: str, name: str) -> float:
+    return float(at(screening, (load, name))["mean"])
 
+
+def _main_shares(screening: xr.Dataset) -> dict[Label, float]:
+    """Return the shares of all main effects, Dx of the middle load apart."""
+    labels = [label for label in labels_of(screening) if label != ("middle", "Dx")]
+    return {label: float(at(screening, label).main) for label in labels}
+
+
+LEAST_MAIN = 0.925
+"""Share of the main effects that [B] finds in every response but D_x of the middle load."""
 
 LOADS = ("middle", "counter")
 
-CLAIMS: dict[str, Callable[[Screening], bool]] = {
+CLAIMS: dict[str, Callable[[xr.Dataset], bool]] = {
     "the lowest displacement of the middle load is along y": lambda s: (
         _mean(s, "middle", "Dy") < min(_mean(s, "middle", "Dx"), _mean(s, "middle", "Dz"))
     ),
@@ -57,7 +72,7 @@ CLAIMS: dict[str, Callable[[Screening], bool]] = {
         for measure in (_mean, _spread)
     ),
     "main effects explain at least 92.5 % of every response but D_x, middle load": lambda s: all(
-        table.main_percent >= 92.5 for label, table in s.tables.items() if label != ("middle", "Dx")
+        share >= LEAST_MAIN for share in _main_shares(s).values()
     ),
     "K_Tx and K_Tz are insignificant for every response": lambda s: (
         not _leading(s, "K_Tx") | _leading(s, "K_Tz")
@@ -100,7 +115,7 @@ CLAIMS: dict[str, Callable[[Screening], bool]] = {
 """Statements of section 4, and whether a screening with D, F and M of both loads agrees."""
 
 
-def claims(screenings: Mapping[str, Screening]) -> list[tuple[str, list[str]]]:
+def claims(screenings: Mapping[str, xr.Dataset]) -> list[tuple[str, list[str]]]:
     """Return each statement with whether it holds in each screening."""
     return [
         (words, [HOLDS if holds(screening) else FAILS for screening in screenings.values()])
@@ -176,43 +191,42 @@ def measured_claims(computed: Mapping[str, Amplitudes]) -> list[list[str]]:
     ]
 
 
-def _least_main(screening: Screening) -> str:
+def _least_main(screening: xr.Dataset) -> str:
     """Return the smallest share of the main effects, Dx of the middle load apart."""
-    shares = {
-        label: table.main_percent
-        for label, table in screening.tables.items()
-        if label != ("middle", "Dx")
-    }
+    shares = _main_shares(screening)
     least = min(shares, key=lambda label: shares[label])
-    good = sum(share >= 92.5 for share in shares.values())
-    return f"{shares[least]:.1f} % ({', '.join(least)}); {good} of {len(shares)} reach 92.5 %"
+    good = sum(share >= LEAST_MAIN for share in shares.values())
+    text = f"{100.0 * shares[least]:.1f} % ({', '.join(least)})"
+    return f"{text}; {good} of {len(shares)} reach 92.5 %"
 
 
-def _elsewhere(screening: Screening, names: str, own: str = "") -> str:
+def _elsewhere(screening: xr.Dataset, names: str, own: str = "") -> str:
     """Return the largest contribution of factors to responses other than one."""
-    percents = {
-        (*label, name): _mains(screening, label)[name].percent
-        for label in screening.tables
+    shares = {
+        (*label, name): _share(screening, label, name)
+        for label in labels_of(screening)
         for name in names.split()
         if label[1] != own
     }
-    worst = max(percents, key=lambda key: percents[key])
-    return f"{percents[worst]:.0f} % ({', '.join(worst)})"
+    worst = max(shares, key=lambda key: shares[key])
+    return f"{100.0 * shares[worst]:.0f} % ({', '.join(worst)})"
 
 
-def _damping_ratios(screening: Screening, published: Published) -> str:
+def _damping_ratios(screening: xr.Dataset, published: xr.Dataset) -> str:
     """Return smallest and largest ratio of effects of damping on displacements to printed ones."""
-    ratios = [
-        term.effects[(-1,)] / published.effects(label, term)[(-1,)]
-        for label, term in published.compared_terms(screening)
-        if label[1].startswith("D") and term.name in ("C_L", "C_T")
-    ]
-    return f"{np.min(ratios):.1f} to {np.max(ratios):.1f} times"
+    names = [name for name in screening.response.values.tolist() if name.startswith("D")]
+    ours, theirs = (
+        data.effect.sel(response=names, term=["C_L", "C_T"], other_level="", level=-1)
+        for data in (screening, published)
+    )
+    compared = compared_terms(published).sel(response=names, term=["C_L", "C_T"])
+    ratios = (ours / theirs).where(compared)
+    return f"{float(ratios.min()):.1f} to {float(ratios.max()):.1f} times"
 
 
-def numbers(screenings: Mapping[str, Screening], published: Published) -> list[list[str]]:
+def numbers(screenings: Mapping[str, xr.Dataset], published: xr.Dataset) -> list[list[str]]:
     """Return the numbers behind statements of section 4: printed, and of each machine."""
-    rows: dict[str, tuple[str, Callable[[Screening], str]]] = {
+    rows: dict[str, tuple[str, Callable[[xr.Dataset], str]]] = {
         "smallest share of the main effects, D_x of the middle load apart": (
             "92.50 % (middle, Dz); 17 of 17 reach 92.5 %",
             _least_main,
@@ -223,7 +237,7 @@ def numbers(screenings: Mapping[str, Screening], published: Published) -> list[l
         ),
         "contribution of K_Ty to D_z, middle load": (
             "below 10 %",
-            lambda s: f"{_mains(s, ('middle', 'Dz'))['K_Ty'].percent:.0f} %",
+            lambda s: f"{100.0 * _share(s, ('middle', 'Dz'), 'K_Ty'):.0f} %",
         ),
         "largest contribution of K_Tx or K_Tz": (
             "below 10 %",

@@ -2,11 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
+import xarray as xr
 
-from wm_drake.batch import simulate_many
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import (
     GASKET_FACTORS,
@@ -17,7 +16,14 @@ from wm_drake.parameters import (
 )
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.doe.design import make_design
-from wm_drake.studies.gasket.screening import Published, Screening, run_screening
+from wm_drake.studies.experiment import Experiment
+from wm_drake.studies.gasket.screening import (
+    is_main,
+    leaders,
+    mean_difference,
+    run_screening,
+    sign_differs,
+)
 from wm_drake.studies.gasket.study import GasketTrials
 
 ORTHOGONAL = 243
@@ -32,8 +38,8 @@ def screening_of(
     trials: int = ORTHOGONAL,
     tables: str = "linear",
     loads: Sequence[str] = LOADS,
-) -> Screening:
-    """Return the gasket study of a machine.
+) -> xr.Dataset:
+    """Return the gasket study of a machine, as of `screening.run_screening`.
 
     Args:
         machine: The machine.
@@ -47,8 +53,8 @@ def screening_of(
     middle = at_levels(machine, levels, [0] * len(levels))
     cases = [Case(name, machine.loads[name], machine.profile) for name in loads]
     study = GasketTrials(middle, levels, cases, ["D", "F", "M"])
-    run = partial(simulate_many, build_machine(middle), measures=study.measures)
-    return run_screening(design, lambda plan: study.responses(plan, run))
+    experiment = Experiment(build_machine(middle), study.measures, loads=tuple(cases))
+    return run_screening(design, lambda plan: study.responses(plan, experiment))
 
 
 @dataclass(frozen=True)
@@ -82,16 +88,21 @@ class Agreement:
         }
 
 
-def agreement(screening: Screening, published: Published) -> Agreement:
-    """Return how well a study agrees with the published one."""
-    leaders = published.leaders(screening).values()
-    differences = published.differences(screening).items()
-    points = [difference for (_, term), difference in differences if ":" not in term]
-    means = [published.mean_difference(screening, label) or 0.0 for label in screening.tables]
+def agreement(screening: xr.Dataset, published: xr.Dataset) -> Agreement:
+    """Return how well a study agrees with the published one.
+
+    Args:
+        screening: As of `wm_drake.studies.gasket.screening.run_screening`.
+        published: As of `published_for` there.
+    """
+    lead = leaders(screening, published).values()
+    points = screening.share - published.share
+    points = points.isel(term=is_main(points.term)).values
+    means = mean_difference(screening, published).fillna(0.0).values
     return Agreement(
-        sum(ours == theirs for ours, theirs in leaders),
-        len(leaders),
-        np.abs(points),
-        np.abs(means),
-        len(published.other_signs(screening)),
+        sum(ours == theirs for ours, theirs in lead),
+        len(lead),
+        100.0 * np.abs(points[np.isfinite(points)]),
+        100.0 * np.abs(means.ravel()),
+        int(sign_differs(screening, published).sum()),
     )

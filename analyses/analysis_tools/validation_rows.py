@@ -11,8 +11,8 @@ import xarray as xr
 
 from wm_drake.parameters import PublishedResults
 from wm_drake.parameters.published import CONSTANT
-from wm_drake.report.quantity import shown
-from wm_drake.studies.gasket.screening import Screening
+from wm_drake.report.quantity import quantity_of, shown
+from wm_drake.studies.gasket.screening import at, labels_of
 from wm_drake.studies.spin.comparison import LARGE_STEADY, STEADY
 from wm_drake.studies.spin.data import amplitudes_of
 from wm_drake.studies.spin.study import SpinRuns
@@ -182,7 +182,7 @@ def held_out_table_rows(table: pd.DataFrame, studies: pd.DataFrame) -> list[Row]
     """Return rows for tables of [B] that were held out of the fit and predicted.
 
     Args:
-        table: Table from `wm_drake.studies.calibrate.tables.prediction_table`.
+        table: Table from `wm_drake.studies.calibrate.results.predictions_of`.
         studies: Agreement of the gasket study of each held-out load, fitted and predicted, with the
             columns held_out, fit, responses and same_leading_factor.
     """
@@ -275,23 +275,24 @@ def effect_rows(data: xr.Dataset, kind: str = FITTED) -> list[Row]:
 
 
 def mean_rows(
-    screening: Screening, published: PublishedResults, kind: str = PREDICTED
+    screening: xr.Dataset, published: PublishedResults, kind: str = PREDICTED
 ) -> list[Row]:
     """Return a row for each published grand mean ([B] Table 5), and one for all."""
     section = "[B] Table 5: grand means of the gasket study"
     rows, every = list[Row](), list[float]()
     for (load, name), terms in published.items():
-        if CONSTANT not in terms or (load, name) not in screening.tables:
+        if CONSTANT not in terms or (load, name) not in labels_of(screening):
             continue
-        theirs, ours = terms[CONSTANT].effects[0], screening.tables[load, name].constant
-        pair = Pair(theirs, ours, screening.responses.units[name], MEAN_LIMIT)
+        mean = at(screening, (load, name))["mean"]
+        theirs, ours = terms[CONSTANT].effects[0], float(shown(mean))
+        pair = Pair(theirs, ours, quantity_of(mean).unit.label, MEAN_LIMIT)
         every.append(abs(pair.difference))
         rows.append(pair.row(section, f"{load}, {name}", kind))
     if every:
         good = sum(size <= MEAN_LIMIT for size in every)
         reason = f"{good} of {len(every)} within {MEAN_LIMIT:g} %; largest {max(every):.0f} %"
-        mean, verdict = f"{np.mean(every):.1f} %", _verdict(good == len(every))
-        rows.append(Row(section, "mean difference", kind, "", mean, "", verdict, reason))
+        size, verdict = f"{np.mean(every):.1f} %", _verdict(good == len(every))
+        rows.append(Row(section, "mean difference", kind, "", size, "", verdict, reason))
     return rows
 
 

@@ -9,6 +9,7 @@ A page asks for a text by a mark:
 - `<!-- pages of decisions -->`: the decisions, below their list in the navigation;
 - `<!-- functions of MODULE -->`: the functions of a module of laws, or `MODULE: NAME NAME` of them;
 - `<!-- picture NAME -->`: a picture that is drawn from the code (`pictures.py`, `schematics.py`);
+- `<!-- machine NAME -->`: a page, folded, in which a shipped machine runs;
 - `<!-- architecture -->`: the rooms of the package and their imports (`architecture.py`).
 """
 
@@ -35,6 +36,7 @@ from sphinx.application import Sphinx
 
 import wm_drake
 from wm_drake.simulation.measures import MEASURES
+from wm_drake.studio.exported import export_page
 
 NAMES = "<!-- public names -->"
 COMMANDS, MEASURED = "<!-- command options -->", "<!-- measures -->"
@@ -42,6 +44,9 @@ BELOW, ROOMS = "<!-- pages of decisions -->", "<!-- architecture -->"
 TREE_BELOW = "```{toctree}\n:hidden:\n:glob:\n\n0*\n```"
 FUNCTIONS = re.compile(r"<!-- functions of ([\w.]+)(?:: ([\w ]+))? -->")
 PICTURE = re.compile(r"<!-- picture ([\w-]+) -->")
+MACHINE = re.compile(r"<!-- machine ([\w-]+) -->")
+LIVE = "_static/machine-{}.html"
+"""Where the page of a machine is in the manual."""
 LINK = re.compile(r"(?<!!)\[([^\]]*)\]\(([^)\s]+?)(#[^)\s]*)?\)")
 PAGE_OF_MANUAL = re.compile(r"`?docs/([\w/-]+)\.md`?")
 SECTION = re.compile(r"(Args|Returns|Raises|Yields|Attributes|Example):$")
@@ -73,6 +78,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.connect("env-before-read-docs", _spread)
     app.connect("source-read", _complete)
     app.connect("include-read", _complete_included)
+    app.connect("build-finished", _export_machines)
     app.connect("autodoc-process-docstring", _plain_docstring, priority=400)  # before napoleon
     return {"parallel_read_safe": True}
 
@@ -108,7 +114,27 @@ def _complete(app: Sphinx, docname: str, source: list[str]) -> None:
         text = text.replace(ROOMS, f"```{{raw}} html\n{architecture.svg()}\n```")
     text = FUNCTIONS.sub(lambda match: _documented(_functions(match[1], match[2])), text)
     text = PICTURE.sub(lambda match: _drawn(match[1]), text)
+    text = MACHINE.sub(lambda match: _live(match[1], docname), text)
     source[0] = _relinked(text, Path(app.srcdir), Path(app.srcdir, docname).parent, docname)
+
+
+def _live(name: str, docname: str) -> str:
+    """Return a frame, folded, with the page of a machine; the browser loads it when it opens."""
+    source = "../" * docname.count("/") + LIVE.format(name)
+    return (
+        f"```{{raw}} html\n<details class='live'><summary>Run the machine {name} here</summary>\n"
+        f"<iframe loading='lazy' title='the machine {name}' src='{source}'></iframe></details>\n```"
+    )
+
+
+def _export_machines(app: Sphinx, error: Exception | None) -> None:
+    """Write the page of each machine that a page of the manual shows."""
+    if error is not None or app.builder.format != "html":
+        return
+    pages = (path.read_text(encoding="utf-8") for path in Path(app.srcdir).rglob("*.md"))
+    for name in sorted({name for text in pages for name in MACHINE.findall(text)}):
+        out = Path(app.outdir, LIVE.format(name))
+        export_page(wm_drake.load_machine(name), out)
 
 
 def _complete_included(app: Sphinx, path: Path, _docname: str, content: list[str]) -> None:

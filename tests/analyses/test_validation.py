@@ -29,8 +29,10 @@ from analysis_tools.validation_rows import (
 )
 
 from wm_drake.parameters import PublishedTerm
+from wm_drake.parameters.units import Unit
+from wm_drake.report.quantity import Quantity
 from wm_drake.studies.doe.design import make_design
-from wm_drake.studies.gasket.screening import Responses, run_screening
+from wm_drake.studies.gasket.screening import run_screening, runs_of
 
 
 @pytest.fixture
@@ -83,10 +85,10 @@ def test_effects_are_judged_by_their_sign():
 
 def test_means_are_those_of_the_screening():
     design = make_design("full", ("C_L", "C_T"))
-    frame = pd.DataFrame({"Dx": 13.0 + design.levels[:, 0], "Dy": 5.0 + design.levels[:, 1]})
-    screening = run_screening(
-        design, lambda _: Responses({"middle": frame}, {"Dx": "mm", "Dy": "mm"}, {})
-    )
+    length = Quantity("displacement", Unit("m", "mm"))
+    one = {"Dx": 0.013 + 1e-3 * design.levels[:, 0], "Dy": 5e-3 + 1e-3 * design.levels[:, 1]}
+    quantities = dict.fromkeys(one, length)
+    screening = run_screening(design, lambda _: runs_of({"middle": one}, quantities))
     known = {
         ("middle", "Dx"): {"constant": PublishedTerm(None, (10.0,))},
         ("middle", "Dy"): {"constant": PublishedTerm(None, (2.0,))},

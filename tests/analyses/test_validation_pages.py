@@ -41,7 +41,7 @@ def test_every_miss_has_its_reason_and_every_section_its_command():
     assert UNEXPLAINED not in text_of(PAGE)
     assert f"**{MISSED}**" in text_of(PAGE)
     compared = [section for section in SECTIONS if section.startswith("[")]
-    assert len(compared) == 8
+    assert len(compared) == 7
     for section in compared:
         assert re.search(r"^Command: `(wm-drake|python analyses/)", section, re.M), section[:40]
         assert "\nTolerance: " in section, section[:40]

@@ -153,7 +153,7 @@ def test_command_writes_the_same_tables_if_the_cluster_loses_a_worker(
     Path("p.yaml").write_text("time: (0, 8) s\nspeed: (0, 60) rpm\n")
     factors = ("--factor", "K_Lx", "--factor", "C_L", "--factor", "K_Ty")
     study = ("study", "gasket", "--design", "full", *factors, "--profile", "p.yaml")
-    monkeypatch.setattr("wm_drake.studies.gasket.page.GasketResult.page", lambda *_: "")
+    monkeypatch.setattr("wm_drake.studies.answer.Answer.page", lambda *_: "")
     # the check of the step runs in this process, not on the cluster
     monkeypatch.setattr("wm_drake.studies.executor.Executor.step_error", lambda executor: None)
     assert wm_drake(*study, "--out", "here").code == 0

@@ -4,7 +4,7 @@
 const faults = [];
 const summary = document.querySelector("main > .summary"), made = document.getElementById("run");
 const figures = [...document.querySelectorAll("main figure")];
-const tables = [...document.querySelectorAll("main table:not(.goals):not(.control)")].filter(table => !table.closest(".answer, #what-to-do"));
+const tables = [...document.querySelectorAll("main table:not(.control)")].filter(table => !table.closest(".answer"));
 const before = (a, b) => Boolean(a.compareDocumentPosition(b) & Node.DOCUMENT_POSITION_FOLLOWING);
 if (!summary || !/\d/.test(summary.textContent) || !/[.]$/.test(summary.textContent.trim())) faults.push("no answer with numbers");
 if (!made || !made.querySelector("dl")) faults.push("nothing says how the page was made");

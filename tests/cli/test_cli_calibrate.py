@@ -56,26 +56,31 @@ def test_planted_friction_comes_back_from_command_line_to_report(wm_drake):
     ended = wm_drake(command, "--json", "--out", "out")
     assert ended.code == 0, ended.err
     result = json.loads(ended.out)
-    friction, radius = result["quantities"]
-    assert friction["value_1"] == pytest.approx(TRUTH, abs=0.5)
-    assert friction["held_by_1"] == "data"
+    friction, radius = result["estimates"]
+    assert friction["value"] == pytest.approx(TRUTH, abs=0.5)
+    assert friction["lower_95"] < friction["value"] < friction["upper_95"]
+    assert friction["held_by"] == "data"
     assert radius["unit"] == "mm"
-    assert result["solutions"][0]["largest_percent"] < 2.0
-    assert result["predictions"][0]["loads"] == ["back"]
+    assert result["searches"][0]["largest_percent"] < 2.0
+    assert result["predictions"][0]["held_out"] == "back"
     names = {path.name for path in Path("out").iterdir()}
     assert names == {
-        "report.html", "machine_1.yaml", "quantities.csv", "amplitudes.csv",
+        "report.html", "machine_1.yaml", "estimates.csv", "solutions.csv", "correlations.csv", "amplitudes.csv", "differences.csv",
+        "predictions.csv", "intervals_back.csv", "critical_speeds.csv", "gaps.csv", "searches.csv",
         "ledger.sqlite", "run.json",
     }  # fmt: skip
     written = load_machine(Path("out/machine_1.yaml"))
     assert written.damper_types["friction"].friction_force == pytest.approx(
-        friction["value_1"], abs=0.01
+        friction["value"], abs=0.01
     )
     assert written.sources["damper_types.friction.friction_force"].startswith("fit: friction")
     assert written.name == "short_calibrated_1"
     table = pd.read_csv("out/amplitudes.csv")
     assert np.allclose(
-        *(table[table.source == source][SENSORS] for source in ("experiment", "solution 1")),
+        *(
+            table[table.source == source][[f"{name}_mm" for name in SENSORS]]
+            for source in ("experiment", "solution 1")
+        ),
         rtol=0.03,
     )
     again = wm_drake(command, "--json", "--out", "out")
@@ -83,6 +88,6 @@ def test_planted_friction_comes_back_from_command_line_to_report(wm_drake):
     assert json.loads(again.out) | {"wall_s": 0.0} == result | {"wall_s": 0.0}
     shown = wm_drake(command, "--out", "out").out
     value = next(line for line in shown.splitlines() if "friction" in line)
-    assert f"{friction['value_1']:.4g}" in value
+    assert f"{friction['value']:.4g}" in value
     assert " N " in value
     assert "data" in value

@@ -1,4 +1,4 @@
-"""Tests of `wm-drake study drive`: output."""
+"""A warning of `wm-drake study drive`, which runs many batches."""
 
 from pathlib import Path
 
@@ -15,13 +15,6 @@ def study(wm_drake):
     return lambda out, *arguments: wm_drake(
         "study", "drive", *small, "--profile", "p.yaml", "--out", out, *arguments
     )
-
-
-def test_without_random_loads_no_file_of_the_estimation_is_written_or_named(study):
-    ended = study("out", "--loads", "0")
-    assert ended.code == 0
-    assert not Path("out/estimation.csv").exists()
-    assert "estimation.csv" not in ended.out
 
 
 def test_friction_that_no_step_resolves_is_said_once_and_on_the_page(study):

@@ -44,20 +44,23 @@ def test_the_answer_and_the_advice_are_those_of_single_runs(verdict):
         assert row["smallest_gap_mm"] == pytest.approx(1e3 * gap, rel=1e-9)
         assert row["speed_rpm"] == pytest.approx(30.0 / 3.14159265 * speed, rel=1e-4)
         assert row["between"] == parts
-    ((numbers,), (single, both)) = shown["numbers"], shown["changes"]
+    (numbers,), (proposed,) = shown["numbers"], shown["proposed"]
     assert numbers["verdict"] == "clear"
     laundry, _ = shown["laundry_probability"]
     assert laundry["upper_percent"] == pytest.approx(100.0 * (1.0 - 0.05 ** (1 / 16)))
-    assert numbers["smallest_gap_mm"] < single["smallest_gap_mm"] < both["smallest_gap_mm"]
-    sets = [word for word in shlex.split(both["sets"]) if word != "--set"]
+    words = shlex.split(proposed["line_to_copy"])
+    assert words[:3] == ["wm-drake", "verdict", "reference"]
+    sets = [word for word in words if "=" in word]
+    assert len(sets) == len(shown["changes"])
     changed = with_values(reference, dict(text.split("=") for text in sets))
     gaps = [gap for gap, _, _ in smallest_gaps(changed).values()]
-    assert both["smallest_gap_mm"] == pytest.approx(1e3 * min(gaps), rel=1e-9)
-    words = shlex.split(numbers["line_to_copy"])
-    assert words[:3] == ["wm-drake", "verdict", "reference"]
-    assert [word for word in words if "=" in word] == sets
+    (gap,) = [row for row in shown["proposal"] if row["response"] == "gap"]
+    assert gap["before"] == pytest.approx(numbers["smallest_gap_mm"], rel=1e-9)
+    assert gap["after"] == pytest.approx(1e3 * min(gaps), rel=1e-9)
+    assert gap["after"] > gap["before"]
+    assert max(row["loss_percent"] for row in shown["proposal"]) <= 10.0
     page = Path("out/report.html").read_text(encoding="utf-8")
-    assert page.index("The tub does not touch the housing") < page.index("Best combination")
+    assert page.index("The tub does not touch the housing") < page.index("Proposal")
 
 
 @pytest.mark.parametrize(

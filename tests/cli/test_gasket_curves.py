@@ -93,8 +93,6 @@ def test_constants_are_fitted_to_a_tension_test(wm_drake):
     assert fitted.test.deviation < 1e-12
     ended = wm_drake("gasket", "curves", "mine.yaml", *SMALL, "--out", "out")
     assert ended.code == 0, ended.err
-    page = Path("out/report.html").read_text(encoding="utf-8")
-    assert "root mean square of fit less test" in page
 
 
 def test_stress_in_tension_is_the_slope_of_the_energy():

@@ -141,7 +141,7 @@ CASES = {  # command -> arguments, message, more files
     "identify damper": [
         ("none.csv", "none.csv: no such file"),
         ("bad.csv", "bad.csv: displacement is not resolved by its samples"),
-        ("bad.csv --units s,mm", "--units: 's,mm' is not three units"),
+        ("bad.csv --file-units s,mm", "--file-units: 's,mm' is not three units"),
         ("good.csv --method newton", "--method: no method 'newton'"),
         ("good.csv --law glue", "--law: no law 'glue' of a damper"),
         ("good.csv --bounds 'friction=1 N'", "--bounds: unknown number 'friction'"),

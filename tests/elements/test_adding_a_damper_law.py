@@ -67,7 +67,7 @@ from wm_drake.parameters import load_machine, with_value
 from wm_drake.rigs import Harmonic, damper_bench, force_loops, measures_of
 from wm_drake.parameters.loop_files import MeasuredLoop
 from wm_drake.rigs.measured import measured_motion
-from wm_drake.studies.fitting.methods import least_squares
+from wm_drake.studies.fitting.methods import identify
 from wm_drake.studies.identify.models import Given, damper_model
 from wm_drake.studies.identify.problem import fit_problem
 from both_engines import difference
@@ -100,7 +100,7 @@ for motion, loop in zip(motions, force_loops(damper_bench(planted), motions)):
     twice = lambda values: np.tile(values, 2)[::20]
     loops.append(measured_motion(MeasuredLoop(
         f"{motion.frequency}", "", time, twice(loop.displacement), twice(loop.force), False)))
-fit = least_squares(fit_problem(damper_model("relaxation", loops, Given(knots=2)), loops), starts=3)
+fit = identify(fit_problem(damper_model("relaxation", loops, Given(knots=2)), loops), starts=3)
 found["fit"] = {estimate.name: estimate.value for estimate in fit.estimates}
 try:
     damper_model("relax", loops)

@@ -31,6 +31,29 @@ def test_they_agree_without_load_gasket_and_dampers_and_with_other_numbers():
     assert difference(machine, parameters=other) < 1e-10
 
 
+LOOSE = {
+    "radial_stiffness": 2e4,
+    "clearance": 2e-4,
+    "contact_stiffness": 4e6,
+    "contact_damping": 600.0,
+}
+
+
+def test_they_agree_in_and_beyond_a_clearance():
+    assert difference(build_machine(with_bearing(load_machine("reference"), **LOOSE))) < 1e-10
+
+
+def test_a_drum_that_hits_its_bearing_moves_as_in_drake():
+    machine = build_machine(with_bearing(load_machine("reference"), step=1e-4, **LOOSE))
+    case = Case("two", LOAD, SpinProfile(time=(0.0, 0.301, 1.0), speed=(8.0, 30.0, 60.0)))
+    drake = simulate(machine, case, "drake")
+    compiled = simulate(machine, case)
+    x, z = drake.drum_displacement.sel(axis=["x", "z"]).values.T
+    assert np.hypot(x, z).max() > LOOSE["clearance"]
+    assert np.ptp(np.unwrap(np.arctan2(x, z))) > 2.0 * np.pi  # it is pulled out and goes round
+    check_alike(compiled, drake, ("displacement", "drum_displacement"), 1e-2)
+
+
 def machine_of(sdf):
     return MachineParameters.model_validate(WHIRLING.model_dump() | {"model": sdf})
 

@@ -13,6 +13,7 @@ from wm_drake.engines.compiled.step_check import fastest_motion
 from wm_drake.errors import InputError
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import (
+    Bearing,
     Load,
     MachineParameters,
     SpinProfile,
@@ -145,6 +146,102 @@ def test_a_couple_tilts_the_drum_as_its_gyroscopic_moment_lets_it(balls, speed):
     assert abs(cosine - 1j * sine) < 0.9 * abs(couple / TILTING) or speed < 100.0
 
 
+CLEARANCE, CONTACT, SOFT = 5e-5, 1e6, 1e3  # m, N/m, N/m
+LOOSE = SIX_BALLS | {
+    "radial_stiffness": SOFT,
+    "radial_damping": 100.0,
+    "clearance": CLEARANCE,
+    "contact_stiffness": CONTACT,
+    "contact_damping": 300.0,
+}
+SLOW, MASS = 25.0, 0.3  # rad/s, far below all modes of the bearing; kg
+
+
+def loose_machine(gravity):
+    """Return tub and drum as `balls` has them, the drum with play in its bearing."""
+    tree = isotropic_machine().model_dump() | {"gravity": gravity}
+    parameters = MachineParameters.model_validate(tree)
+    return build_machine(with_bearing(parameters, step=2.5e-4, **LOOSE))
+
+
+@pytest.fixture(scope="module")
+def loose():
+    return loose_machine(gravity=9.81)
+
+
+def across(record):
+    """Return the displacement of the drum across its axis as complex numbers, z + i x. [m]"""
+    return record.drum_displacement.sel(axis="z").values + 1j * (
+        record.drum_displacement.sel(axis="x").values
+    )
+
+
+def last_turns(record):
+    return record.sel(time=slice(float(record.time[-1]) - 2.0, None))
+
+
+def test_at_rest_the_drum_lies_at_the_bottom_of_its_clearance(loose):
+    setup = loose.set_up()
+    sag = setup.rest_pose[5] - setup.carrier_rest[5]
+    pressed = (DRUM * 9.81 - SOFT * CLEARANCE) / (SOFT + CONTACT)
+    assert sag == pytest.approx(CLEARANCE + pressed, rel=1e-4)  # the tub tilts a little
+    assert np.abs(setup.residual).max() < 1e-8
+
+
+@pytest.mark.parametrize("ratio", [0.5, 0.85, 1.2, 2.0])
+def test_the_drum_is_pulled_out_where_the_rotating_force_exceeds_its_weight(loose, ratio):
+    # at a speed far below the modes of the bearing the drum lies where the force on it points
+    inner, weight = DRUM + MASS, (DRUM + MASS) * 9.81
+    tub = STIFFNESS + 1j * SLOW * DAMPING - (inner + TUB) * SLOW**2
+    moved_with_tub = abs(1.0 + inner * SLOW**2 / tub)
+    radius = ratio * weight / (MASS * SLOW**2 * moved_with_tub)
+    case = Case("one", unbalance(MASS, radius), constant_speed(SLOW, 14.0))
+    record = last_turns(simulate(loose, case))
+    moved = across(record)
+    turns = np.ptp(np.unwrap(np.angle(moved))) / (2.0 * np.pi)
+    assert (turns > 6.0) if ratio > 1.0 else (turns < 0.5)
+    if 0.5 < ratio < 2.0:
+        return  # near that speed the force vanishes once a turn, and the drum flies a part of it
+    time, place = record.time.values, record.tub_position
+    tub_path = place.sel(axis="z").values + 1j * place.sel(axis="x").values
+    acceleration = np.gradient(np.gradient(tub_path, time), time)
+    unbalanced = MASS * radius * SLOW**2 * np.exp(1j * record.drum_angle.values)
+    force = unbalanced - weight - inner * acceleration
+    size = (np.abs(force) + CONTACT * CLEARANCE) / (SOFT + CONTACT)
+    wrong = np.abs(moved - size * force / np.abs(force))[2:-2]  # no differences at the ends
+    # inertia and damping of the drum's motion in the bearing: 2 N of 70 to 210
+    assert wrong.max() < 0.03 * size.max()
+
+
+def test_without_gravity_the_orbit_is_a_circle_of_closed_form():
+    machine, speed = loose_machine(gravity=0.0), 80.0
+    mass, radius = 0.05, 0.25
+    record = last_turns(
+        simulate(machine, Case("one", unbalance(mass), constant_speed(speed, 14.0)))
+    )
+    # inner body: (N - u w^2) / (m w^2); outer body: N / (K + i w D - M w^2); N = k rho - k_c c
+    k, m, u = SOFT + CONTACT, DRUM + mass, mass * radius
+    tub = STIFFNESS - TUB * speed**2
+    slope = 1.0 / (m * speed**2) - 1.0 / tub
+    rho = (slope * CONTACT * CLEARANCE + u / m) / (k * slope - 1.0)
+    found = np.abs(across(record))
+    assert found == pytest.approx(abs(rho), rel=5e-3)
+    assert abs(rho) > CLEARANCE
+
+
+@pytest.mark.parametrize(
+    ("numbers", "message"),
+    [
+        ({"clearance": 1e-4}, "a clearance needs the stiffness of the contact beyond it"),
+        ({"contact_stiffness": 1e7}, "belong to a clearance above 0"),
+        ({"clearance": -1e-4, "contact_stiffness": 1e7}, "greater than or equal to 0"),
+    ],
+)
+def test_a_clearance_and_its_contact_belong_together(numbers, message):
+    with pytest.raises(ValueError, match=message):
+        Bearing(**BEARING | numbers)
+
+
 def test_amplitudes_tend_to_those_of_a_perfect_joint_with_the_give(machine, reference):
     load = reference.loads["front"]
     perfect = simulate(machine, Case("front", load, RUN_UP), step=2.5e-4).displacement.values
@@ -231,6 +328,14 @@ def test_the_fastest_motion_of_two_bodies_on_a_spring_is_the_closed_form(balls):
     axial = np.sqrt(BEARING["axial_stiffness"] * (1.0 / DRUM + 1.0 / TUB))
     # rad/s; the stiffest direction
     assert fastest_motion(balls.set_up()).rate == pytest.approx(axial, rel=1e-4)
+
+
+def test_the_fastest_motion_counts_the_contact_though_the_drum_hangs_within_its_clearance():
+    numbers = LOOSE | {"contact_stiffness": 1e8, "clearance": 1e-3}
+    parameters = MachineParameters.model_validate(isotropic_machine().model_dump())
+    floating = build_machine(with_bearing(parameters, step=2.5e-5, **numbers))  # no gravity
+    radial = np.sqrt((1e8 + SOFT) * (1.0 / DRUM + 1.0 / TUB))  # rad/s
+    assert fastest_motion(floating.set_up()).rate == pytest.approx(radial, rel=0.02)
 
 
 @pytest.mark.parametrize(("pieces", "allowed"), [(5, "1 ms"), (7, "0.7143 ms, such as 0.625 ms")])

@@ -1,6 +1,7 @@
 """Tests of usual ranges: shipped machines are inside, slips of unit and keyboard are found."""
 
 import pytest
+from simple_machines import SPONGES
 
 from wm_drake.model.build import build_machine
 from wm_drake.model.expectations import unusual_springs, unusual_values
@@ -74,7 +75,7 @@ spring_types:
 
 def test_every_range_belongs_to_a_number_and_has_its_unit(tmp_path):
     (tmp_path / "more.yaml").write_text(MORE)
-    machines = map(load_machine, [*shipped_machines(), tmp_path / "more.yaml"])
+    machines = map(load_machine, [*shipped_machines(), SPONGES, tmp_path / "more.yaml"])
     units = {key: unit.shown for machine in machines for key, _, unit in quantities(machine)}
     units |= dict.fromkeys(load_gasket_drawing("folded").sizes, "mm")
     used = {usual: key for key in units if (usual := usual_range(key)) and usual.unit == units[key]}

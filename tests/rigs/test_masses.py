@@ -52,12 +52,11 @@ def test_a_motion_beyond_a_table_is_told_with_its_reach():
     assert beyond_tables(damper_bench(MSTV), [Harmonic(1.0, 1.0)]) == []
 
 
-def test_command_prints_the_effect_of_masses(wm_drake):
+def test_command_writes_the_effect_of_masses(wm_drake):
     bench = ("rig", "damper", "--machine", "free_stroke", "-f", "7 Hz", "-a", "5 mm")
     ended = wm_drake(*bench, "--outer-mass", "150 g", "--jig-mass", "2 kg", "--out", "out")
     assert ended.code == 0
     largest = 2.15 * (2.0 * np.pi * 7.0) ** 2 * 5e-3
-    assert f"The masses change the force by up to {largest:.3g} N" in ended.out
     table = pd.read_csv("out/masses.csv")
     assert table.largest_difference_N[0] == pytest.approx(largest, rel=1e-6)
 

@@ -34,6 +34,7 @@ def locked(ring, *directions):
     return replace(ring, locked=without)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bulk", [500.0, 5000.0, 500000.0])
 def test_long_bush_in_radial_shear_does_not_lock(bulk):
     """Poisson's ratio 0.499, 0.4999, 0.499999: rubber that cannot give way but around."""

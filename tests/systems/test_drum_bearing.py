@@ -8,15 +8,20 @@ from pydrake.autodiffutils import ExtractGradient, InitializeAutoDiff
 from pydrake.math import RollPitchYaw, RotationMatrix
 from scipy.spatial.transform import Rotation
 
-from wm_drake.elements.bearing import DRUM_BEARING, FORCE_SIZE, drum_bearing_history
-from wm_drake.elements.bushing import SixComponentBushingParameters, packed_bushing_law
+from wm_drake.elements.bearing import (
+    DRUM_BEARING,
+    FORCE_SIZE,
+    DrumBearingParameters,
+    drum_bearing_history,
+)
+from wm_drake.elements.bushing import packed_bushing_law
 from wm_drake.parameters import Bearing
 from wm_drake.systems.element_system import ElementSystem
 
 POINT = np.array([0.02, 0.15, -0.01])  # m
 R_TB = RotationMatrix(RollPitchYaw([0.2, 0.0, -0.1])).matrix()
 LAW = packed_bushing_law(Bearing(**BEARING, torsional_stiffness=7e3).as_bushing())
-PACKED = SixComponentBushingParameters(POINT, R_TB, POINT, R_TB, LAW).packed()
+PACKED = DrumBearingParameters(POINT, R_TB, POINT, R_TB, LAW).packed()
 
 
 @pytest.fixture(scope="module")
@@ -113,7 +118,31 @@ def test_history_is_what_the_port_says(system):
     )
 
 
-def test_derivatives_are_those_of_finite_differences(system):
+CLEARANCE = {"clearance": 1e-4, "contact_stiffness": 2e7, "contact_damping": 3e3}
+
+
+@pytest.fixture(scope="module")
+def loose():
+    """Return a bearing with a clearance, and little stiffness within it."""
+    law = packed_bushing_law(Bearing(**BEARING | {"radial_stiffness": 1e4}).as_bushing())
+    placed = DrumBearingParameters(POINT, R_TB, POINT, R_TB, law, **CLEARANCE)
+    return ElementSystem(DRUM_BEARING, placed.packed())
+
+
+def test_beyond_the_clearance_shaft_and_bearing_touch(loose):
+    x = np.zeros(28)
+    for depth, pressed in ((0.8e-4, 0.0), (1.5e-4, 0.5e-4)):
+        x[17:20] = R_TB @ [0.6 * depth, 0.0, -0.8 * depth]
+        force, own = answers(loose, x)
+        size = 1e4 * depth + 2e7 * pressed
+        np.testing.assert_allclose(own[6:9], size * np.array([0.6, 0.0, -0.8]), atol=1e-9)
+        np.testing.assert_allclose(force[3:6], R_TB @ own[6:9], atol=1e-9)
+        np.testing.assert_allclose(force[10:13], -force[3:6], atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["system", "loose"])
+def test_derivatives_are_those_of_finite_differences(kind, request):
+    system = request.getfixturevalue(kind)
     differentiable, x = system.ToAutoDiffXd(), states(1, seed=43)[0]
     context = differentiable.CreateDefaultContext()
     differentiable.GetInputPort("plant_state").FixValue(context, InitializeAutoDiff(x).ravel())

@@ -20,11 +20,14 @@ from wm_drake.compiler.lanes import WIDTH
 from wm_drake.errors import InputError
 from wm_drake.model.machine import Machine
 from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import Unit
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.steps import checked_integrator, checked_step
 
 LARGEST_DIFFERENCE = 0.02
 """Largest difference of amplitudes that needs no warning, by the largest amplitude of the run."""
+
+MS, PERCENT = Unit("s", "ms"), Unit("", "%")
 
 MOST_RUNS = WIDTH
 """Largest number of runs that are run again: one batch."""
@@ -58,11 +61,12 @@ class StepError:
         if not np.isfinite(self.difference):
             differ = f"one of the two runs of '{self.case}' diverges"
         else:
-            differ = f"amplitudes of '{self.case}' differ by {100.0 * self.difference:.2g} %"
-        return (
-            f"with half the step of {1e3 * self.step:g} ms and half the {1e3 * self.period:g} ms "
-            f"between samples, {differ}"
-        )
+            differ = (
+                f"amplitudes of '{self.case}' differ by {PERCENT.from_si(self.difference):.2g} %"
+            )
+        step, period = map(MS.from_si, (self.step, self.period))
+        halved = f"half the step of {step:g} ms and half the {period:g} ms between samples"
+        return f"with {halved}, {differ}"
 
     @property
     def warning(self) -> str:

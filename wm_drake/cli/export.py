@@ -12,6 +12,7 @@ from wm_drake.report.terminal import say
 from wm_drake.studies.inputs import load_parameters, located_in, machine_warnings
 
 app = typer.Typer(no_args_is_help=True)
+DEFAULT_PAGE = Path("machine.html")
 
 
 @app.callback()
@@ -47,3 +48,27 @@ def fmu(
 
 
 app.command("fmu")(with_options(fmu, FmuOptions))
+
+
+@app.command()
+def page(
+    machine: MachineOption = "reference",
+    load: Annotated[
+        list[str] | None,
+        typer.Option(help="Load that the page runs, repeatable. Default: all.", metavar="NAME"),
+    ] = None,
+    out: Annotated[Path, typer.Option(help="File to write.", metavar="FILE.html")] = DEFAULT_PAGE,
+    sets: SetOption = None,
+) -> None:
+    """Write a machine as one HTML file that runs it in a browser, without installation."""
+    from wm_drake.studio.exported import export_page
+
+    parameters = load_parameters(machine, sets)
+    for text in machine_warnings(parameters):
+        say(f"warning: {text}", err=True)
+    with located_in(machine):
+        written = export_page(parameters, out, load or (), machine, sets or ())
+    say(
+        f"{out}: {written.movable} numbers to move, {written.fixed} fixed; "
+        f"{written.size / 1e3:.0f} kB"
+    )

@@ -21,11 +21,12 @@ from pathlib import Path
 from typing import Any
 
 import numba
+import numpy as np
 from numba import config
 from numba.extending import is_jitted
 
 from wm_drake.compiler.cache_files import LawCache, say_once
-from wm_drake.compiler.lanes import LawCompiler
+from wm_drake.compiler.lanes import LawCompiler, number_array, stack_array
 
 _PACKAGE = Path(__file__).parents[1]
 
@@ -107,6 +108,40 @@ def generic(compiled: Any) -> Callable[..., Any]:
     return types.FunctionType(
         source.__code__, names, source.__name__, source.__defaults__, source.__closure__
     )
+
+
+@numba.njit
+def _nothing():
+    """Do nothing, where a loop for lanes aligns its stack."""
+
+
+@numba.njit(inline="always")
+def _zeros(shape):
+    """Return an array of zeros on the stack of the calling function."""
+    array = stack_array(shape)
+    array[:] = 0.0
+    return array
+
+
+_ON_STACK = types.ModuleType("arrays_on_stack")
+"""In place of numpy in a loop for one run: its arrays need no memory of Python."""
+vars(_ON_STACK).update(empty=stack_array, zeros=_zeros, inf=np.inf, nan=np.nan)
+
+
+def for_one_run(loop: Any) -> Any:
+    """Return a long-running loop for a single run: its arrays of lanes are arrays of floats.
+
+    The source is the same, so that a program without this package measures what a batch measures.
+    The loop must not call others that fill lanes, and may take of numpy only `_ON_STACK`.
+    """
+    source = loop.py_func
+    single = {
+        "lane_array": number_array, "align_stack": _nothing, "WIDTH": 1, "np": _ON_STACK
+    }  # fmt: skip
+    function = types.FunctionType(
+        source.__code__, source.__globals__ | single, source.__name__, source.__defaults__
+    )
+    return numba.njit(error_model="numpy", fastmath={"contract", "nsz"})(function)
 
 
 CACHE_FOLDER = _cache_folder()

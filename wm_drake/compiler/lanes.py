@@ -236,6 +236,35 @@ def number_array(typing_context, array):
 
 
 @intrinsic
+def stack_array(typing_context, shape):
+    """Return an array of floats on the stack of the calling function, of one or two dimensions."""
+    is_tuple = isinstance(shape, types.BaseTuple)
+    array = types.Array(types.float64, len(shape) if is_tuple else 1, "C")
+
+    def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        sizes = cgutils.unpack_tuple(builder, args[0]) if is_tuple else [args[0]]
+        word = context.get_value_type(types.intp)
+        sizes = [builder.sext(n, word) if n.type.width < word.width else n for n in sizes]
+        strides, stride = [], word(8)
+        for n in reversed(sizes):
+            strides.insert(0, stride)
+            stride = builder.mul(stride, n)
+        made = context.make_array(array)(context, builder)
+        count = builder.udiv(stride, word(8))
+        context.populate_array(
+            made,
+            data=builder.alloca(ir.DoubleType(), count),
+            shape=sizes,
+            strides=strides,
+            itemsize=8,
+            meminfo=None,
+        )
+        return made._getvalue()
+
+    return array(shape), emit
+
+
+@intrinsic
 def keep(typing_context, array):
     """Do nothing but use an array, so that its memory is not freed before.
 

@@ -109,6 +109,10 @@ class SixComponentBushingParameters:
     @packed_once
     def packed(self) -> FloatArray:
         """Return the numbers of `BUSHING`."""
+        return self.packed_bushing()
+
+    def packed_bushing(self) -> FloatArray:
+        """Return the numbers of `BUSHING`, packed anew."""
         return BUSHING.pack(
             tub_side_point=self.tub_side_point,
             tub_side_rotation=self.tub_side_rotation,

@@ -92,13 +92,7 @@ class SpringStrutParameters:
         """Tension from which it is fully taut; -inf if it pushes. [N]"""
         if self.pushes:
             return -math.inf
-        stretched, drawn = (
-            stiffness_force(x, self.packed_stiffness, 0) for x in (SLACK_TRANSITION, 0.0)
-        )
-        w = stretched - drawn
-        if self.preload > 0.0:
-            w = min(w, _LARGEST_SHARE * self.preload)
-        return max(w, _SMALLEST_TAUT)
+        return float(taut_tension(self.preload, self.packed_stiffness, 0))
 
     def tension(self, length: float) -> float:
         """Return its tension at a length. [m -> N]"""
@@ -124,6 +118,20 @@ class SpringStrutParameters:
             taut_from=self.taut_from,
             stiffness=self.packed_stiffness,
         )
+
+
+@law
+def taut_tension(preload, packed, at):
+    """Return the tension from which a spring that goes slack is fully taut. [N]
+
+    Args:
+        preload: [N]
+        packed, at: Array that holds the packed stiffness, and where it begins.
+    """
+    w = stiffness_force(SLACK_TRANSITION, packed, at) - stiffness_force(0.0, packed, at)
+    if preload > 0.0:
+        w = min(w, _LARGEST_SHARE * preload)
+    return max(w, _SMALLEST_TAUT)
 
 
 @law

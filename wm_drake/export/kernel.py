@@ -112,26 +112,24 @@ def pointer_at(typing_context, pointer, index):
 
 
 @law
-def set_unbalance(p, v, at, c, drum):
-    """Add a point mass in the drum to sums: mass, first moment and inertia about O, in T.
+def add_point_mass(p, mass, q, c, frame):
+    """Add a point mass to sums: mass, first moment and inertia about O, in T.
 
     Args:
         p: Sums (10,), changed. [kg, kg m, kg m^2]
-        v, at: Numbers of an instance, and index of those of the unbalance.
-        c, drum: Constants, and index of `Constants.drum`.
+        mass, q: The mass and its position in the frame of its body. [kg, m]
+        c, frame: Constants, and index of rotation and position of that frame, as
+            `Constants.drum`.
     """
-    mass, phase, y, radius = v[at], v[at + 1], v[at + 2], v[at + 3]
-    s, k = np.sin(phase), np.cos(phase)
-    q = (radius * s, y, radius * k)
-    x = c[drum] * q[0] + c[drum + 1] * q[1] + c[drum + 2] * q[2] - c[drum + 9]
-    y_T = c[drum + 3] * q[0] + c[drum + 4] * q[1] + c[drum + 5] * q[2] - c[drum + 10]
-    z = c[drum + 6] * q[0] + c[drum + 7] * q[1] + c[drum + 8] * q[2] - c[drum + 11]
+    x = c[frame] * q[0] + c[frame + 1] * q[1] + c[frame + 2] * q[2] - c[frame + 9]
+    y = c[frame + 3] * q[0] + c[frame + 4] * q[1] + c[frame + 5] * q[2] - c[frame + 10]
+    z = c[frame + 6] * q[0] + c[frame + 7] * q[1] + c[frame + 8] * q[2] - c[frame + 11]
     p[0] = p[0] + mass
-    p[1], p[2], p[3] = p[1] + mass * x, p[2] + mass * y_T, p[3] + mass * z
-    p[4] = p[4] + mass * (y_T * y_T + z * z)
+    p[1], p[2], p[3] = p[1] + mass * x, p[2] + mass * y, p[3] + mass * z
+    p[4] = p[4] + mass * (y * y + z * z)
     p[5] = p[5] + mass * (x * x + z * z)
-    p[6] = p[6] + mass * (x * x + y_T * y_T)
-    p[7], p[8], p[9] = p[7] - mass * x * y_T, p[8] - mass * x * z, p[9] - mass * y_T * z
+    p[6] = p[6] + mass * (x * x + y * y)
+    p[7], p[8], p[9] = p[7] - mass * x * y, p[8] - mass * x * z, p[9] - mass * y * z
 
 
 @law
@@ -193,12 +191,23 @@ def kernel(plan: Any) -> dict[str, Any]:
 
 def _preparation(plan: Any) -> Any:
     """Return the function (v, c) that packs the numbers, with the parameters and the unbalance."""
-    at, of, count = plan.at, plan.of, plan.count
+    write_rows, add_load = row_writer(plan), load_adder(plan)
 
     @njit(**OPTIONS)
     def prepare(v, c):
-        numbers, constants = numbers_at(v, 0), numbers_at(c, 0)
-        p, sums = numbers_at(v, at.packed), numbers_at(v, at.total)
+        write_rows(v, c)
+        add_load(v, c)
+
+    return prepare
+
+
+def row_writer(plan: Any) -> Any:
+    """Return the function (v, c) that packs the numbers with the parameters, without unbalance."""
+    at, of, count = plan.at, plan.of, plan.count
+
+    @njit(**OPTIONS)
+    def write_rows(v, c):
+        numbers, constants, p = numbers_at(v, 0), numbers_at(c, 0), numbers_at(v, at.packed)
         for k in range(count.packed):
             p[k] = constants[of.packed + k]
         for k in range(count.entries):
@@ -206,11 +215,38 @@ def _preparation(plan: Any) -> Any:
             row, parameter = int(constants[entry]), int(constants[entry + 1])
             change = numbers[at.parameters + parameter] - constants[of.start + parameter]
             p[row] = p[row] + constants[entry + 2] * change
+
+    return write_rows
+
+
+def load_adder(plan: Any) -> Any:
+    """Return the function (v, c) that adds the unbalance to the packed numbers."""
+    at, of, count = plan.at, plan.of, plan.count
+    add_to_drum = drum_adder(plan)
+
+    @njit(**OPTIONS)
+    def add_load(v, c):
+        numbers, constants, sums = numbers_at(v, 0), numbers_at(c, 0), numbers_at(v, at.total)
         for k in range(10):
             sums[k] = 0.0
         for k in range(count.unbalances):
             begin = at.unbalances + UNBALANCE_SIZE * k
-            set_unbalance(sums, numbers, begin, constants, of.drum)
+            sine, cosine = sine_cosine(numbers[begin + 1])
+            y, radius = numbers[begin + 2], numbers[begin + 3]
+            place = (radius * sine, y, radius * cosine)
+            add_point_mass(sums, numbers[begin], place, constants, of.drum)
+        add_to_drum(v, c)
+
+    return add_load
+
+
+def drum_adder(plan: Any) -> Any:
+    """Return the function (v, c) that adds the sums of masses at `at.total` to the packed drum."""
+    at, of = plan.at, plan.of
+
+    @njit(**OPTIONS)
+    def add_to_drum(v, c):
+        constants, sums, p = numbers_at(c, 0), numbers_at(v, at.total), numbers_at(v, at.packed)
         p[INVERSE_MASS] = p[INVERSE_MASS] / (1.0 + sums[0] * p[INVERSE_MASS])
         for k in range(HARMONICS_SIZE):
             value = p[HARMONICS_BEGIN + k]
@@ -218,7 +254,7 @@ def _preparation(plan: Any) -> Any:
                 value += constants[of.harmonics + 9 * k + i] * sums[1 + i]
             p[HARMONICS_BEGIN + k] = value
 
-    return prepare
+    return add_to_drum
 
 
 def _rate(plan: Any) -> Any:

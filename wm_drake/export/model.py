@@ -420,5 +420,5 @@ def _shape_pairs(setup: Setup) -> list[FloatArray]:
     """
     return [
         np.concatenate([moving.numbers, fixed.numbers, [moving.is_round, fixed.is_round], away])
-        for moving, fixed, away in Scene(setup.parameters).separations(setup.rest_pose)
+        for moving, fixed, away, _ in Scene(setup.parameters).separations(setup.rest_pose)
     ]

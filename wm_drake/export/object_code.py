@@ -4,7 +4,7 @@ import functools
 import json
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass
 
 import llvmlite.binding as llvm
@@ -146,17 +146,31 @@ class _Target:
 def _emitted(name: str, symbol: str, text: str, target: _Target) -> bytes:
     """Return the machine code of one function."""
     machine = target.machine()
-    text = re.sub(r"target triple = .*", f'target triple = "{target.platform.triple}"', text)
-    text = re.sub(r"target datalayout = .*", f'target datalayout = "{machine.target_data}"', text)
-    text = re.sub(r'"target-(cpu|features)"="[^"]*"', "", text)
-    module = llvm.parse_assembly(text)
-    _expose(module, _entry(module, name), symbol)
-    _remove_unused(module, machine)
-    if unwanted := _unwanted(module):
+    module = exposed_module(name, symbol, text, target.platform.triple, machine)
+    if unwanted := foreign_functions(module, OF_LIBM):
         raise AssertionError(f"{symbol} needs {', '.join(unwanted)}")
     if target.form == "object":
         return bytes(machine.emit_object(module))
     return str(machine.emit_assembly(module)).encode()
+
+
+def exposed_module(
+    name: str, symbol: str, text: str, triple: str, machine: llvm.TargetMachine
+) -> llvm.ModuleRef:
+    """Return the module of a function for a target, in which it alone is seen, under a symbol.
+
+    Args:
+        name: Name of the function in the source.
+        text: LLVM's text of the function as numba gives it.
+        triple, machine: The target.
+    """
+    text = re.sub(r"target triple = .*", f'target triple = "{triple}"', text)
+    text = re.sub(r"target datalayout = .*", f'target datalayout = "{machine.target_data}"', text)
+    text = re.sub(r'"target-(cpu|features)"="[^"]*"', "", text)
+    module = llvm.parse_assembly(text)
+    _expose(module, _entry(module, name), symbol)
+    remove_unused(module, machine)
+    return module
 
 
 def _expose(module: llvm.ModuleRef, entry: str, symbol: str) -> None:
@@ -169,7 +183,7 @@ def _expose(module: llvm.ModuleRef, entry: str, symbol: str) -> None:
     function.visibility = "hidden"  # libraries of other FMUs have the same names
 
 
-def _remove_unused(module: llvm.ModuleRef, machine: llvm.TargetMachine) -> None:
+def remove_unused(module: llvm.ModuleRef, machine: llvm.TargetMachine) -> None:
     """Remove what only the entry from Python used; the text is optimised already."""
     passes = llvm.create_new_module_pass_manager()
     passes.add_global_dead_code_eliminate_pass()
@@ -178,14 +192,14 @@ def _remove_unused(module: llvm.ModuleRef, machine: llvm.TargetMachine) -> None:
     passes.run(module, llvm.create_pass_builder(machine, options))
 
 
-def _unwanted(module: llvm.ModuleRef) -> list[str]:
-    """Return the functions outside of a module that are none of libm's."""
+def foreign_functions(module: llvm.ModuleRef, known: Container[str]) -> list[str]:
+    """Return the functions outside of a module that are none of the known ones."""
     return [
         function.name
         for function in module.functions
         if function.is_declaration
         and not function.name.startswith("llvm.")
-        and function.name not in OF_LIBM
+        and function.name not in known
     ]
 
 

@@ -44,6 +44,7 @@ class Statics:
     ) -> None:
         """Keep what a solution of the equilibrium needs. The Context's pose is moved by it."""
         self.plant, self.context, self.state_layout = plant, context, state_layout
+        self.bearing = elements.bearing
         self._applied = AppliedForce(elements, state_layout)
 
     def generalized_force(self) -> FloatArray:
@@ -242,11 +243,20 @@ def _sags(elements: PlacedElements) -> bool:
 
 def _is_far(elements: PlacedElements, pose: FloatArray) -> bool:
     """Return whether a pose is too far from the drawn one, or not finite."""
-    largest = (_LARGEST_REST_ANGLE, _LARGEST_REST_POSITION)
-    if _sags(elements):
-        largest = (_LARGEST_SAG_ANGLE, _LARGEST_SAG)
+    largest = largest_rest(sags=_sags(elements))
     near = np.abs(pose[:3]).max() <= largest[0] and np.abs(pose[3:]).max() <= largest[1]
     return not near
+
+
+def largest_rest(*, sags: bool) -> tuple[float, float]:
+    """Return the largest angle and displacement of a rest pose from the drawn one. [rad, m]
+
+    Args:
+        sags: Whether preloads are given, so that the tub rests away from its drawn pose.
+    """
+    if sags:
+        return _LARGEST_SAG_ANGLE, _LARGEST_SAG
+    return _LARGEST_REST_ANGLE, _LARGEST_REST_POSITION
 
 
 def _is_at_rest(
@@ -375,7 +385,7 @@ def _balance(statics: Statics, chosen: Indices) -> float:
         plant.SetPositions(context, q)
         return np.asarray(directions @ statics.generalized_force())
 
-    q = plant.GetPositions(context)
+    q = plant.GetPositions(context) + _sag_in_clearance(statics)
     remaining, rounding = forces(q), 0.0
     for iteration in range(100):
         if not max(0.1 * EQUILIBRIUM_TOLERANCE, rounding) < np.max(np.abs(remaining)) < np.inf:
@@ -392,6 +402,24 @@ def _balance(statics: Statics, chosen: Indices) -> float:
     on_attached = remaining[np.isin(chosen, layout.attached)]
     _check_held(q, on_attached, max(TUBES_TOLERANCE, rounding), layout)
     return rounding
+
+
+def _sag_in_clearance(statics: Statics) -> FloatArray:
+    """Return how far the drum carrier moves from its drawn pose into contact with its bearing.
+
+    Within a clearance almost nothing holds the drum, so Newton's method must begin beyond it.
+
+    Returns:
+        Change of the positions of the plant, 0 if the carrier has moved already. (n,) [rad, m]
+    """
+    layout, plant, context = statics.state_layout, statics.plant, statics.context
+    q, change = plant.GetPositions(context), np.zeros(layout.size)
+    if statics.bearing is None or np.any(q[layout.carrier] != q[layout.tub]):
+        return change
+    rotation = statics.bearing.ground_side_rotation
+    weight = plant.CalcGravityGeneralizedForces(context)[layout.carrier[3:]]
+    change[layout.carrier[3:]] = rotation @ statics.bearing.sag(rotation.T @ weight)
+    return change
 
 
 def _check_held(

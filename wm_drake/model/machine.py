@@ -8,6 +8,7 @@ import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, InputPort, OutputPort
 
+from wm_drake.elements.bearing import DrumBearingParameters
 from wm_drake.elements.bushing import SixComponentBushingParameters
 from wm_drake.elements.cabinet import CabinetOnFeet
 from wm_drake.elements.friction_damper import FrictionDamperParameters
@@ -139,7 +140,7 @@ class Setup:
         return self.elements.telescopes
 
     @property
-    def bearing(self) -> SixComponentBushingParameters | None:
+    def bearing(self) -> DrumBearingParameters | None:
         """Return the compliant bearing between drum carrier and tub; None if it is rigid."""
         return self.elements.bearing
 

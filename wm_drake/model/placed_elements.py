@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 
-from wm_drake.elements.bearing import DRUM_BEARING
+from wm_drake.elements.bearing import DRUM_BEARING, DrumBearingParameters
 from wm_drake.elements.bushing import SixComponentBushingParameters, packed_bushing_law
 from wm_drake.elements.damper_law import packed_damper_law
 from wm_drake.elements.friction_damper import FRICTION_DAMPER_STRUT, FrictionDamperParameters
@@ -69,7 +69,7 @@ class PlacedElements:
     dampers: dict[str, FrictionDamperParameters]
     bushings: dict[str, SixComponentBushingParameters]
     telescopes: dict[str, TelescopicDamperParameters]
-    bearing: SixComponentBushingParameters | None
+    bearing: DrumBearingParameters | None
     others: dict[str, PlacedElement]
 
     def without_gasket(self) -> "PlacedElements":
@@ -360,9 +360,7 @@ def _telescopes(
     return placed
 
 
-def _bearing(
-    plant: MultibodyPlant, parameters: MachineParameters
-) -> SixComponentBushingParameters | None:
+def _bearing(plant: MultibodyPlant, parameters: MachineParameters) -> DrumBearingParameters | None:
     """Place the compliant bearing between tub and drum carrier; return None if it is rigid.
 
     The tub is its ground side.
@@ -378,6 +376,13 @@ def _bearing(
     x = across - (across @ axis) * axis
     x /= np.linalg.norm(x)
     rotation = np.column_stack([x, axis, np.cross(x, axis)])
-    return SixComponentBushingParameters(
-        point, rotation, point, rotation, packed_bushing_law(bearing.as_bushing())
+    return DrumBearingParameters(
+        point,
+        rotation,
+        point,
+        rotation,
+        packed_bushing_law(bearing.as_bushing()),
+        clearance=bearing.clearance,
+        contact_stiffness=bearing.contact_stiffness or 0.0,
+        contact_damping=bearing.contact_damping,
     )

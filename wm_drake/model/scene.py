@@ -154,6 +154,7 @@ class Scene:
 
     Attributes:
         plant: Plant with the shapes; its bearing is rigid.
+        reach: Largest distance of a point of the tub group from To. [m]
 
     Example:
         >>> import wm_drake as wm
@@ -200,8 +201,7 @@ class Scene:
         self._references: dict[tuple[float, ...], list[_Pair]] = {}
         self._names = tuple(f"{self._name(a)}|{self._name(b)}" for a, b in self._pairs)
         outlines = [self._outlines[shape] for shape, _ in self._pairs]
-        # largest distance of a point of the tub group from To
-        self._reach = max(
+        self.reach = max(
             (float(np.linalg.norm(o.centre) + np.linalg.norm(o.half)) for o in outlines),
             default=0.0,
         )
@@ -366,7 +366,7 @@ class Scene:
         counts = fill_lanes(aligned(WIDTH), [np.array([float(count)]) for count in good])
         flat = samples.ravel(), size, counts
         references = [_reference(pose) for pose in rest_poses]
-        places = [np.array([*pose, self._reach]) for pose in references]
+        places = [np.array([*pose, self.reach]) for pose in references]
         farthest = aligned(2 * WIDTH)
         measure_shifts(*flat, fill_lanes(aligned(7 * WIDTH), places), farthest)
         numbers, shift = farthest[:WIDTH].astype(int).tolist(), farthest[WIDTH:]
@@ -402,20 +402,21 @@ class Scene:
             for lane, (count, first) in enumerate(zip(good, firsts, strict=True))
         ]
 
-    def separations(self, pose: FloatArray) -> list[tuple[Outline, Outline, FloatArray]]:
-        """Return both outlines of each pair of shapes, and the direction that separates them.
+    def separations(self, pose: FloatArray) -> list[tuple[Outline, Outline, FloatArray, float]]:
+        """Return outlines of each pair of shapes, what separates them, and their distance.
 
         Args:
             pose: Pose of the tub: roll, pitch, yaw, x, y, z. (6,) [rad, m]
 
         Returns:
             Outline of the shape of the tub group, in T, and of that of the housing, in W; unit
-            vector in W along which the first moves away from the second. (3,)
+            vector in W along which the first moves away from the second (3,); signed distance [m].
         """
-        return [
-            (self._outlines[pair[0]], self._outlines[pair[1]], self._nearest(pose, pair)[2])
-            for pair in self._pairs
-        ]
+        separations = []
+        for pair in self._pairs:
+            distance, _, away = self._nearest(pose, pair)
+            separations.append((self._outlines[pair[0]], self._outlines[pair[1]], away, distance))
+        return separations
 
     def pair_names(self) -> list[str]:
         """Return the names of the pairs of shapes: one of the tub group, one of the housing."""

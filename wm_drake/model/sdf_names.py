@@ -78,12 +78,8 @@ def frame_problems(plant: MultibodyPlant, parameters: MachineParameters) -> list
     """Return one problem for each wrong name of a frame or body in a machine."""
     names = sdf_names(plant)
     problems = []
-    for key, body, frame in _attachments(plant, parameters):
-        if frame not in names.frames:
-            message = f"no frame '{frame}' in the SDF{nearest_names(frame, names.frames)}"
-            problems.append(Problem("", key, message))
-        elif body not in names.welded[frame]:
-            problems.append(Problem("", key, f"frame '{frame}' is not fixed to the {body}"))
+    for attachment in _attachments(plant, parameters):
+        problems += frame_problem(plant, *attachment)
     for name in parameters.bodies:
         if name not in names.links:
             message = f"no moving link '{name}' in the SDF{nearest_names(name, names.links)}"
@@ -96,6 +92,21 @@ def frame_problems(plant: MultibodyPlant, parameters: MachineParameters) -> list
             )
             problems.append(Problem("", f"frames.{name}", message))
     return problems
+
+
+def frame_problem(plant: MultibodyPlant, key: str, body: str, frame: str) -> list[Problem]:
+    """Return the problem of a frame that must be fixed to a body; empty if it is.
+
+    Args:
+        key: Key path that names the frame.
+    """
+    names = sdf_names(plant)
+    if frame not in names.frames:
+        message = f"no frame '{frame}' in the SDF{nearest_names(frame, names.frames)}"
+        return [Problem("", key, message)]
+    if body not in names.welded[frame]:
+        return [Problem("", key, f"frame '{frame}' is not fixed to the {body}")]
+    return []
 
 
 def _attachments(

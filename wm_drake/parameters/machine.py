@@ -154,6 +154,11 @@ class Bearing(Frozen):
         tilting_damping, torsional_damping: Damping of the rotations; if the torsional one is None,
             the tilting one is used. [N m s/rad]
         y: Position of the bearing along the axis of the drum's joint, from the joint's origin. [m]
+        clearance: Radial clearance, beyond which shaft and bearing touch; 0 for none. Within it the
+            radial stiffness, of seal and grease, is all that centres the shaft. [m]
+        contact_stiffness: Radial stiffness of the contact, beside the radial stiffness. [N/m]
+        contact_damping: Radial damping of the contact; full from a tenth of the clearance into it.
+            [N s/m]
     """
 
     radial_stiffness: Annotated[u.LinearStiffness, Field(gt=0.0)]
@@ -165,6 +170,22 @@ class Bearing(Frozen):
     tilting_damping: Annotated[u.RotationalDamping, Field(ge=0.0)]
     torsional_damping: Annotated[u.RotationalDamping, Field(ge=0.0)] | None = None
     y: u.Length
+    clearance: Annotated[u.Length, Field(ge=0.0)] = 0.0
+    contact_stiffness: Annotated[u.LinearStiffness, Field(gt=0.0)] | None = None
+    contact_damping: Annotated[u.LinearDamping, Field(ge=0.0)] = 0.0
+
+    @model_validator(mode="after")
+    def _contact_with_clearance(self) -> "Bearing":
+        if self.clearance > 0.0 and self.contact_stiffness is None:
+            raise ValueError(
+                "a clearance needs the stiffness of the contact beyond it: add contact_stiffness, "
+                "such as '20 kN/mm'"
+            )
+        if self.clearance == 0.0 and (self.contact_stiffness or self.contact_damping):
+            raise ValueError(
+                "contact_stiffness and contact_damping belong to a clearance above 0; add clearance"
+            )
+        return self
 
     def as_bushing(self) -> BushingType:
         """Return the bearing as a bushing in a frame whose y axis is the drum axis."""

@@ -1,10 +1,7 @@
 """Measured amplitudes and other responses, from the files that a machine file names."""
 
-import math
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,7 +10,6 @@ import numpy as np
 from wm_drake.errors import input_error
 from wm_drake.parameters.csv_files import finite_numbers, read_csv, read_header, read_note
 from wm_drake.parameters.machine import MachineParameters
-from wm_drake.parameters.published import COLUMNS, CONSTANT, OF_RESPONSE, published_results
 
 if TYPE_CHECKING:  # slow to import: CSV files
     import pandas as pd
@@ -32,8 +28,8 @@ BAND = "band"
 OF = "of"
 """Column that only files of responses have. It says what a value belongs to."""
 
-MACHINE, DESIGN = "machine", "design"
-"""Entries of the column `OF`: the machine itself, or the mean over a design of gasket factors."""
+MACHINE = "machine"
+"""Entry of the column `OF`: the machine itself."""
 
 _HEAD = re.compile(r"\s*(\w+)\s*\[([^\]]+)\]\s*")
 
@@ -46,28 +42,19 @@ class NamedValue:
         load: Name of the load.
         gasket: Whether the machine has its gasket.
         source: Where the value comes from.
-        of: `MACHINE` or `DESIGN`.
         name: Name of the response, such as ``Dx``.
         value: The value, in `unit`.
-        unit: Unit in the head of the column; "" for that in which the response is displayed.
+        unit: Unit in the head of the column.
         where: The file, for messages.
-        factor: Factor of the design to which the value belongs; "" if it belongs to all trials.
-        level: Level -1, 0 or 1 of which the value is the effect; None if the value is the
-            contribution of the factor in percent.
-        mean: Grand mean to which an effect is compared, in `unit`; NaN for other values.
     """
 
     load: str
     gasket: bool
     source: str
-    of: str
     name: str
     value: float
     unit: str
     where: str
-    factor: str = ""
-    level: int | None = None
-    mean: float = math.nan
 
 
 def measured_amplitudes(parameters: MachineParameters) -> "pd.DataFrame":
@@ -126,46 +113,18 @@ def measured_responses(parameters: MachineParameters) -> list[NamedValue]:
 
     Returns:
         All values of the files of responses in `measured`. Such a file has the columns ``load``,
-        ``gasket`` (yes, no), ``source``, ``of`` (machine, design) and one for each response, with
-        its unit in the head: ``Fx [N]``. Or it has the form of the results of a gasket study
-        (`published_results`): means, effects at the levels -1 and 0, and contributions of the main
-        effects are read; interactions, sums and ranges are not.
+        ``gasket`` (yes, no), ``source``, ``of`` (machine) and one for each response, with its unit
+        in the head: ``Fx [N]``.
 
     Raises:
         InputError: a file is missing, has another column, or contains a value that is not allowed.
     """
-    values: list[NamedValue] = []
-    for path in parameters.measured:
-        if _is_of_study(path):
-            values += _of_study(path)
-        elif _has_responses(path):
-            values += _responses(path)
-    return values
+    files = [path for path in parameters.measured if _has_responses(path)]
+    return [value for path in files for value in _responses(path)]
 
 
 def _has_responses(path: str) -> bool:
-    return OF in read_header(Path(path), key="measured") or _is_of_study(path)
-
-
-def _is_of_study(path: str) -> bool:
-    return read_header(Path(path), key="measured") == COLUMNS
-
-
-def _of_study(path: str) -> Iterator[NamedValue]:
-    """Yield the results of a gasket study as values of its design."""
-    source = Path(path).name
-    for (load, name), terms in published_results([path], "measured").items():
-        named = partial(NamedValue, load, True, source, DESIGN, name, unit="", where=path)
-        mean = terms[CONSTANT].effects[0] if CONSTANT in terms else math.nan
-        if CONSTANT in terms:
-            yield named(mean)
-        mains = {k: v for k, v in terms.items() if k not in OF_RESPONSE and ":" not in k}
-        for factor, term in mains.items():
-            # the effect at level 1 is minus the sum of the others
-            for level, effect in zip((-1, 0), term.effects, strict=False):
-                yield named(effect, factor=factor, level=level, mean=mean)
-            if term.percent is not None:
-                yield named(term.percent, factor=factor)
+    return OF in read_header(Path(path), key="measured")
 
 
 def _responses(path: str) -> list[NamedValue]:
@@ -182,14 +141,13 @@ def _responses(path: str) -> list[NamedValue]:
             key="measured",
         )
     _check_entries(table, "gasket", ("yes", "no"), path)
-    _check_entries(table, OF, (MACHINE, DESIGN), path)
+    _check_entries(table, OF, (MACHINE,), path)
     numbers = finite_numbers(table[columns], path, key="measured")
     return [
         NamedValue(
             str(row["load"]),
             row["gasket"] == "yes",
             str(row["source"]),
-            str(row[OF]),
             match[1],
             float(number),
             match[2],
@@ -214,7 +172,7 @@ def _check_entries(table: "pd.DataFrame", column: str, allowed: tuple[str, ...],
 
 def _read(path: str, sensors: list[str]) -> "pd.DataFrame":
     head, written = read_header(Path(path), key="measured"), [f"{name}_mm" for name in sensors]
-    if set(head) == {*_KEYS, BAND, *written}:  # as `wm-drake spin` writes it
+    if set(head) - {BAND} == {*_KEYS, *written}:  # as commands write it
         table, columns = read_csv(path, head, key="measured"), written
     else:
         table = read_csv(path, _KEYS + sensors, key="measured", optional=BAND)

@@ -428,6 +428,11 @@ def to_base(value: float, unit: str) -> float:
     return float(registry().Quantity(value, unit).to_base_units().magnitude)
 
 
+def with_base(unit: str) -> Unit:
+    """Return a unit in which numbers are written, with its SI base unit."""
+    return Unit(str(registry().Quantity(1.0, unit).to_base_units().units), unit)
+
+
 def from_base(value: float, unit: str) -> float:
     """Return a number in SI units as a number in another unit."""
     return value / to_base(1.0, unit)
@@ -562,5 +567,6 @@ Forces = Annotated[tuple[float, ...], Unit("N", "N")]
 Torques = Annotated[tuple[float, ...], Unit("N*m", "N*mm")]
 MotorTorques = Annotated[tuple[float, ...], Unit("N*m", "N*m")]
 Times = Annotated[tuple[float, ...], Unit("s", "s")]
+Frequency = Annotated[float, Unit("Hz", "Hz")]
 Frequencies = Annotated[tuple[float, ...], Unit("Hz", "Hz")]
 Speeds = Annotated[tuple[float, ...], Unit("rad/s", "rpm")]

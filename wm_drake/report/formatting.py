@@ -32,6 +32,17 @@ def significant(value: float, digits: int = 4) -> str:
     return text.replace("-", "−")
 
 
+def three_digits(value: float) -> str:
+    """Return a number with three significant digits, also zeros at its end; NaN becomes a dash."""
+    if not math.isfinite(value):
+        return MISSING
+    size = abs(float(f"{value:.3g}"))
+    return number(
+        value,
+        0 if size >= 100 else 1 if size >= 10 else 2 if size >= 1 else 3 if size >= 0.1 else 4,
+    )
+
+
 def with_interval(value: float, lower: float, upper: float) -> str:
     """Return a number with the ends of its interval, `2 (1 to 3)`; without ends if they are NaN."""
     if not math.isfinite(value):
@@ -42,10 +53,12 @@ def with_interval(value: float, lower: float, upper: float) -> str:
 
 def percent(value: float) -> str:
     """Return a difference in whole percent, with its sign; NaN becomes a dash."""
-    if not math.isfinite(value):
-        return MISSING
-    text = number(value, 0)
-    return f"+{text} %" if round(value) > 0 else f"{text} %"
+    return f"{signed(value)} %" if math.isfinite(value) else MISSING
+
+
+def signed(value: float) -> str:
+    """Return a difference as a whole number with its sign; NaN becomes a dash."""
+    return f"+{number(value, 0)}" if math.isfinite(value) and round(value) > 0 else number(value, 0)
 
 
 def listed(words: Sequence[str]) -> str:

@@ -1,18 +1,24 @@
 """A table as a labelled dataset: from it follow file, JSON, lines of the terminal and the page."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 import xarray as xr
 
 from wm_drake.report.formatting import plain
-from wm_drake.report.quantity import HIDDEN, quantity_of
+from wm_drake.report.quantity import HIDDEN, quantity_of, shown, units_of
 from wm_drake.report.table import Table, line, table_of
+
+if TYPE_CHECKING:
+    from rich.table import Table as TerminalTable
 
 MOST_LINES = 200
 """Largest number of lines of a table on the page; the file has all."""
+
+NUMBERS = "fiu"
+"""Kinds of arrays that have a unit; others are texts and truth values."""
 
 
 @dataclass(frozen=True)
@@ -20,7 +26,8 @@ class LabelledTable:
     """A dataset in SI, and how it is shown.
 
     Its dimensions with labels are the first columns, its variables the others. Each variable
-    carries its `Quantity`; one of texts needs none. A row without any value is left out.
+    carries its `Quantity`; one of texts needs none. If the unit differs from row to row, it has a
+    column. A row without any value is left out.
 
     Attributes:
         name: Name of the file, without suffix, and of the key in JSON.
@@ -31,6 +38,7 @@ class LabelledTable:
         marked: Boolean variable of the lines that are marked, and their style, as of
             `report.table.Row`. The variable is no column on page and terminal.
         words: Words for labels on page and terminal, by the labels.
+        on_page_only: Variables for which a terminal is too narrow.
         is_in_terminal: Whether the terminal shows it.
         is_in_json: Whether JSON has it; a long history is in files and notebooks only.
     """
@@ -42,6 +50,7 @@ class LabelledTable:
     across: str = ""
     marked: tuple[str, str] = ("", "")
     words: Mapping[str, str] = field(default_factory=dict)
+    on_page_only: Sequence[str] = ()
     is_in_terminal: bool = False
     is_in_json: bool = True
 
@@ -55,8 +64,13 @@ class LabelledTable:
         records: list[dict[str, Any]] = plain(self.frame().to_dict("records"))
         return records
 
+    def terminal(self) -> "TerminalTable":
+        """Return the table for the terminal."""
+        narrow = self.data.drop_vars(self.on_page_only, errors="ignore")
+        return replace(self, data=narrow).table().terminal(self.heading)
+
     def table(self) -> Table:
-        """Return the table for page and terminal."""
+        """Return the table for the page."""
         hidden = [name for name, v in self.data.variables.items() if HIDDEN in v.attrs]
         data = self._spread(self.data.drop_vars(hidden))
         frame = _rows(data)
@@ -74,18 +88,28 @@ class LabelledTable:
         Its name is the label, after that of the variable if several vary.
         """
         if not self.across:
-            return data
+            return _with_unit(data)
         varying = [name for name, variable in data.items() if self.across in variable.dims]
         wide = data.drop_dims(self.across)
         for label in data[self.across].values.tolist():
             for name in varying:
-                quantity, head = quantity_of(data[name]), self.words.get(str(label), str(label))
-                several = len(varying) > 1
-                column = data[name].sel({self.across: label}, drop=True)
-                words = f"{quantity.words}, {head}" if several else head
-                column.attrs = quantity.named(words).attributes()
+                head, several = self.words.get(str(label), str(label)), len(varying) > 1
+                column = data[name].sel({self.across: label})
+                words = f"{quantity_of(data[name]).words}, {head}" if several else head
+                quantity = quantity_of(column).named(words)
+                several_units = column.attrs if units_of(column) else {}
+                column = column.drop_vars(self.across, errors="ignore")
+                column.attrs = {**several_units, **quantity.attributes()}
                 wide[f"{name}_{label}" if several else str(label)] = column
-        return wide
+        return _with_unit(wide)
+
+
+def _with_unit(data: xr.Dataset) -> xr.Dataset:
+    """Return data with a column of units, if the unit of a variable differs from row to row."""
+    numbers = (variable for variable in data.values() if variable.dtype.kind in NUMBERS)
+    for dim, quantities in filter(None, map(units_of, numbers)):
+        return data.assign_coords(unit=(dim, [quantity.reading.label for quantity in quantities]))
+    return data
 
 
 @dataclass(frozen=True)
@@ -120,29 +144,31 @@ class TurnedTable(LabelledTable):
 
 def _rows(data: xr.Dataset) -> pd.DataFrame:
     """Return a row for each place of a dataset that has a value, in units for reading."""
-    dims = [str(dim) for dim in data.sizes]
-    names = [dim for dim in dims if dim in data.coords]
-    others = [str(name) for name in data.variables if name not in data.sizes]
+    sizes = {dim: data.sizes[dim] for dim in _dims_of(data)}
+    labels = [name for name in dict.fromkeys([*sizes, *data.coords]) if name in data.coords]
     # many times as fast as `Dataset.to_dataframe`
     columns = {
-        name: _in_reading_unit(data[name]).variable.set_dims(data.sizes).transpose(*dims).values
-        for name in (*names, *others)
+        name: _in_reading_unit(data[name]).variable.set_dims(sizes).transpose(*sizes).values
+        for name in (*labels, *data)
     }
     frame = pd.DataFrame({name: values.ravel() for name, values in columns.items()})
-    frame = frame.dropna(how="all", subset=others).reset_index(drop=True)
-    return frame[[*_labels_first(frame, data)]]
+    return frame.dropna(how="all", subset=list(data)).reset_index(drop=True)
 
 
-def _labels_first(frame: pd.DataFrame, data: xr.Dataset) -> Sequence[str]:
-    """Return the columns of a frame, those of labels first."""
-    return sorted(map(str, frame.columns), key=lambda name: name not in data.coords)
+def _dims_of(data: xr.Dataset) -> list[Hashable]:
+    """Return the dimensions in the order in which variables have them.
+
+    xarray has no order of its own: it keeps coordinates in sets.
+    """
+    of_variables = [dim for array in data.values() for dim in array.dims]
+    return list(dict.fromkeys([*of_variables, *data.sizes]))
 
 
 def _in_reading_unit(array: xr.DataArray) -> xr.DataArray:
-    unit = quantity_of(array).unit
-    if unit.si == unit.shown:
+    unit = quantity_of(array).reading
+    if array.dtype.kind not in NUMBERS or (unit.si == unit.shown and units_of(array) is None):
         return array
-    return array.copy(data=quantity_of(array).values(array.values))
+    return array.copy(data=shown(array))
 
 
 def _name_in_files(name: str, array: xr.DataArray) -> str:

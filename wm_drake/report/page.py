@@ -141,7 +141,7 @@ class Section:
 
     @property
     def has_content(self) -> bool:
-        """Whether the section shows anything; a page leaves an empty one out."""
+        """Return whether the section shows anything; a page leaves an empty one out."""
         return any(
             (self.pictures, self.tables, self.text, self.facts, self.links, self.remarks, self.body)
         )

@@ -5,7 +5,7 @@ variable (page, terminal, file, axis, sentence) takes words, unit and digits fro
 nothing else converts a number or spells a unit.
 """
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,7 @@ import numpy as np
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import PureNumber, Unit
 from wm_drake.report.formatting import MISSING, number, significant
+from wm_drake.report.reading import finer_decimals, reading_unit
 
 if TYPE_CHECKING:  # slow to import, and not needed for declarations
     import xarray as xr
@@ -23,6 +24,10 @@ if TYPE_CHECKING:  # slow to import, and not needed for declarations
 NO_UNIT = PureNumber()
 HIDDEN = "is_hidden"
 """Attribute of a variable that files and JSON have, and page and terminal leave out."""
+
+ALONG, EACH = "along", "each"
+"""Attributes of a variable with several quantities: the coordinate that tells which, and the
+quantity of each of its labels."""
 
 
 @dataclass(frozen=True)
@@ -43,13 +48,18 @@ class Quantity:
     form: Callable[[float], str] | None = None
 
     @property
+    def reading(self) -> Unit:
+        """Unit in which it is read."""
+        return reading_unit(self.unit)
+
+    @property
     def unit_text(self) -> str:
         """Unit for reading, without line breaks: `N m`."""
         return self._unit.replace(" ", "\u00a0")
 
     @property
     def _unit(self) -> str:
-        return self.unit.label.replace("^2", "²").replace("^3", "³")
+        return self.reading.label.replace("^2", "²").replace("^3", "³")
 
     @property
     def label(self) -> str:
@@ -59,7 +69,7 @@ class Quantity:
     @property
     def suffix(self) -> str:
         """End of names in files: `_mm`, `_N_per_mm`; "" without a unit."""
-        text = self.unit.shown.replace("*", "").replace("/", "_per_").replace("%", "percent")
+        text = self.reading.shown.replace("*", "").replace("/", "_per_").replace("%", "percent")
         return f"_{text.replace('^', '')}" if text else ""
 
     def named(self, words: str) -> "Quantity":
@@ -68,11 +78,11 @@ class Quantity:
 
     def values(self, array: Any) -> FloatArray:
         """Return SI values in the unit for reading."""
-        return np.asarray(array, dtype=float) * self.unit.from_si(1.0)
+        return np.asarray(array, dtype=float) * self.reading.from_si(1.0)
 
     def to_si(self, values: Any) -> FloatArray:
         """Return values in the unit for reading as SI values."""
-        return np.asarray(values, dtype=float) / self.unit.from_si(1.0)
+        return np.asarray(values, dtype=float) / self.reading.from_si(1.0)
 
     def number(self, value: Any) -> str:
         """Return an SI value as text without its unit; NaN and infinity become a dash."""
@@ -81,11 +91,16 @@ class Quantity:
             return MISSING
         if self.form is not None:
             return self.form(shown)
-        return significant(shown) if self.decimals is None else number(shown, self.decimals)
+        decimals = self._decimals
+        return significant(shown) if decimals is None else number(shown, decimals)
 
     def text(self, value: Any) -> str:
         """Return an SI value as text with its unit."""
         return f"{self.number(value)} {self._unit}".rstrip()
+
+    @property
+    def _decimals(self) -> int | None:
+        return None if self.decimals is None else finer_decimals(self.unit, self.decimals)
 
     def variable(self, dims: str | Sequence[str], values: Any) -> "xr.Variable":
         """Return values in SI as a variable that carries this quantity."""
@@ -99,6 +114,25 @@ class Quantity:
         variable.attrs[HIDDEN] = True
         return variable
 
+    def of_each(
+        self,
+        along: str,
+        each: Mapping[str, "Quantity"],
+        dims: str | Sequence[str],
+        values: Any,
+    ) -> "xr.Variable":
+        """Return values in SI as a variable whose unit differs along a coordinate.
+
+        Args:
+            along: The coordinate, such as that of the responses of a study.
+            each: Quantity of each of its labels.
+            dims: Dimensions of the values.
+            values: The values. [SI]
+        """
+        variable = self.variable(dims, values)
+        variable.attrs |= {ALONG: along, EACH: each}
+        return variable
+
     def attributes(self) -> dict[Hashable, Any]:
         """Return the attributes of a variable that carries this quantity.
 
@@ -110,15 +144,19 @@ class Quantity:
         """Return the column of a table, with its words or others."""
         from wm_drake.report.table import Column  # slow to import: pandas
 
-        return Column(words or self.words, self.unit_text, self.decimals, self.form)
+        return Column(words or self.words, self.unit_text, self._decimals, self.form)
 
 
 def quantity_of(array: "xr.DataArray") -> Quantity:
     """Return the quantity that a variable carries.
 
-    A variable of a table of runs has that of its measure; any other is a pure number with the words
-    of its name.
+    A variable with several quantities has that of its label, once one is selected. A variable of a
+    table of runs has that of its measure; any other is a pure number with the words of its name.
     """
+    label = array.coords.get(array.attrs.get(ALONG, ""))
+    if label is not None and not label.ndim:
+        of_label: Quantity = array.attrs[EACH][str(label.item())]
+        return of_label
     if "quantity" in array.attrs:
         quantity: Quantity = array.attrs["quantity"]
         return quantity
@@ -145,9 +183,33 @@ def _of_measure(name: str) -> Quantity | None:
     return known and Quantity(known.kind, known.unit, known.studio)
 
 
+def named(array: "xr.DataArray", words: str) -> "xr.DataArray":
+    """Return a variable with other words."""
+    quantity: Quantity = array.attrs["quantity"]
+    return array.assign_attrs(quantity.named(words).attributes())
+
+
 def shown(array: "xr.DataArray") -> FloatArray:
     """Return the values of a variable in its unit for reading, for a mark of a figure."""
-    return quantity_of(array).values(array.values)
+    each = units_of(array)
+    if each is None:
+        return quantity_of(array).values(array.values)
+    dim, quantities = each
+    factors = [float(quantity.values(1.0)) for quantity in quantities]
+    place = array.dims.index(dim)
+    at_end = np.moveaxis(np.asarray(array.values, dtype=float), place, -1)
+    return np.moveaxis(at_end * factors, -1, place)
+
+
+def units_of(array: "xr.DataArray") -> "tuple[Hashable, list[Quantity]] | None":
+    """Return the dimension along which the unit of a variable differs, and the quantities there.
+
+    It is None if the variable has one unit.
+    """
+    labels = array.coords.get(array.attrs.get(ALONG, ""))
+    if labels is None or not labels.ndim:
+        return None
+    return labels.dims[0], [array.attrs[EACH][str(label)] for label in labels.values]
 
 
 def text_of(array: "xr.DataArray") -> str:

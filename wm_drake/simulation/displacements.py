@@ -23,6 +23,8 @@ from wm_drake.simulation.outputs import point_positions
 from wm_drake.simulation.records import Record, profile_of, sample_period
 from wm_drake.simulation.signals import filter_both_ways, largest_peaks
 
+LEAST_PADDING = 6 * FILTER_ORDER + 3
+"""Samples that the filter needs at both ends: the padding that sosfiltfilt chooses by default."""
 REPLAY_SPAN = 8.0
 """Length of a replay. [s]"""
 
@@ -75,16 +77,16 @@ def filtered_lanes(
     """
     groups, rows, _ = signals.shape
     padding = min(round(PADDING_PERIODS / band[0] / period), rows - 1)
-    if padding <= 6 * FILTER_ORDER + 3:  # the padding that sosfiltfilt chooses by default
+    if padding <= LEAST_PADDING:
         return np.full(signals.shape, np.nan)
     answer, work = array("filtered", rows * groups), array("filter", rows + 2 * padding)
-    sections = _band_pass(period, band)
+    sections = band_pass(period, band)
     filter_both_ways(signals.ravel(), (rows, groups), *sections, padding, work, answer)
     return answer.reshape(signals.shape)
 
 
 @functools.cache
-def _band_pass(period: float, band: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+def band_pass(period: float, band: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
     """Return the sections of the filter, and their states at a constant signal, flat."""
 
     def designed() -> bytes:

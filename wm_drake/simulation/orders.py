@@ -45,14 +45,7 @@ def order_map(
 ) -> xr.DataArray:
     """Return the amplitudes of the orders of signals over time.
 
-    The signal in each window of drum angle is integrated against the rotation of each order:
-
-        A(o) = 2 |sum w_i x_i exp(-j o phi_i) dphi_i| / sum w_i dphi_i
-
-    with a Blackman window w over a number of revolutions, and dphi_i by the trapezoidal rule, so
-    that the samples need not be equally spaced in angle (time-variant discrete Fourier transform;
-    Blough, Brown and Vold, SAE paper 972006, 1997). A component x = a cos(o phi + b) gives
-    A(o) = a. The mean of each window is removed first, since it is no vibration.
+    They are the sizes of `order_vectors`.
 
     Args:
         signal: (n,) or (n, k), one column per signal.
@@ -63,19 +56,52 @@ def order_map(
         period: Time between the centres of the windows. [s]
 
     Returns:
+        As `order_vectors`, real.
+    """
+    orders: FloatArray = step * np.arange(1, round(highest / step) + 1, dtype=float)
+    sizes: xr.DataArray = abs(order_vectors(signal, angle, time, orders, (revolutions, period)))
+    return sizes
+
+
+def order_vectors(
+    signal: FloatArray,
+    angle: FloatArray,
+    time: FloatArray,
+    orders: FloatArray,
+    windows: tuple[int, float] = (REVOLUTIONS, PERIOD),
+) -> xr.DataArray:
+    """Return the complex amplitudes of orders of signals over time.
+
+    The signal in each window of drum angle is integrated against the rotation of each order:
+
+        A(o) = 2 sum w_i x_i exp(-j o phi_i) dphi_i / sum w_i dphi_i
+
+    with a Blackman window w over a number of revolutions, and dphi_i by the trapezoidal rule, so
+    that the samples need not be equally spaced in angle (time-variant discrete Fourier transform;
+    Blough, Brown and Vold, SAE paper 972006, 1997). A component x = a cos(o phi + b) gives
+    A(o) = a exp(j b). The mean of each window is removed first, since it is no vibration.
+
+    Args:
+        signal: (n,) or (n, k), one column per signal.
+        angle: (n,) drum angle. [rad]
+        time: (n,) rising. [s]
+        orders: Orders, > 0.
+        windows: Length of a window in revolutions, and time between their centres. [s]
+
+    Returns:
         (time, order) or (time, order, signal) in the unit of the signal, with the drum speed of
         each centre as the coordinate `speed` [rad/s]. Only windows within the record are used, so
         it begins after half a window. NaN where the samples are too coarse for the order (at most
         half a turn of the order from sample to sample). Without a full window it has no times.
     """
     columns = np.atleast_2d(np.asarray(signal, dtype=float).T).T
-    orders = step * np.arange(1, round(highest / step) + 1)
+    revolutions, period = windows
     turned = (
         np.concatenate([[0.0], np.cumsum(np.abs(np.diff(angle)))]) if len(time) else np.empty(0)
     )
     half = np.pi * revolutions
     centres, speed, places = _windows(time, angle, turned, half, period)
-    values = np.full((len(centres), len(orders), columns.shape[1]), np.nan)
+    values = np.full((len(centres), len(orders), columns.shape[1]), np.nan, dtype=complex)
     rotation = np.exp(-1j * np.outer(angle, orders))
     with threadpool_limits(1, "blas"):  # these products are too small for several threads
         for index, place in enumerate(places):
@@ -87,7 +113,7 @@ def order_map(
             share = np.gradient(near) * _blackman((near - place) / half)
             share /= share.sum()
             part = share[:, None] * (part - share @ part)
-            values[index, fine] = 2.0 * np.abs(rotation[inside][:, fine].T @ part)
+            values[index, fine] = 2.0 * rotation[inside][:, fine].T @ part
     result = xr.DataArray(
         values,
         {"time": centres, "order": orders, "speed": ("time", speed, {"units": "rad/s"})},

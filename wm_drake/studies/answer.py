@@ -16,10 +16,13 @@ import xarray as xr
 from wm_drake.parameters import MachineParameters
 from wm_drake.report.figure import Figure
 from wm_drake.report.labelled import LabelledTable
+from wm_drake.report.reading import READING, read_in
 from wm_drake.studies.study import Facts, Result
 
 if TYPE_CHECKING:
     from rich.table import Table as TerminalTable
+
+    from wm_drake.report.page import SectionedPage
 
 
 WritesFile: TypeAlias = Callable[[Path], None]
@@ -91,6 +94,7 @@ class Answer(Result):
         diverged: A line for each run that diverged, or another reason for exit code 1.
         others: Answers with pages of their own beside this one, by the names of their files.
         script: Script of the page, beside that of the pictures.
+        units: In which its numbers are read, of `report.reading`; those in which it was made.
     """
 
     title: str
@@ -105,6 +109,7 @@ class Answer(Result):
     diverged: tuple[str, ...] = ()
     others: "Mapping[str, Answer]" = field(default_factory=dict)
     script: Path | None = None
+    units: str = field(default_factory=READING.get)
     float_format: ClassVar[str] = "%.9g"
 
     def labelled(self) -> dict[str, LabelledTable]:
@@ -114,26 +119,34 @@ class Answer(Result):
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """Return the tables as frames, in units for reading, by name."""
-        return {name: table.frame() for name, table in self.labelled().items()}
+        with read_in(self.units):
+            return {name: table.frame() for name, table in self.labelled().items()}
 
     def as_json(self) -> dict[str, Any]:
         """Return title, machine, answer, and each table as a list of rows."""
         about = {} if self.machine is None else {"machine": self.machine.name}
-        tables = {n: table.records() for n, table in self.labelled().items() if table.is_in_json}
+        with read_in(self.units):
+            tables = {n: t.records() for n, t in self.labelled().items() if t.is_in_json}
         return {"title": self.title, **about, "answer": self.answer, **tables}
 
     def terminal(self) -> "list[TerminalTable | str]":
         """Return some tables, the answer, and the facts of the part in short."""
         chosen = [table for table in self.labelled().values() if table.is_in_terminal]
         facts = self.short.facts if self.short else ()
+        with read_in(self.units):
+            shown = [table.terminal() for table in chosen]
         return [
-            *(table.table().terminal(table.heading) for table in chosen),
+            *shown,
             self.answer,
             *(f"{word}: {text}" for word, text in facts),
         ]
 
     def page(self, facts: Facts) -> str:
         """Return the page: answer, parts, how it was made, and the numbers of the machine."""
+        with read_in(self.units):
+            return self._sectioned(facts).html()
+
+    def _sectioned(self, facts: Facts) -> "SectionedPage":
         from wm_drake.report.page import SectionedPage
 
         about = [] if self.machine is None else [("Machine", self.machine.name)]
@@ -149,7 +162,7 @@ class Answer(Result):
             method=self.method,
             advice=_section(self.short) if self.short else None,
             script=self.script,
-        ).html()
+        )
 
     def pages(self, facts: Facts) -> Mapping[str, str]:
         """Return the page, and those of other answers, by the names of their files."""

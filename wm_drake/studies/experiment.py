@@ -11,7 +11,8 @@ ledger, workers or cluster with retries, progress, and the check of the step.
 
 Machines and cases are made one by one when they are run, so that 100,000 of them take the memory of
 their results. Cases that are no product of points and loads go to `Experiment.over`, with the
-labels of any dimensions.
+labels of any dimensions; what needs the motion itself, such as an envelope, to
+`Experiment.records`. `placed` alone keeps what was measured of a run until it failed.
 """
 
 import math
@@ -19,16 +20,19 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
+import numpy as np
 import xarray as xr
 
-from wm_drake.batch import simulate_many
+from wm_drake.batch import RunResult, simulate_many
 from wm_drake.engines.compiled.step_check import check_step
 from wm_drake.errors import InputError
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters, with_values
+from wm_drake.parameters.types import FloatArray
 from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.cases import Case, load_of
 from wm_drake.simulation.measures.responses import Response
+from wm_drake.simulation.records import Record
 from wm_drake.simulation.steps import checked_step
 
 Simulate: TypeAlias = Callable[..., xr.Dataset]
@@ -66,6 +70,19 @@ def run_here(
     return simulate_many(machine, cases, measures=measures)
 
 
+def record_here(
+    machine: Machine, cases: Iterable[Case], keep: Callable[[int, Record], None], what: str
+) -> None:
+    """Run cases on the cores of this computer and pass number and record of each on."""
+    del what
+
+    def collect(run: RunResult) -> None:
+        assert run.record is not None
+        keep(run.number, run.record)
+
+    simulate_many(machine, cases, measures=("extremes",), histories=True, finished=collect)
+
+
 @dataclass(frozen=True)
 class Experiment:
     """Runs of a machine with other numbers and loads, and what is measured of each.
@@ -75,12 +92,14 @@ class Experiment:
         measures: Names of measures, keys of `wm_drake.simulation.measures.MEASURES`.
         simulate: Function that runs cases.
         loads: Case of each load, without parameters, for `at`.
+        record: Function that runs cases with their records, `Executor.records`.
     """
 
     machine: Machine
     measures: tuple[str, ...]
     simulate: Simulate = run_here
     loads: tuple[Case, ...] = ()
+    record: Callable[..., None] = record_here
 
     def over(self, labels: PlaceLabels, cases: Iterable[Case], what: str = "runs") -> xr.Dataset:
         """Run cases and return their measures over labelled dimensions.
@@ -114,6 +133,36 @@ class Experiment:
         pairs = zip(points, machines, strict=True)
         cases = (case for point, machine in pairs for case in self.cases_of(machine, str(point)))
         return self.over({"point": points, "load": [c.name for c in self.loads]}, cases, what)
+
+    def records(
+        self,
+        labels: PlaceLabels,
+        cases: Iterable[Case],
+        measure: Callable[[Record], FloatArray],
+        size: int,
+        what: str = "records",
+    ) -> FloatArray:
+        """Run cases on this computer and return numbers of the record of each.
+
+        Records are too large for a ledger.
+
+        Args:
+            labels, cases, what: As for `over`.
+            measure: Function of a record with an array. (size,)
+            size: Number of its values.
+
+        Returns:
+            Over the labels and these values; NaN for a run that failed.
+        """
+        shape = tuple(map(len, labels.values()))
+        values = np.full((math.prod(shape), size), np.nan)
+
+        def keep(number: int, record: Record) -> None:
+            if not record.attrs["diverged"]:
+                values[number] = measure(record)
+
+        self.record(self.machine, CountedCases(cases, len(values)), keep, what)
+        return values.reshape(*shape, size)
 
     def cases_of(self, machine: MachineParameters, name: str) -> Iterator[Case]:
         """Yield the case of each load for a changed machine, which has a name."""

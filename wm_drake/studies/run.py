@@ -8,12 +8,13 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import ValidationError
 
 from wm_drake.errors import InputError, InputNotice, Problem, input_error
 from wm_drake.report.provenance import command_line
+from wm_drake.report.reading import SI, read_in
 from wm_drake.report.terminal import QUIET, say
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import (
@@ -33,7 +34,16 @@ from wm_drake.studies.result_folder import (
     prepare_folder,
     result_folder,
 )
-from wm_drake.studies.study import PAGE, STUDIES, Facts, OptionModel, Result, Study, option
+from wm_drake.studies.study import (
+    PAGE,
+    SI_ONLY,
+    STUDIES,
+    Facts,
+    OptionModel,
+    Result,
+    Study,
+    option,
+)
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     from wm_drake.batch.ledger import Ledger
@@ -64,6 +74,9 @@ class RunOptions(OptionModel):
         "DIR",
     )
     quick: bool = option(False, "Small sizes for a first look, where no other option sets them.")
+    units: Literal["si", "us"] = option(
+        "si", "Units of page, tables and files: si (mm, N, kg), or us (in, lbf, lb).", "NAME"
+    )
 
 
 class LedgerOptions(RunOptions):
@@ -152,6 +165,8 @@ def order_of(study: Study, given: Mapping[str, Any], command: str = "") -> Order
     model = options_of_driver(study)
     running = {name: value for name, value in given.items() if name in model.model_fields}
     others = {name: value for name, value in given.items() if name not in running}
+    if running.get("units", SI) != SI and study.command in SI_ONLY:
+        raise input_error(f"'{study.command}' has no other units than si", where="--units")
     if running.get("figures") and not running.get("out"):
         raise input_error("needs a folder of results too (out)", where="figures")
     if isinstance(others.get("machine"), Path):
@@ -187,6 +202,11 @@ def execute(order: Order) -> tuple[Result, Facts, tuple[str, ...]]:
         InputError: the input is wrong, or the folder must not or cannot be written to.
         StudyInterrupted: Ctrl-C was pressed.
     """
+    with read_in(order.run.units):
+        return _executed(order)
+
+
+def _executed(order: Order) -> tuple[Result, Facts, tuple[str, ...]]:
     begin, study, options = time.perf_counter(), order.study, order.options
     machines = tuple(_machine_of(order, name) for name in order.machines)
     machine = machines[0] if len(machines) == 1 else None

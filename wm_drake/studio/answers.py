@@ -23,7 +23,7 @@ from wm_drake.errors import InputError, Problem
 from wm_drake.model.expectations import unusual_springs
 from wm_drake.model.machine import Setup
 from wm_drake.model.scene import Gap
-from wm_drake.parameters import SpinProfile
+from wm_drake.parameters import MachineParameters, SpinProfile
 from wm_drake.parameters.plausibility import unusual_numbers
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
@@ -231,24 +231,36 @@ def _rows_of(machine: OpenMachine, run: RunResult) -> list[dict[str, Any]]:
 
 def _rows(machine: OpenMachine, run: RunResult, variable: Variable) -> list[dict[str, Any]]:
     """Return a row for each number of a variable of a run."""
-    along = [LABELS[dim](machine.parameters, run.case.profile) for dim in variable.dims]
     values = plain(np.ravel(run.values[variable.name] * variable.unit.from_si(1.0)))
-    rows = []
-    for labels, value in zip(itertools.product(*along), values, strict=True):
+    heads = heads_of(machine.parameters, run.case.profile, variable)
+    return [
+        head | {"value": value, "alarm": head["touches"] and value is not None and value <= 0.0}
+        for head, value in zip(heads, values, strict=True)
+    ]
+
+
+def heads_of(
+    parameters: MachineParameters, profile: SpinProfile, variable: Variable
+) -> list[dict[str, Any]]:
+    """Return what a row says of each number of a variable, without its value.
+
+    `touches` says that a value of 0 and below is an alarm.
+    """
+    along = [LABELS[dim](parameters, profile) for dim in variable.dims]
+    unit, heads = variable.unit_text, []
+    for labels in itertools.product(*along):
         words = [words_of(label.split(".")) if "." in label else label for label in labels]
-        title, unit = variable.short_title_of(words), variable.unit_text
-        rows.append(
+        heads.append(
             {
-                "title": f"{title}, {unit}",
+                "title": f"{variable.short_title_of(words)}, {unit}",
                 "kind": variable.kind,
                 "group": "" if variable.dims in ((), EACH) else f"largest {variable.kind}, {unit}",
-                "value": value,
                 "decimals": variable.studio,
                 "sensor": labels[0] if variable.name == "amplitude" else None,
-                "alarm": variable.name == "smallest_gap" and value is not None and value <= 0.0,
+                "touches": variable.name == "smallest_gap",
             }
         )
-    return rows
+    return heads
 
 
 def _gap_of(run: RunResult) -> dict[str, Any]:

@@ -157,17 +157,17 @@ class Slider:
 
     @property
     def key(self) -> str:
-        """Key path of the number."""
+        """Return the key path of the number."""
         return self.number.key
 
     @property
     def unit(self) -> Unit:
-        """Unit of the number."""
+        """Return the unit of the number."""
         return self.number.unit
 
     @property
     def step(self) -> float:
-        """One hundredth of the slider, in SI units."""
+        """Return one hundredth of the slider, in SI units."""
         return (self.high - self.low) / 100.0 / self.unit.from_si(1.0)
 
     def for_page(self, places: Mapping[str, tuple[str, str]]) -> dict[str, Any]:

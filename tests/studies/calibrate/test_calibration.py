@@ -10,19 +10,16 @@ import pytest
 from wm_drake.batch.ledger import open_ledger
 from wm_drake.errors import InputError
 from wm_drake.model.build import build_machine
-from wm_drake.parameters import load_machine
+from wm_drake.parameters import load_machine, measured_amplitudes
 from wm_drake.parameters.files import yaml_text
 from wm_drake.parameters.free import Measured, load_free
+from wm_drake.report.labelled import LabelledTable
 from wm_drake.studies.calibrate.computed import Evaluation, PointRunner
 from wm_drake.studies.calibrate.parameter_map import parameter_map_of
 from wm_drake.studies.calibrate.prediction import predict
+from wm_drake.studies.calibrate.results import amplitudes_of, predictions_of, quantities_of
 from wm_drake.studies.calibrate.solutions import Solution, distinct, solved_machine
 from wm_drake.studies.calibrate.study import SearchPlan, calibrate, identity_of
-from wm_drake.studies.calibrate.tables import (
-    amplitude_rows,
-    prediction_table,
-    quantity_table,
-)
 from wm_drake.studies.calibrate.targets import Targets, targets_of
 from wm_drake.studies.fitting.posterior import Posterior
 
@@ -416,10 +413,10 @@ def test_start_values_of_the_free_file_are_not_used_for_predictions(short, recov
 def test_held_out_loads_are_predicted_from_the_others(recovered):
     (prediction,) = recovered[5]
     assert prediction.loads == ("middle",)
-    (row,) = prediction_table([prediction]).to_dict("records")
+    row = predictions_of([prediction]).isel(row=0)
     (kind,) = prediction.kinds()
-    assert (row["held_out"], row["what"], row["values"]) == ("middle", "amplitudes", 6)
-    assert row["predicted_mean_percent"] == pytest.approx(100.0 * np.abs(kind.predicted).mean())
+    assert (row.held_out, row.what, row["values"]) == ("middle", "amplitudes", 6)
+    assert row.predicted_mean == pytest.approx(np.abs(kind.predicted).mean())
     assert np.abs(kind.predicted).max() < 0.05
     assert not np.array_equal(kind.predicted, kind.calibrated)
 
@@ -438,9 +435,8 @@ def test_interrupted_calibration_continues_where_it_stopped(short, tmp_path, rec
     with open_ledger(path, identity, resume=True) as ledger:
         assert len(ledger) > 5
         resumed = calibrate(PointRunner(short, ledger, workers=1), free, targets, plan)
-    assert quantity_table(resumed).equals(
-        quantity_table(calibration)
-    )  # also: any number of workers
+    # also: any number of workers
+    assert quantities_of(resumed).identical(quantities_of(calibration))
 
 
 def test_solved_machine_has_the_source_of_each_number(recovered):
@@ -459,13 +455,14 @@ def test_solved_machine_has_the_source_of_each_number(recovered):
 
 def test_table_of_amplitudes_is_a_file_of_measured_amplitudes(recovered, short, tmp_path):
     path = tmp_path / "again.csv"
-    amplitude_rows(recovered[4]).to_csv(path, index=False)
-    from wm_drake.parameters import measured_amplitudes
-
-    named = short.parameters.model_copy(update={"measured": (str(path),)})
-    assert targets_of(short.parameters, measured_amplitudes(named)).amplitude == pytest.approx(
-        recovered[2].amplitude
+    table = LabelledTable(
+        "", amplitudes_of(recovered[4]).to_dataset(name="amplitude"), across="sensor"
     )
+    table.frame().to_csv(path, index=False)
+    named = short.parameters.model_copy(update={"measured": (str(path),)})
+    again, targets = targets_of(short.parameters, measured_amplitudes(named)), recovered[2]
+    order = [again.loads.index(case) for case in targets.loads]
+    assert again.amplitude[order] == pytest.approx(targets.amplitude)
 
 
 ONE_VALUE = Targets((("a", True),), ("X",), np.array([[1.0]]), np.ones((1, 1)))

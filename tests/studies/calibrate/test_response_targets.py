@@ -1,6 +1,4 @@
-"""Targets that are no amplitudes: files, means over a design, and what is known of ratios."""
-
-from dataclasses import replace
+"""Targets that are no amplitudes: files, and what is known of ratios."""
 
 import numpy as np
 import pytest
@@ -8,25 +6,18 @@ import pytest
 from wm_drake.batch import simulate_many
 from wm_drake.errors import InputError
 from wm_drake.model.build import build_machine
-from wm_drake.parameters import at_levels, levels_of, load_factors, load_machine
-from wm_drake.parameters.factors import GASKET_FACTORS
+from wm_drake.parameters import load_machine
 from wm_drake.parameters.free import load_free
 from wm_drake.parameters.measured import measured_amplitudes, measured_responses
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.calibrate.computed import Evaluation
 from wm_drake.studies.calibrate.parameter_map import parameter_map_of
-from wm_drake.studies.calibrate.prediction import Prediction
 from wm_drake.studies.calibrate.response_targets import (
     ComputedResponses,
-    _Design,
     response_targets_of,
     with_deviations,
 )
-from wm_drake.studies.calibrate.solutions import Solution
-from wm_drake.studies.calibrate.tables import prediction_table
 from wm_drake.studies.calibrate.targets import targets_of
-from wm_drake.studies.doe.orthogonal import orthogonal_levels
-from wm_drake.studies.fitting.posterior import Posterior
 
 HEAD = "load,gasket,source,of,Fx [N],My [N*mm]\n"
 ROWS = "middle,yes,test,machine,50,4000\ncounter,yes,test,machine,30,2000\n"
@@ -52,7 +43,6 @@ def test_values_are_read_with_the_unit_in_the_head(short, tmp_path):
     found = {(t.load, t.response.name): t.value for t in targets}
     assert found["middle", "Fx"] == 50.0
     assert found["counter", "My"] == pytest.approx(2.0)  # read in N mm, shown in N m
-    assert not any(target.of_design for target in targets)
 
 
 def test_files_of_responses_are_no_files_of_amplitudes(short, tmp_path):
@@ -72,11 +62,10 @@ def test_files_of_responses_are_no_files_of_amplitudes(short, tmp_path):
         (HEAD.replace("[N]", "[kg]") + ROWS, "column 'Fx' is in kg; it needs a unit such as N"),
         (HEAD.replace("Fx", "Fq") + ROWS, "no response 'Fq'"),
         (HEAD + ROWS.replace("middle", "midle"), "no load 'midle' in the machine"),
-        (HEAD + ROWS.replace("machine", "mean"), "is not allowed; allowed are machine, design"),
+        (HEAD + ROWS.replace("machine", "design"), "is not allowed; allowed are machine"),
         (HEAD + ROWS.replace("50", "0"), "it must be above 0"),
         (HEAD + ROWS.replace("counter", "middle"), "occurs twice"),
         (HEAD + ROWS.replace("50", "x"), "'x' is not a finite number"),
-        (HEAD + ROWS.replace("machine", "design").replace("yes", "no"), "a mean over the gasket's design needs the gasket"),
     ],
 )  # fmt: skip
 def test_a_wrong_file_is_refused(short, tmp_path, text, message):
@@ -97,105 +86,6 @@ def test_a_response_of_the_machine_is_that_of_a_run(short, tmp_path):
         for value in (table.gasket_force.values[run, 0], table.gasket_moment.values[run, 1])
     ]
     assert computed == pytest.approx(expected, rel=1e-12)
-
-
-def test_a_mean_over_the_design_is_that_of_its_trials(short, tmp_path):
-    text = HEAD + "middle,yes,test,design,50,4000\n"
-    targets = response_targets_of(short.parameters, named(short, tmp_path, text))
-    computed = ComputedResponses(short, targets)([short.parameters, short.parameters])
-    p, factors = short.parameters, levels_of(short.parameters, load_factors(GASKET_FACTORS))
-    trials = [at_levels(p, factors, row.tolist()) for row in orthogonal_levels(8, 27)]
-    cases = [Case("middle", p.loads["middle"], p.profile, parameters=trial) for trial in trials]
-    table = simulate_many(build_machine(trials[0]), cases, measures=("extremes",))
-    assert computed[0] == pytest.approx(
-        [table.gasket_force.values[:, 0].mean(), table.gasket_moment.values[:, 1].mean()], rel=1e-12
-    )
-    assert np.array_equal(computed[0], computed[1])
-
-
-OF_STUDY = """load,response,term,percent,effects
-middle,Fx,constant,,40
-middle,Fx,main effects,99,
-middle,Fx,K_Lx,90,-20 1
-middle,My,C_L,0.5,
-"""
-
-
-def test_effects_and_contributions_of_a_design_are_targets(short, tmp_path):
-    """Take the values from trials of a known law: 40 + 20 K_Lx - 3 K_Lx^2 + 2."""
-    targets = response_targets_of(short.parameters, named(short, tmp_path, OF_STUDY))
-    assert [target.of for target in targets] == ["design", "K_Lx at -1", "K_Lx at 0", "K_Lx", "C_L"]
-    assert [target.deviation for target in targets] == [0.10, 0.03, 0.03, 0.10, 0.10]
-    design = _Design.of(short.parameters)
-    level = design.levels[:, list(load_factors(GASKET_FACTORS)).index("K_Lx")].astype(float)
-    other = design.levels[:, 0].astype(float)
-    runs = (40.0 + 20.0 * level - 3.0 * level**2 + 2.0 + 4.0 * other)[None]
-    found = [float(design.statistic(target, runs)[0]) for target in targets]
-    assert found[:3] == pytest.approx([40.0, -21.0, 2.0])
-    sums = np.square([-21.0, 2.0, 19.0]).sum(), 2.0 * 4.0**2
-    assert found[3:] == pytest.approx([100.0 * s / sum(sums) for s in sums])
-    of_all = targets_of(
-        short.parameters, measured_amplitudes(load_machine("reference")), responses=()
-    )
-    of_all = replace(of_all, responses=targets)
-    errors = of_all.response_errors(np.array(found))
-    assert errors[:3] == pytest.approx([0.0, -1.0 / 40.0, 1.0 / 40.0])
-    assert errors[4] == pytest.approx((found[4] - 0.5) / 100.0)
-    residuals = of_all.residuals(of_all.amplitude, np.array(found), np.ones((6, 6)))
-    assert residuals[36:] == pytest.approx(errors / [0.1, 0.03, 0.03, 0.1, 0.1])
-    limited = of_all.limited({"effect": 0.01})
-    beyond = limited.excesses(of_all.amplitude, np.array(found), np.ones((6, 6)))
-    assert beyond == pytest.approx([-0.5, 0.5])
-
-
-def test_values_of_held_out_loads_are_predicted_by_kind(short, tmp_path):
-    text = OF_STUDY + "counter,Fx,constant,,30\ncounter,Fx,C_T,40,\n"
-    targets = targets_of(
-        short.parameters,
-        measured_amplitudes(load_machine("reference")),
-        responses=named(short, tmp_path, text),
-    )
-    wanted = np.array([target.value for target in targets.responses])
-    for target, value in zip(targets.responses, wanted, strict=True):
-        assert target.misfits(target.scattered(value, 0.2)) == pytest.approx(0.2)
-    others = targets.without("counter")
-    amplitude, responses = 1.1 * targets.amplitude, wanted.copy()
-    responses[[target.load == "counter" for target in targets.responses]] = [33.0, 50.0]
-    limits = np.stack([responses, responses - 11.0, responses + 4.0])
-    posterior = Posterior(np.zeros(1), np.ones((1, 1)), 1)
-    with_all, without = (
-        Solution(None, t, 0, np.zeros(1), a, r, 1.0, 0.0, posterior, 1)
-        for t, a, r in (
-            (targets, targets.amplitude, wanted),
-            (others, 1.2 * others.amplitude, wanted[: len(others.responses)]),
-        )
-    )
-    bounds = np.stack([amplitude, 0.9 * amplitude, 1.2 * amplitude])
-    prediction = Prediction(("counter",), with_all, without, bounds, limits, 0.04)
-    table = prediction_table([prediction]).set_index("what")
-    assert table["values"].to_dict() == {"amplitudes": 12, "means": 1, "contributions": 1}
-    assert table.predicted_mean_percent.to_dict() == pytest.approx(
-        {"amplitudes": 10.0, "means": 10.0, "contributions": 10.0}
-    )
-    assert table.seen_mean_percent["amplitudes"] == pytest.approx(20.0)
-    assert table.in_intervals_percent.tolist() == [100.0, 100.0, 100.0]
-    assert (table.calibrated_mean_percent == 0.0).all()
-    below = replace(prediction, responses=limits + 20.0)
-    assert [kind.is_covered.all() for kind in below.kinds()] == [True, False, False]
-
-
-@pytest.mark.parametrize(
-    ("row", "message"),
-    [
-        ("middle,Fx,K_Lq,90,-20 1\n", "no factor 'K_Lq'"),
-        ("middle,Fx,K_Lx,90,-20 1\n", "has effects and no constant above 0"),
-    ],
-)
-def test_wrong_results_of_a_study_are_refused(short, tmp_path, row, message):
-    values = named(short, tmp_path, "load,response,term,percent,effects\n" + row)
-    with pytest.raises(InputError) as refused:
-        response_targets_of(short.parameters, values)
-    assert message in refused.value.problems[0].message
 
 
 def test_weights_and_deviations_go_by_name_and_by_kind(short, tmp_path):

@@ -50,8 +50,8 @@ def test_battery_table_of_the_textbook():
             df,
             pytest.approx(f, abs=0.006),
         )
-        assert term.percent == pytest.approx(100.0 * sum_sq / 36.0 / total, abs=1e-3)
-    assert table.residual_percent == pytest.approx(100.0 * 18230.75 / 27.0 / total, abs=1e-3)
+        assert 100.0 * term.share == pytest.approx(100.0 * sum_sq / 36.0 / total, abs=1e-3)
+    assert 100.0 * table.unexplained == pytest.approx(100.0 * 18230.75 / 27.0 / total, abs=1e-3)
     assert table.residual_sum_sq == pytest.approx(18230.75, abs=0.006)
     assert table.total_sum_sq == pytest.approx(77646.97, abs=0.006)
     assert table.residual_df == 27
@@ -142,7 +142,7 @@ def test_known_effects_are_recovered_exactly_by_any_design(seed, kind):
     }
     total = sum(variances.values())
     for term in table.terms:
-        assert term.percent == pytest.approx(
+        assert 100.0 * term.share == pytest.approx(
             100.0 * variances.get(term.factors, 0.0) / total, abs=1e-8
         )
         for combination, effect in term.effects.items():
@@ -153,8 +153,8 @@ def test_known_effects_are_recovered_exactly_by_any_design(seed, kind):
             elif term.factors == ("a", "b"):
                 expected = cross[places]
             assert effect == pytest.approx(expected, abs=1e-9)
-    assert table.residual_percent == pytest.approx(0.0, abs=1e-12)
-    assert table.main_percent + table.interaction_percent == pytest.approx(100.0)
+    assert 100.0 * table.unexplained == pytest.approx(0.0, abs=1e-12)
+    assert table.main + table.interaction == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize(
@@ -178,7 +178,7 @@ def test_contributions_of_an_orthogonal_design_are_those_of_statsmodels(levels):
     variances = expected["sum_sq"] / trials
     variances["Residual"] *= trials / table.residual_df * (1.0 - coefficients / grid)
     percents = 100.0 * variances / variances.sum()
-    found = [*(term.percent for term in table.terms), table.residual_percent]
+    found = [*(100.0 * term.share for term in table.terms), 100.0 * table.unexplained]
     assert found == pytest.approx(list(percents))
     assert sum(found) == pytest.approx(100.0)
 
@@ -187,8 +187,8 @@ def test_response_that_does_not_vary_has_no_contributions():
     levels = level_matrix(3)
     table = anova(design_of(levels), pd.DataFrame({"y": np.full(27, 0.3)}))["y"]
     assert table.constant == pytest.approx(0.3)
-    assert all(np.isnan(term.percent) for term in table.terms)
-    assert np.isnan(table.residual_percent)
+    assert all(np.isnan(100.0 * term.share) for term in table.terms)
+    assert np.isnan(100.0 * table.unexplained)
 
 
 def test_predicted_r2_is_that_of_fits_without_each_trial():
@@ -214,7 +214,7 @@ def test_residual_share_is_that_of_the_grid_for_any_number_of_trials():
     full = level_matrix(5)
     response = 2.0 * full[:, 0] + full[:, 1] * full[:, 2] + rng.normal(size=len(full))
     frame = pd.DataFrame({"y": response})
-    truth = anova(design_of(full), frame)["y"].residual_percent
+    truth = anova(design_of(full), frame)["y"].unexplained
     plain, corrected = [], []
     for _ in range(150):
         rows = rng.choice(len(full), 75, replace=False)
@@ -222,7 +222,7 @@ def test_residual_share_is_that_of_the_grid_for_any_number_of_trials():
         plain.append(table.residual_sum_sq / 75.0)
         corrected.append(SumCoding(design_of(full[rows]), True).residual_variance(75.0 * plain[-1]))
     over_grid = anova(design_of(full), frame)["y"].residual_sum_sq / len(full)
-    assert truth == pytest.approx(100.0 * over_grid / np.var(response))
+    assert truth == pytest.approx(over_grid / np.var(response))
     assert np.mean(corrected) == pytest.approx(over_grid, rel=0.05)
     assert np.mean(plain) < 0.5 * over_grid
 
@@ -231,5 +231,5 @@ def test_saturated_design_has_no_residual_and_no_predicted_r2():
     levels = level_matrix(2)
     table = anova(design_of(levels), pd.DataFrame({"y": np.arange(9.0) ** 2}))["y"]
     assert table.residual_df == 0
-    assert all(np.isnan([table.residual_percent, table.adjusted_r2, table.predicted_r2]))
-    assert table.main_percent + table.interaction_percent == pytest.approx(100.0)
+    assert all(np.isnan([100.0 * table.unexplained, table.adjusted_r2, table.predicted_r2]))
+    assert table.main + table.interaction == pytest.approx(1.0)

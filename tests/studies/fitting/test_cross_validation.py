@@ -65,4 +65,4 @@ def test_a_model_without_unknowns_has_its_own_errors():
     fit = identify(given)
     assert fit.rmse == pytest.approx(np.sqrt((4.0 + 9.0 + 1.0 + 1.0) / 4.0))
     assert left_out_errors(fit, lambda chosen: given) == pytest.approx(np.sqrt([6.5, 1.0]))
-    assert fit.as_dict()["unknowns"] == {}
+    assert fit.estimates == ()

@@ -21,8 +21,8 @@ class FunctionProblem(CostProblem):
         values = np.array([[self.cost(point)] for point in self.points_at(coordinates)])
         return Residuals(values, values)
 
-    def costs(self, residuals, coordinates):  # noqa: ARG002
-        return np.where(np.isnan(residuals[:, 0]), np.inf, residuals[:, 0])
+    def costs_of(self, rows):
+        return np.where(np.isnan(rows[:, 0]), np.inf, rows[:, 0])
 
 
 def bowl(best):

@@ -1,7 +1,5 @@
 """The core of identification on functions of known answer."""
 
-import json
-
 import numpy as np
 import pytest
 from scipy.optimize import curve_fit
@@ -11,11 +9,11 @@ from wm_drake.parameters.units import Unit
 from wm_drake.studies.fitting.assessment import assess, correlation_time
 from wm_drake.studies.fitting.fit import SearchLog
 from wm_drake.studies.fitting.methods import METHODS, identify
+from wm_drake.studies.fitting.page import estimates_of
 from wm_drake.studies.fitting.problem import FitProblem, Measurement, Unknown, point_by_point
 from wm_drake.studies.fitting.surfaces import (
     QuadraticSurface,
     SurfaceRegion,
-    response_surface,
     surface_design,
 )
 
@@ -59,7 +57,8 @@ def test_the_same_seed_gives_the_same_fit_and_progress_ends_at_one(method):
         for _ in range(2)
     )
     assert np.array_equal(first.values, second.values)
-    assert first.as_dict() == second.as_dict()
+    assert first.estimates == second.estimates
+    assert first.log == second.log
     assert told[-1][0] == 1.0
     assert all(0.0 <= done <= 1.0 for done, _ in told)
 
@@ -101,7 +100,7 @@ def bent_valley(p):
 
 @pytest.mark.parametrize("problem", [straight_valley(9), bent_valley(2), bent_valley(4)])
 def test_response_surfaces_come_to_the_end_of_narrow_valleys(problem):
-    fit = response_surface(problem)
+    fit = identify(problem, "response-surface")
     assert fit.values == pytest.approx(np.ones(len(problem.unknowns)), abs=1e-4)
     assert "had not come to an end" not in fit.log.notes[-1]
 
@@ -149,12 +148,11 @@ def test_evolution_finds_a_frequency_among_many_minima(seed):
 
 
 def test_a_search_that_had_not_come_to_an_end_claims_no_interval():
-    fit = response_surface(planted(0.05), rounds=2)
+    fit = identify(planted(0.05), "response-surface", rounds=2)
     assert all(np.isnan([estimate.lower, estimate.upper]).all() for estimate in fit.estimates)
     assert np.isnan(fit.covariance).all()
     assert "had not come to an end" in fit.log.notes[-1]
-    assert all(unknown["interval_95"] is None for unknown in fit.as_dict()["unknowns"].values())
-    json.dumps(fit.as_dict(), allow_nan=False)
+    assert all(np.isnan([e.lower, e.upper]).all() for e in fit.estimates)
 
 
 def test_covariance_is_that_of_scipys_curve_fit():
@@ -206,7 +204,7 @@ def test_what_the_data_cannot_determine_is_named(method):
     (both,) = (direction for direction in fit.undetermined if set(direction.names) == {"a", "b"})
     assert both.parts[0] == pytest.approx(-both.parts[1], rel=1e-3)
     assert [estimate.determined for estimate in fit.estimates] == [False, False, False, True]
-    assert fit.as_dict()["unknowns"]["c"]["value"] is None
+    assert np.isnan(estimates_of(fit).value.sel(unknown="c"))
     assert fit["d"].value == pytest.approx(2.0, rel=1e-4)
 
 
@@ -276,6 +274,25 @@ def test_correlated_samples_claim_less():
         fit = identify(problem)
         widths[correlated] = fit["mean"].upper - fit["mean"].lower
     assert 4.0 < widths[True] / widths[False] < 9.0  # root of 40 samples that move together
+
+
+def coverage_of_line(heteroscedastic, repeats=300):
+    """Return how often the interval of a slope holds it, with an error of 2 % of each value."""
+    x = np.geomspace(0.02, 2.0, 60)  # a few large values, which determine the slope
+    rng, hits = np.random.default_rng(8), 0
+    for _ in range(repeats):
+        values = 1.5 * x * (1.0 + 0.02 * rng.standard_normal(x.size))
+        test = Measurement("line", values, heteroscedastic=heteroscedastic)
+        problem = FitProblem((Unknown("slope", 1.0, 2.0),), (test,), lambda points: points * x)
+        slope = float(values @ x / (x @ x))
+        fit = assess(problem, problem.coordinates_of(np.array([slope])), SearchLog("by hand"))
+        hits += fit["slope"].lower <= 1.5 <= fit["slope"].upper
+    return hits / repeats
+
+
+def test_errors_that_grow_with_the_values_widen_the_interval_so_that_it_holds():
+    assert 0.92 < coverage_of_line(heteroscedastic=True) < 0.98
+    assert coverage_of_line(heteroscedastic=False) < 0.85
 
 
 def test_correlation_time_of_white_noise_is_one():

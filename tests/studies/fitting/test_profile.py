@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 
-from wm_drake.studies.fitting.methods import least_squares
+from wm_drake.studies.fitting.methods import identify
 from wm_drake.studies.fitting.problem import FitProblem, Measurement, Unknown
 
 TIME = np.linspace(0.0, 1.0, 60)
@@ -22,7 +22,7 @@ def problem(seed, friction, noise=1.0, lower=0.0):
 
 
 def fitted(seed, friction, **options):
-    return least_squares(problem(seed, friction, **options), starts=1, screened=4)
+    return identify(problem(seed, friction, **options), starts=1, screened=4)
 
 
 def test_an_interval_within_the_bounds_is_that_of_the_linear_model():
@@ -49,7 +49,7 @@ def test_the_profile_of_a_curved_model_ends_where_its_sum_of_squares_has_risen()
     model = lambda x: np.exp(-x[:, :1] * TIME)  # noqa: E731
     values = model(np.array([[0.5]]))[0] + 1.0 * rng.normal(size=TIME.size)
     given = FitProblem((Unknown("rate", 0.0, 4.0),), (Measurement("m", values),), model)
-    estimate = least_squares(given, starts=1)["rate"]
+    estimate = identify(given, starts=1)["rate"]
     square = lambda rate: np.sum((values - np.exp(-rate * TIME)) ** 2)  # noqa: E731
     slope = -TIME * np.exp(-estimate.value * TIME)
     variance = square(estimate.value) / 59.0

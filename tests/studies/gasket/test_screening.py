@@ -1,14 +1,13 @@
 """Screening and the gasket study on functions with a known answer."""
 
-import json
 from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+from made_up_runs import made_up
 
-from wm_drake.batch import simulate_many
 from wm_drake.errors import InputError
 from wm_drake.model.build import build_machine
 from wm_drake.model.scene import Scene
@@ -21,26 +20,29 @@ from wm_drake.parameters import (
     load_factors,
 )
 from wm_drake.parameters.spin import Region
+from wm_drake.parameters.units import Unit
+from wm_drake.report.quantity import Quantity, shown
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import measure
 from wm_drake.simulation.measures.responses import chosen_responses, measures_of
 from wm_drake.simulation.runs import simulate
 from wm_drake.studies.doe.coding import level_matrix
 from wm_drake.studies.doe.design import Design, make_design, read_design
-from wm_drake.studies.gasket.page import GasketResult
-from wm_drake.studies.gasket.screening import Responses, leading_terms, mean_at, run_screening
-from wm_drake.studies.gasket.study import GasketTrials, as_responses
-from wm_drake.studies.gasket.tables import as_plain_data
+from wm_drake.studies.experiment import Experiment
+from wm_drake.studies.gasket.page import gasket_answer
+from wm_drake.studies.gasket.screening import at, leading, mean_at, run_screening, runs_of
+from wm_drake.studies.gasket.study import GasketTrials, responses_of
+from wm_drake.studies.gasket.surface import models_of
 
 NAMES = ("a", "b", "c")
-UNITS = {"y": "mm", "z": "N"}
+QUANTITIES = {"y": Quantity("y", Unit("m", "mm")), "z": Quantity("z", Unit("N", "N"))}
 
 
 def additive(design):
     """Return y = 10 + 3 a + b^2 - 2/3, z = a b for load one, twice that for load two."""
     a, b, _ = design.levels.T.astype(float)
-    frame = pd.DataFrame({"y": 10.0 + 3.0 * a + b**2 - 2.0 / 3.0, "z": 5.0 + a * b})
-    return Responses({"one": frame, "two": 2.0 * frame}, UNITS, {})
+    one = {"y": 10.0 + 3.0 * a + b**2 - 2.0 / 3.0, "z": 5.0 + a * b}
+    return runs_of({"one": one, "two": {n: 2.0 * v for n, v in one.items()}}, QUANTITIES)
 
 
 @pytest.fixture(scope="module")
@@ -49,81 +51,77 @@ def screening():
 
 
 def test_known_effects_are_recovered(screening):
-    table = screening.tables["two", "y"]
-    assert table.constant == pytest.approx(20.0)
-    a, b, c = table.terms[:3]
-    assert a.effects == pytest.approx({(-1,): -6.0, (0,): 0.0, (1,): 6.0})
-    assert b.effects == pytest.approx({(-1,): 2.0 / 3.0, (0,): -4.0 / 3.0, (1,): 2.0 / 3.0})
-    assert c.percent == pytest.approx(0.0, abs=1e-12)
-    assert a.percent == pytest.approx(100.0 * 6.0 / (6.0 + 2.0 / 9.0))
-    assert screening.tables["one", "z"].interaction_percent == pytest.approx(100.0)
+    of = at(screening, ("two", "y"))
+    assert of["mean"].item() == pytest.approx(20.0)
+    effects = of.effect.sel(other_level="")
+    assert effects.sel(term="a").values == pytest.approx([-6.0, 0.0, 6.0])
+    assert effects.sel(term="b").values == pytest.approx(np.array([2.0, -4.0, 2.0]) / 3.0)
+    assert of.share.sel(term="c").item() == pytest.approx(0.0, abs=1e-12)
+    assert of.share.sel(term="a").item() == pytest.approx(6.0 / (6.0 + 2.0 / 9.0))
+    assert at(screening, ("one", "z")).interaction.item() == pytest.approx(1.0)
 
 
 def test_leading_terms_are_those_above_the_thresholds(screening):
-    assert [term.name for term in leading_terms(screening.tables["one", "y"])] == ["a"]
-    assert [term.name for term in leading_terms(screening.tables["one", "z"])] == ["a:b"]
+    assert leading(at(screening, ("one", "y"))) == ["a"]
+    assert leading(at(screening, ("one", "z"))) == ["a:b"]
 
 
 def test_mean_at_levels_is_the_mean_over_the_others(screening):
-    values = additive(screening.design).values["one"]["z"]
-    levels = screening.design.levels
-    means = mean_at(screening, ("one", "z"), ["b", "a"])
-    for (b, a), mean in means.items():
-        assert mean == pytest.approx(values[(levels[:, 0] == a) & (levels[:, 1] == b)].mean())
+    of, levels = at(screening, ("one", "z")), screening.design.levels
+    for (b, a), mean in np.ndenumerate(mean_at(of, "b", "a")):
+        chosen = (levels[:, 0] == a - 1) & (levels[:, 1] == b - 1)
+        assert mean == pytest.approx(of.value.values[chosen].mean())
 
 
-def test_tables_are_the_same_bytes_each_time(screening, tmp_path):
+def answer_of(screening, machine, factors=()):
+    """Return the answer of a screening; without factors they have no physical values."""
+    trials = SimpleNamespace(factors=factors, parameters=machine, loads=())
+    return gasket_answer(screening, models_of(screening), trials)
+
+
+def test_tables_are_the_same_bytes_each_time(reference, tmp_path):
+    known = load_factors(GASKET_FACTORS)
+    factors = levels_of(reference, {name: known[name] for name in ("C_L", "C_T", "K_Lx")})
+    screening = run_screening(make_design("full", ("C_L", "C_T", "K_Lx")), additive)
     for name in ("first", "second"):
         (tmp_path / name).mkdir()
-        GasketResult(screening, SimpleNamespace(factors=())).write(tmp_path / name)
+        answer_of(screening, reference, factors).write(tmp_path / name)
     files = {path.name: path.read_bytes() for path in (tmp_path / "first").iterdir()}
     assert files == {path.name: path.read_bytes() for path in (tmp_path / "second").iterdir()}
-    assert set(files) == {
-        "design.csv", "runs.csv", "variance.csv", "contributions.csv", "effects.csv",
-        "leading_terms.csv",
-    }  # fmt: skip
     variance = pd.read_csv(tmp_path / "first" / "variance.csv").set_index(["load", "response"])
-    assert variance.loc[
-        ("two", "y"), ["constant", "smallest", "largest"]
-    ].tolist() == pytest.approx([20.0, 38 / 3, 80 / 3])
+    assert variance.loc[("two", "y"), ["mean", "smallest", "largest"]].tolist() == pytest.approx(
+        [20e3, 38e3 / 3, 80e3 / 3]
+    )
+    assert variance.loc[("two", "y"), "unit"] == "mm"
     assert len(pd.read_csv(tmp_path / "first" / "runs.csv")) == 54
-
-
-def test_plain_data_have_the_documented_form(screening):
-    data = as_plain_data(screening)
-    json.dumps(data, allow_nan=False)
-    assert {"design", "trials", "d_efficiency", "responses"} <= set(data)
-    response = data["responses"]["two"]["y"]
-    assert {"mean", "main_percent", "interaction_percent", "residual_percent", "terms"} <= set(
-        response
-    )
-    first = response["terms"][0]
-    assert (first["term"], first["effects"]) == (
-        "a",
-        pytest.approx({"-1": -6.0, "0": 0.0, "1": 6.0}),
-    )
-    assert response["terms"][3]["effects"].keys() == {
-        f"{i}:{j}" for i in (-1, 0, 1) for j in (-1, 0, 1)
-    }
+    effects = pd.read_csv(tmp_path / "first" / "effects.csv", dtype={"other_level": "string"})
+    of_pair = effects[
+        (effects.load == "one") & (effects.response == "z") & (effects.term == "C_L:C_T")
+    ]
+    assert len(of_pair) == 9
+    first = of_pair[(of_pair.level == -1) & (of_pair.other_level == "-1")]
+    assert first.effect.item() == pytest.approx(1.0)
 
 
 def failing(trials):
     def evaluate(design):
-        responses = additive(design)
-        for trial in trials:
-            responses.values["two"].loc[trial] = np.nan
-        return Responses(responses.values, UNITS, {(trial, "two"): "diverged" for trial in trials})
+        runs = additive(design)
+        rows = [trial - 1 for trial in trials]
+        runs.value.loc[{"load": "two"}][rows] = np.nan
+        runs.failed.loc[{"load": "two"}][rows] = "diverged"
+        return runs
 
     return evaluate
 
 
 def test_failed_runs_are_omitted_if_the_others_determine_the_effects():
     design = make_design("full", NAMES)
-    screening = run_screening(design, failing([3, 20]))
-    assert screening.tables["two", "y"].terms[0].effects[(1,)] == pytest.approx(6.0)
-    assert len(screening.tables["two", "y"].residual) == 25
+    screening = run_screening(design, failing([4, 21]))
+    of = at(screening, ("two", "y"))
+    assert of.effect.sel(term="a", level=1, other_level="").item() == pytest.approx(6.0)
+    assert int(of.residual.notnull().sum()) == 25
     with pytest.raises(InputError, match="load two: 20 of 27 runs failed"):
-        run_screening(design, failing(range(20)))
+        run_screening(design, failing(range(1, 21)))
 
 
 SHORT = SpinProfile(time=(0.0, 2.0), speed=(5.0, 12.0))
@@ -139,25 +137,25 @@ def test_cases_of_trials_have_their_levels(reference):
     trials = GasketTrials(middle, factors, loads)
     assert trials.measures == ("extremes", "gap", "spring tensions")
     design = Design("own", texts, level_matrix(2), "main")
-    responses = trials.responses(
-        design, lambda cases: simulate_many(machine, cases, measures=trials.measures)
-    )
-    assert list(responses.values) == ["middle", "counter"]
+    experiment = Experiment(machine, trials.measures, loads=tuple(loads))
+    responses = trials.responses(design, experiment)
+    assert responses["load"].values.tolist() == ["middle", "counter"]
     names = [letter + axis for letter in "DFM" for axis in "xyz"]
-    assert list(responses.values["middle"].columns) == [*names, "gap"] == list(responses.units)
-    heavy = list(trials.cases(design))[2 * 5]  # levels 0, 1: heavier, middle load
+    assert responses.response.values.tolist() == [*names, "gap"]
+    # levels 0, 1: heavier, middle load
+    heavy, _ = experiment.cases_of(at_levels(middle, factors, design.levels[5]), "")
     assert heavy.load.unbalances[0].mass == pytest.approx(1.2)
     measures = measure(simulate(machine, heavy), Scene(heavy.parameters))
     expected = [
-        *(1e3 * measures.detergent_displacement.values),
+        *measures.detergent_displacement.values,
         *measures.gasket_force.values,
         *measures.gasket_moment.values,
-        1e3 * measures.smallest_gap.distance,
+        measures.smallest_gap.distance,
     ]
-    assert list(responses.values["middle"].loc[5]) == pytest.approx(expected, rel=1e-9)
-    assert (
-        responses.values["counter"].loc[3, "Dx"] == responses.values["counter"].loc[5, "Dx"]
-    )  # its own masses stay
+    values = responses.value
+    assert values.sel(load="middle", trial=6).values == pytest.approx(expected, rel=1e-9)
+    counter = values.sel(load="counter", response="Dx")
+    assert counter.sel(trial=4) == counter.sel(trial=6)  # its own masses stay
 
 
 def test_any_measure_can_be_a_response(machine, reference):
@@ -169,8 +167,10 @@ def test_any_measure_can_be_a_response(machine, reference):
     names += ("turn_margin", "drive_mean_torque", "drive_speed_ripple", "drive_end_speed")
     chosen = chosen_responses(reference, profile, names)
     case = Case("middle", reference.loads["middle"], profile)
-    table = simulate_many(machine, [case], measures=measures_of(reference, chosen))
-    found = as_responses(table, ["middle"], chosen).values["middle"].loc[0]
+    experiment = Experiment(machine, measures_of(reference, chosen), loads=(case,))
+    table = experiment.at([""], [reference])
+    values = responses_of(table, chosen).value.sel(load="middle", trial=1)
+    found = dict(zip(values.response.values.tolist(), shown(values), strict=True))
     assert found["gap"] == pytest.approx(1e3 * table.smallest_gap.item())
     assert found["amplitude_Xr"] == pytest.approx(1e3 * table.amplitude.sel(sensor="Xr").item())
     rpm = 30.0 / np.pi * table.critical_speed.sel(sensor="Yf").item()
@@ -212,10 +212,14 @@ def test_runs_that_touch_are_marked(reference):
         },
         {"run": range(4), "spring": ["left", "rear"]},
     )
-    responses = as_responses(table, ["one", "two"], chosen)
-    assert responses.touching == pytest.approx({(0, "two"): -1.0, (1, "one"): 0.0})
-    assert responses.slack == {(0, "one"): ["left"], (0, "two"): ["left", "rear"]}
-    assert np.isnan(responses.values["two"].loc[1, "Dx"])
+    loads = [Case(name, reference.loads["middle"], SHORT) for name in ("one", "two")]
+    data = made_up(lambda _: table, reference, loads).at(["1", "2"], [reference] * 2)
+    runs = responses_of(data, chosen)
+    assert runs.overlap.sel(load="two", trial=1) == -0.001
+    assert runs.overlap.sel(load="one", trial=2) == 0.0
+    assert int(runs.overlap.notnull().sum()) == 2
+    assert runs.slack.values.tolist() == [["left", ""], ["left, rear", ""]]
+    assert np.isnan(runs.value.sel(load="two", trial=2, response="Dx"))
 
 
 def test_physical_values_are_in_design_and_runs(reference, tmp_path):
@@ -223,13 +227,13 @@ def test_physical_values_are_in_design_and_runs(reference, tmp_path):
     known = load_factors(GASKET_FACTORS)
     factors = levels_of(reference, dict(factor_of_text(text, known) for text in texts))
     design = Design("own", ("C_L", "K_Lx"), level_matrix(2), "main")
-    y = pd.DataFrame({"y": np.arange(9.0)})
-    screening = run_screening(design, lambda _: Responses({"one": y}, {"y": "mm"}, {}))
-    GasketResult(screening, SimpleNamespace(factors=factors)).write(tmp_path)
+    y = {"y": np.arange(9.0)}
+    screening = run_screening(design, lambda _: runs_of({"one": y}, {"y": QUANTITIES["y"]}))
+    answer_of(screening, reference, factors).write(tmp_path)
     for name in ("design.csv", "runs.csv"):
         table = pd.read_csv(tmp_path / name)
-        assert list(table["K_Lx [N/mm]"]) == pytest.approx([2.0, 3.0, 4.0] * 3)
+        assert list(table["K_Lx_N_per_mm"]) == pytest.approx([2.0, 3.0, 4.0] * 3)
         damping = 1e-3 * at_levels(reference, factors, [-1, 0]).gasket.damping_x
-        assert table["C_L [N s/mm]"][0] == pytest.approx(damping)
+        assert table["C_L_Ns_per_mm"][0] == pytest.approx(damping)
     again = read_design(tmp_path / "design.csv", ("C_L", "K_Lx"), "main")
     np.testing.assert_array_equal(again.levels, design.levels)

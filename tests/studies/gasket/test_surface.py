@@ -3,7 +3,6 @@
 import itertools
 
 import numpy as np
-import pandas as pd
 import pytest
 from scipy import stats
 
@@ -18,11 +17,23 @@ from wm_drake.parameters import (
     place_of,
     quantities,
 )
+from wm_drake.parameters.units import Unit
+from wm_drake.report.quantity import Quantity
 from wm_drake.studies.doe.design import make_design
-from wm_drake.studies.gasket.screening import Responses, run_screening
-from wm_drake.studies.gasket.surface import Check, Setting, codes, model_row, surfaces
+from wm_drake.studies.gasket.screening import run_screening, runs_of
+from wm_drake.studies.gasket.surface import (
+    Setting,
+    codes,
+    compared_with_models,
+    half_widths,
+    mean_half_widths,
+    model_rows,
+    models_of,
+    predicted,
+)
 
 NAMES = ("a", "b", "c")
+LENGTH = Quantity("y", Unit("m", "mm"))
 
 
 def truth(x):
@@ -35,7 +46,7 @@ def screening_of(noise, seed=0):
     def evaluate(design):
         rng = np.random.default_rng(seed)
         y = truth(design.levels) + noise * rng.normal(size=design.trials)
-        return Responses({"middle": pd.DataFrame({"y": y})}, {"y": "mm"}, {})
+        return runs_of({"middle": {"y": y}}, {"y": LENGTH})
 
     return run_screening(make_design("full", NAMES, model="main+2fi"), evaluate)
 
@@ -45,14 +56,14 @@ def test_codes_are_those_of_the_levels():
 
 
 def test_polynomial_of_the_model_is_recovered_between_the_levels():
-    found = surfaces(screening_of(0.0))
-    for x in np.random.default_rng(1).uniform(-1.0, 1.0, (20, 3)):
-        assert found.prediction(("middle", "y"), x) == pytest.approx(truth(x), abs=1e-10)
+    x = np.random.default_rng(1).uniform(-1.0, 1.0, (20, 3))
+    found = predicted(models_of(screening_of(0.0)), x)
+    assert found.predicted.values.ravel() == pytest.approx(truth(x), abs=1e-10)
 
 
 def test_intervals_are_those_of_least_squares_with_another_basis():
     screening = screening_of(0.4)
-    found, label, x = surfaces(screening), ("middle", "y"), (0.3, -0.7, 0.5)
+    models, x = models_of(screening), (0.3, -0.7, 0.5)
 
     def powers(a, b, c):
         one = [[v, v * v] for v in (a, b, c)]
@@ -61,22 +72,25 @@ def test_intervals_are_those_of_least_squares_with_another_basis():
 
     levels = np.array(list(itertools.product((-1.0, 0.0, 1.0), repeat=3)))
     order = {tuple(row): i for i, row in enumerate(screening.design.levels.tolist())}
-    y = screening.responses.values["middle"]["y"].to_numpy()
+    y = screening.value.sel(load="middle", response="y").values
     y = y[[order[tuple(map(int, row))] for row in levels]]
     matrix = np.array([powers(*row) for row in levels])
     beta, residual, *_ = np.linalg.lstsq(matrix, y)
     df = len(y) - matrix.shape[1]
     leverage = powers(*x) @ np.linalg.solve(matrix.T @ matrix, powers(*x))
     spread = stats.t.ppf(0.975, df) * np.sqrt(residual[0] / df)
-    assert found.prediction(label, x) == pytest.approx(powers(*x) @ beta, abs=1e-10)
-    assert found.half_width(label, x, of_run=False) == pytest.approx(spread * leverage**0.5)
-    assert found.half_width(label, x, of_run=True) == pytest.approx(spread * (1 + leverage) ** 0.5)
+    found = predicted(models, [x])
+    assert found.predicted.item() == pytest.approx(powers(*x) @ beta, abs=1e-10)
+    assert found.half_width.item() == pytest.approx(spread * (1 + leverage) ** 0.5)
+    rows = model_rows(np.array([x]), interactions=True)
+    assert half_widths(models, rows, of_run=False).item() == pytest.approx(spread * leverage**0.5)
     # a mean over 9 of the 27 trials of the full factorial
-    assert found.mean_half_width(label, "b", 1.0) == pytest.approx(spread / 3.0)
+    assert mean_half_widths(models, [1.0])[1].item() == pytest.approx(spread / 3.0)
 
 
 def test_row_without_interactions_is_short():
-    assert model_row((0.0, 1.0), interactions=False).tolist() == [1.0, 0.0, 1.0, -1.0, -1.0]
+    rows = model_rows(np.array([[0.0, 1.0]]), interactions=False)
+    assert rows.tolist() == [[1.0, 0.0, 1.0, -1.0, -1.0]]
 
 
 @pytest.fixture(scope="module")
@@ -114,11 +128,13 @@ def test_place_of_a_value_in_percent_and_with_unit(machine):
 
 
 def test_check_says_which_runs_are_inside_the_interval():
-    found = surfaces(screening_of(0.4))
+    models = models_of(screening_of(0.4))
     settings = (Setting("a=1", (1.0, 0.0, 0.0)), Setting("a=-1", (-1.0, 0.0, 0.0)))
-    half = found.half_width(("middle", "y"), settings[0].places, of_run=True)
-    middle = found.prediction(("middle", "y"), settings[0].places)
-    runs = pd.DataFrame({"y": [middle + 0.9 * half, 99.0]})
-    table = Check(settings, found, Responses({"middle": runs}, {"y": "mm"}, {})).frame()
-    assert table.is_inside.tolist() == [True, False]
-    assert table.difference[0] == pytest.approx(0.9 * half)
+    one = predicted(models, [settings[0].places]).isel(setting=0).squeeze()
+    values = [one.predicted.item() + 0.9 * one.half_width.item(), 99.0]
+    runs = runs_of({"middle": {"y": values}, "left out": {"y": values}}, {"y": LENGTH}).value
+    check = compared_with_models(models, settings, runs.rename(trial="setting"))
+    assert check.is_inside.sel(load="middle", response="y").values.tolist() == [True, False]
+    first = check.isel(setting=0).sel(load="middle")
+    assert first.difference.item() == pytest.approx(0.9 * one.half_width.item())
+    assert np.isnan(check.predicted.sel(load="left out")).all()

@@ -16,9 +16,9 @@ from wm_drake.simulation.cases import Case
 from wm_drake.simulation.runs import simulate
 from wm_drake.studies.fitting.assessment import assess
 from wm_drake.studies.fitting.fit import SearchLog
-from wm_drake.studies.fitting.methods import least_squares
+from wm_drake.studies.fitting.methods import identify
 from wm_drake.studies.fitting.problem import Measurement, Unknown
-from wm_drake.studies.fitting.search import descended
+from wm_drake.studies.fitting.search import Search, descended
 from wm_drake.studies.gasket_damping.study import (
     LOWER,
     NOISE,
@@ -129,7 +129,7 @@ def with_noise(records, seed):
 def test_fit_and_grids_find_the_true_damping(short_problem, records):
     """Repeat with one pair, one load and the resonances only."""
     problem = short_problem(with_noise({"counter": records["counter"]}, 1))
-    fit = least_squares(problem, starts=STARTS, screened=SCREENED)
+    fit = identify(problem, starts=STARTS, screened=SCREENED)
     assert fit.values == pytest.approx(TRUTH, rel=0.02)
     for estimate, true in zip(fit.estimates, TRUTH, strict=True):
         assert estimate.lower < true < estimate.upper
@@ -145,7 +145,7 @@ def test_intervals_hold_the_planted_damping(short_problem, records):
     held = 0
     for seed in range(20):
         problem = short_problem(with_noise(records, seed))
-        end = descended(problem.residuals, problem.coordinates_of(1.05 * TRUTH))
+        end = descended(Search(problem), problem.coordinates_of(1.05 * TRUTH))
         fit = assess(problem, end.point, SearchLog("from beside the truth"))
         held += sum(e.lower < t < e.upper for e, t in zip(fit.estimates, TRUTH, strict=True))
     assert held >= 34

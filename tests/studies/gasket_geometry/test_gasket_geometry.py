@@ -108,6 +108,7 @@ def test_the_best_drawing_keeps_the_limits_and_then_has_the_largest_gap():
     assert excess(responses, {"largest_stretch": 2.0}) == pytest.approx([0.0, 1.0, 0.0, 0.0])
 
 
+@pytest.mark.slow
 def test_thicker_and_harder_walls_are_stiffer_and_the_best_drawing_is_verified(tmp_path):
     out = tmp_path / "out"
     limit = 1.05

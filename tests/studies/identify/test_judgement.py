@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from wm_drake.parameters import CoulombDamper, MeasuredLoop, load_component, load_machine
 from wm_drake.rigs import Harmonic, bushing_bench, damper_bench, force_loops
 from wm_drake.rigs.measured import measured_motion
-from wm_drake.studies.fitting.methods import least_squares
+from wm_drake.studies.fitting.methods import identify
 from wm_drake.studies.identify.judgement import judge, noise_of
 from wm_drake.studies.identify.models import Given, TestedAxis, bushing_model, damper_model
 from wm_drake.studies.identify.problem import fit_problem
@@ -40,7 +40,7 @@ def recorded(bench, *, sign=1.0, noise=0.0, delay=0.0, periods=3.1, samples=400)
 
 
 def judged(model, loops):
-    fit = least_squares(fit_problem(model, loops), starts=1)
+    fit = identify(fit_problem(model, loops), starts=1)
     return judge(fit, loops)
 
 
@@ -75,18 +75,15 @@ def test_the_right_law_is_a_good_fit_at_any_noise(noise):
     assert judgement.verdict == "good"
     assert judgement.missed < 0.01
     assert judgement.noise == pytest.approx(noise * 1.1, rel=0.3, abs=0.01)
-    shown = "no lack of fit shows above the noise" if judgement.missed == 0.0 else "the lack of fit"
-    assert judgement.sentences[0].startswith(f"Good fit: {shown}")
     assert judgement.hints == ()
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.1])
 def test_a_law_without_sponge_on_a_damper_with_one_is_a_poor_fit(noise):
     loops = recorded(damper_bench(MSTV), noise=noise)
-    fit = least_squares(fit_problem(damper_model("coulomb", loops), loops), starts=1)
+    fit = identify(fit_problem(damper_model("coulomb", loops), loops), starts=1)
     judgement = judge(fit, loops)
     assert judgement.verdict == "poor"
-    assert judgement.sentences[0].startswith("Poor fit: ")
     assert judgement.hints == ()
     # lack of fit and noise together are the residual
     squares = [np.mean(np.square(m.loop.force - m.baseline @ b)) for m, b in zip(
@@ -125,14 +122,14 @@ def test_a_reversed_sign_is_told(bench, noise):
         else:
             assert judgement.verdict == "poor"
             (hint,) = judgement.hints
-            assert hint.startswith("The force seems to have the wrong sign in all 2 loops")
+            assert "wrong sign" in hint
             assert hint in judgement.sentences
 
 
 def test_a_delay_of_the_force_is_told_from_a_reversed_sign():
     loops = recorded(bushing_bench(GASKET, "x"), delay=0.5)
     (hint,) = judged(bushing_model("voigt", loops, TestedAxis(GASKET, "x")), loops).hints
-    assert hint.startswith("The component gives energy in all 2 loops")
+    assert "gives energy" in hint
 
 
 def test_work_of_a_loop_is_its_area():

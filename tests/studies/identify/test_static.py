@@ -10,7 +10,7 @@ import pytest
 
 from wm_drake.errors import InputError
 from wm_drake.parameters import MeasuredLoop, load_machine
-from wm_drake.studies.identify.static import field_of, static_curve
+from wm_drake.studies.identify.static import field_of, static_curve, table_of_curve
 
 FRICTION, SOON = 3.0, 2e-4  # N, m
 
@@ -42,36 +42,35 @@ def ramps(ends, *, noise=0.0, offset=0.0, friction=FRICTION, samples=2000, rotat
 )
 def test_table_and_hysteresis_come_back(ends):
     curve = static_curve("x", [ramps(ends, noise=0.3, offset=2.0)])
-    table = curve.table(5)
+    table = table_of_curve(curve, 5)
     places = np.array(table["displacement"])
     assert len(places) == (6 if ends == (0.0, 20e-3, 0.0) else 11)
     largest = elastic(20e-3)
     assert table["force"] == pytest.approx(elastic(places), abs=0.004 * largest)
     assert dict(zip(places, table["force"], strict=True))[0.0] == 0.0
-    assert curve.friction == pytest.approx(FRICTION, rel=0.1)
-    inner = np.abs(curve.position) < 3e-3
-    assert curve.stiffness == pytest.approx(
-        np.sum((curve.position * elastic(curve.position))[np.abs(curve.position) <= 4e-3])
-        / np.sum(curve.position[np.abs(curve.position) <= 4e-3] ** 2),
-        rel=0.03,
-    )
-    assert np.nanmax(np.abs(curve.half_width[inner] - FRICTION)) < 0.2 * FRICTION
-    assert curve.fastest == pytest.approx(1.67e-3, rel=1e-2)
+    assert curve.hysteresis == pytest.approx(FRICTION, rel=0.1)
+    position = curve.position.values
+    near, inner = position[np.abs(position) <= 4e-3], np.abs(position) < 3e-3
+    slope = np.sum(near * elastic(near)) / np.sum(near**2)
+    assert curve.stiffness == pytest.approx(slope, rel=0.03)
+    assert np.nanmax(np.abs(curve.half_width.values[inner] - FRICTION)) < 0.2 * FRICTION
+    assert curve.median_rate == pytest.approx(1.67e-3, rel=1e-2)
 
 
 def test_energy_of_a_whole_cycle_is_the_area_of_the_loop():
     curve = static_curve("x", [ramps((0.0, 10e-3, -10e-3, 10e-3, -10e-3, 0.0), samples=8000)])
     full = 4.0 * FRICTION * 10e-3
-    assert curve.energy == pytest.approx(full, rel=0.1)  # less what turning round saves
+    assert curve.energy_per_cycle == pytest.approx(full, rel=0.1)  # less what turning round saves
 
 
 def test_repeated_tests_are_averaged_and_purely_elastic_ones_have_no_hysteresis():
     runs = [ramps((0.0, 20e-3, 0.0), friction=0.0, offset=o) for o in (0.0, 0.0, 0.0)]
     curve = static_curve("about_y", runs)
     assert field_of(curve.axis) == "rotational_stiffness_y"
-    assert curve.friction == pytest.approx(0.0, abs=1e-3)
-    assert set(curve.table(3)) == {"angle", "torque"}
-    assert curve.table(3)["torque"][-1] == pytest.approx(elastic(20e-3), rel=3e-3)
+    assert curve.hysteresis == pytest.approx(0.0, abs=1e-3)
+    table = table_of_curve(curve, 3)
+    assert set(table) == {"angle", "torque"}
+    assert table["torque"][-1] == pytest.approx(elastic(20e-3), rel=3e-3)
 
 
 @pytest.mark.parametrize(
@@ -100,8 +99,10 @@ def test_command_gives_all_axes_in_one_plot_and_a_machine(wm_drake):
     tests = "radial=r.csv axial=a.csv tilt=t.csv twist=w.csv"
     ended = wm_drake(f"identify gasket --static {tests} --out fit --json")
     assert ended.code == 0
-    axes = [axis["axis"] for axis in json.loads(ended.out)["axes"]]
-    assert axes == ["x", "y", "about_x", "about_y"]
+    found = json.loads(ended.out)
+    measures = [*found["measures"], *found["rotational_measures"]]
+    assert [row["axis"] for row in measures] == ["x", "y", "about_x", "about_y"]
+    assert [row["tests"] for row in measures] == [1, 1, 1, 1]
     gasket = load_machine("fit/identified.yaml").gasket
     assert gasket.stiffness_x == gasket.stiffness_z
     assert gasket.stiffness_x.force[-1] == pytest.approx(elastic(20e-3), rel=0.01)
@@ -109,7 +110,10 @@ def test_command_gives_all_axes_in_one_plot_and_a_machine(wm_drake):
     assert gasket.damping_x == load_machine("reference").gasket.damping_x
     page = Path("fit/report.html").read_text()
     assert page.count("<figure data-picture>") == 1
-    assert set(pd.read_csv("fit/static.csv").axis) == {"x", "y", "about_x", "about_y"}
+    curves = [pd.read_csv(f"fit/{name}.csv") for name in ("static", "rotational_static")]
+    assert [set(curve.axis) for curve in curves] == [{"x", "y"}, {"about_x", "about_y"}]
+    assert curves[0].displacement_mm.max() == pytest.approx(20.0, rel=0.01)
+    assert curves[1].mean_Nm.abs().max() == pytest.approx(elastic(0.1), rel=0.01)
 
 
 def test_command_finds_the_sponge_of_a_free_stroke_damper(wm_drake):
@@ -127,7 +131,7 @@ def test_command_finds_the_sponge_of_a_free_stroke_damper(wm_drake):
     wanted = np.interp(places, table.displacement, table.force)
     got = np.interp(places, found.displacement, found.force)
     assert got == pytest.approx(wanted, abs=0.4)
-    assert "with a hysteresis of ±1 N" in Path("fit/report.html").read_text()
+    assert pd.read_csv("fit/measures.csv").hysteresis_N[0] == pytest.approx(1.0, rel=0.01)
 
 
 def test_a_damper_without_a_sponge_table_is_refused(wm_drake):

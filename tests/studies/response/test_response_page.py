@@ -1,5 +1,7 @@
 """What the page of the steady response leads with, on hand-made branches."""
 
+import re
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -44,13 +46,10 @@ def cases():
     return [case(True, (4.0, 6.0, 12.6, 7.0, 5.0)), without]
 
 
-def test_summary_has_what_is_reached_where_the_tub_touches_and_what_is_unstable(cases):
-    reached, without, touching, unstable, *_ = summary(cases).split(". ")
-    assert "12.6 mm at sensor Xr" in reached
-    assert "14.0 mm at sensor Xr" in without
-    assert "at 120 rpm" in touching
-    assert touching.endswith(" 4.5 mm")
-    assert "at 160 rpm, up to 203.4 mm" in unstable
+def test_summary_has_the_numbers_that_are_reached_touch_and_are_unstable_in_this_order(cases):
+    numbers = re.findall(r"[\d.]+ (?:mm|rpm)", summary(cases))
+    assert numbers[:4] == ["12.6 mm", "140 rpm", "14.0 mm", "140 rpm"]
+    assert numbers[4:8] == ["120 rpm", "4.5 mm", "160 rpm", "203.4 mm"]
 
 
 def test_table_and_peaks_have_reachable_motions_only(reference, cases):

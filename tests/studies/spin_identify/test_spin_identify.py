@@ -171,7 +171,7 @@ def identify(wm_drake):
     return run
 
 
-def test_command_names_its_experiment_virtual_and_recovers_the_true_numbers(identify):
+def test_command_recovers_the_true_numbers(identify):
     unknowns = (
         "--unknown",
         "gasket.stiffness_x+gasket.stiffness_z=(2, 8) N/mm",
@@ -188,8 +188,6 @@ def test_command_names_its_experiment_virtual_and_recovers_the_true_numbers(iden
         for entry in shown["parameters"]
     )
     assert numbers["average_error_after_percent"] < 0.1 < numbers["average_error_before_percent"]
-    page = Path("out/report.html").read_text(encoding="utf-8")
-    assert "This is a virtual experiment: nothing was measured." in page
     written = load_machine("out/identified.yaml")
     table = pd.read_csv("out/parameters.csv").set_index("unknown")
     assert list(table.index) == ["gasket.stiffness_x", "gasket.stiffness_z", "gasket.stiffness_y"]
@@ -205,6 +203,3 @@ def test_command_names_its_experiment_virtual_and_recovers_the_true_numbers(iden
     for entry, other in zip(told["parameters"], shown["parameters"], strict=True):
         assert "planted" not in entry
         assert entry["value"] == pytest.approx(other["value"], rel=1e-3)
-    assert (
-        "virtual" not in Path("out/report.html").read_text(encoding="utf-8").split("references")[0]
-    )

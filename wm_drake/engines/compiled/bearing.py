@@ -23,7 +23,7 @@ from wm_drake.compiler.vectors import (
     scale,
     subtract,
 )
-from wm_drake.elements.bushing import BUSHING
+from wm_drake.elements.bearing import DRUM_BEARING_NUMBERS
 from wm_drake.elements.motion import TubMotion, read_body_state, rpy_rates
 
 TUB = PackedLayout(
@@ -31,8 +31,10 @@ TUB = PackedLayout(
 )
 """The tub without drum: 1/M [1/kg], S [kg m], I [kg m^2], inverse of the inertia about the centre
 of mass [1/(kg m^2)]."""
-TUB_AND_BEARING = PackedLayout("TubAndBearingNumbers", tub=LAYOUT(TUB), bearing=LAYOUT(BUSHING))
-"""Packed numbers of a compliant bearing: the tub, then the bushing."""
+TUB_AND_BEARING = PackedLayout(
+    "TubAndBearingNumbers", tub=LAYOUT(TUB), bearing=LAYOUT(DRUM_BEARING_NUMBERS)
+)
+"""Packed numbers of a compliant bearing: the tub, then the bearing itself."""
 
 read_tub, read_tub_and_bearing = TUB.read, TUB_AND_BEARING.read
 

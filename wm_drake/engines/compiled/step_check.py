@@ -18,8 +18,10 @@ from wm_drake.compiler.lanes import WIDTH
 from wm_drake.elements.rubber import FRICTION, MAXWELL
 from wm_drake.elements.state_map import CABINET as CABINET_STATES
 from wm_drake.elements.state_map import (
+    CARRIER,
     CONTROL,
     DRIVE_WORDS,
+    POSITION,
     SPONGE,
     STRUT_SPONGE,
     VELOCITIES,
@@ -28,7 +30,7 @@ from wm_drake.elements.state_map import (
 from wm_drake.engines.compiled.linear import CABINET as MOVING_CABINET
 from wm_drake.engines.compiled.linear import INTERNAL, PATH, SMOOTH, jacobians
 from wm_drake.engines.compiled.mechanics import DRUM_ANGLE, DRUM_RATE
-from wm_drake.engines.compiled.packing import Layout, initial_state, pack
+from wm_drake.engines.compiled.packing import Layout, initial_state, pack, state_map
 from wm_drake.errors import input_error
 from wm_drake.model.machine import Setup
 from wm_drake.parameters import SpinProfile
@@ -290,8 +292,14 @@ def free_states(setup: Setup, states: StateMap) -> tuple[list[int], list[str]]:
 
 
 def _states(setup: Setup, kinds: StateKinds) -> FloatArray:
-    """Return the states to look at (WIDTH, size): the rest pose, with speeds of each size."""
+    """Return the states to look at (WIDTH, size): the rest pose, with speeds of each size.
+
+    A drum with play in its bearing is pressed into the contact, which is the stiffest it meets.
+    """
     rest = initial_state(setup, _STANDSTILL)
+    if setup.bearing:
+        place = state_map(setup).indices(POSITION, kinds=[CARRIER])
+        rest[place] += setup.bearing.into_contact(rest[place] - setup.rest_pose[3:])
     states, directions = np.tile(rest, (WIDTH, 1)), _directions(len(rest))
     speeds, sponges = np.resize(SPEEDS, WIDTH), kinds.sponges.astype(int)
     states[:, kinds.velocities] += speeds[:, None] * directions[kinds.velocities]

@@ -81,12 +81,16 @@ class Response:
         """Unit for reading."""
         return self.variable.unit_text
 
-    def values(self, table: xr.Dataset) -> FloatArray:
-        """Return the response of each run of a table. [unit for reading]"""
+    def of_runs(self, table: xr.Dataset) -> FloatArray:
+        """Return the response of each run of a table. [SI]"""
         values = table[self.variable.name].values
         for index in self.place:
             values = values[:, index]
-        return np.asarray(self.unit.from_si(1.0) * values)
+        return np.asarray(values)
+
+    def values(self, table: xr.Dataset) -> FloatArray:
+        """Return the response of each run of a table. [unit for reading]"""
+        return np.asarray(self.unit.from_si(1.0) * self.of_runs(table))
 
 
 def known_responses(parameters: MachineParameters, profile: SpinProfile) -> tuple[Response, ...]:

@@ -13,7 +13,9 @@ from wm_drake.parameters import MachineParameters, with_values
 from wm_drake.parameters.free import FreeFile, FreeQuantity, KnownQuantity, Measured
 from wm_drake.parameters.keys import quantities
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Unit, dimension, from_base
+from wm_drake.parameters.units import Unit, dimension, from_base, with_base
+from wm_drake.studies.fitting.posterior import priors_of
+from wm_drake.studies.fitting.problem import Unknown
 
 COMPONENTS = {"x": 0, "y": 1, "z": 2}
 
@@ -85,10 +87,8 @@ class ParameterMap:
 
     Attributes:
         base: The machine, with explicit values for all that may change.
-        names, units: Names of the quantities and the units in which they are written.
-        lower, upper: Bounds.
-        expected, deviation: Prior: expected values and standard deviations.
-        start: Point where searches start.
+        unknowns: The quantities, each with the unit in which it is written, bounds, prior and the
+            point where searches start.
         values: Values of the machine that depend on the quantities.
         preload: Expected preload of each spring and its standard deviation; None without a prior.
             [N]
@@ -98,27 +98,46 @@ class ParameterMap:
     """
 
     base: MachineParameters
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    lower: FloatArray
-    upper: FloatArray
-    expected: FloatArray
-    deviation: FloatArray
-    start: FloatArray
+    unknowns: tuple[Unknown, ...]
     values: tuple[FreeValue, ...]
     preload: tuple[float, float] | None
     elongation: tuple[float, float] | None
     relations: tuple[KnownRatio, ...]
 
     @property
-    def prior(self) -> tuple[FloatArray, FloatArray]:
-        """Expected values and standard deviations."""
-        return self.expected, self.deviation
+    def names(self) -> list[str]:
+        """Names of the quantities."""
+        return [unknown.name for unknown in self.unknowns]
+
+    @property
+    def lower(self) -> FloatArray:
+        """Lower bounds."""
+        return np.array([unknown.lower for unknown in self.unknowns])
+
+    @property
+    def upper(self) -> FloatArray:
+        """Upper bounds."""
+        return np.array([unknown.upper for unknown in self.unknowns])
+
+    @property
+    def start(self) -> FloatArray:
+        """Point where searches start."""
+        return np.array([unknown.start for unknown in self.unknowns])
+
+    @property
+    def expected(self) -> FloatArray:
+        """Expected values."""
+        return priors_of(self.unknowns)[0]
+
+    @property
+    def deviation(self) -> FloatArray:
+        """Standard deviations of the priors."""
+        return priors_of(self.unknowns)[1]
 
     def in_units(self, values: FloatArray) -> FloatArray:
         """Return values (quantity) in the units in which the quantities are written."""
-        pairs = zip(values.tolist(), self.units, strict=True)
-        return np.array([from_base(value, unit) for value, unit in pairs])
+        pairs = zip(values.tolist(), self.unknowns, strict=True)
+        return np.array([unknown.unit.from_si(value) for value, unknown in pairs])
 
     def prior_residuals(
         self, points: FloatArray, preload: FloatArray, elongation: FloatArray
@@ -180,24 +199,26 @@ def parameter_map_of(machine: Machine, free: FreeFile) -> ParameterMap:
             problems.append(Problem("", f"{section}.{first}.sets", f"'{key}' {error}"))
     if problems:
         raise InputError(problems)
-    entries = list(free.quantities.values())
-    pairs = np.array([[*q.bounds.values, *q.prior.values] for q in entries])
-    names, units = tuple(free.quantities), tuple(q.unit for q in entries)
-    lower, upper, expected, deviation = pairs.T
-    start = np.array([(q.start or q.prior).values[0] for q in entries])
     return ParameterMap(
         base,
-        names,
-        units,
-        lower,
-        upper,
-        expected,
-        deviation,
-        start,
+        tuple(_unknown(name, quantity) for name, quantity in free.quantities.items()),
         tuple(values),
         None if free.spring_preload is None else free.spring_preload.prior.pair,
         None if free.spring_elongation is None else free.spring_elongation.at_least.pair,
         tuple(_known_ratios(free)),
+    )
+
+
+def _unknown(name: str, quantity: FreeQuantity) -> Unknown:
+    lower, upper = quantity.bounds.pair
+    start = (quantity.start or quantity.prior).values[0]
+    return Unknown(
+        name,
+        lower,
+        upper,
+        with_base(quantity.unit),
+        float(np.clip(start, lower, upper)),
+        prior=quantity.prior.pair,
     )
 
 

@@ -19,6 +19,9 @@ from wm_drake.studies.calibrate.solutions import Solution
 from wm_drake.studies.calibrate.study import Calibration, SearchPlan, calibrate
 from wm_drake.studies.calibrate.targets import AMPLITUDE, Targets
 
+FITS = ("calibrated", "predicted", "seen")
+"""Errors of a kind of values in a prediction, by the names of its attributes."""
+
 
 @dataclass(frozen=True)
 class KindErrors:
@@ -165,7 +168,9 @@ def _predicted(
     drawn = np.concatenate(
         [
             generator.multivariate_normal(
-                solution.coordinates, solution.posterior.covariance(scatter / plan.deviation), each
+                solution.coordinates,
+                solution.posterior.spread_matrix(scatter / plan.deviation),
+                each,
             )
             for solution in calibration.solutions
         ]

@@ -2,16 +2,16 @@
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import from_base, to_base
+from wm_drake.parameters.units import Share, from_base, to_base
+from wm_drake.report.quantity import Quantity
 from wm_drake.studies.calibrate.parameter_map import ParameterMap
 from wm_drake.studies.calibrate.targets import Targets
-from wm_drake.studies.fitting.posterior import AT_BOUND, DETERMINED, UNDETERMINED, Posterior
+from wm_drake.studies.fitting.posterior import DETERMINED, UNDETERMINED, Posterior
 
 GOOD = 1.25
 """Largest ratio of the mean error of a good solution to that of the best solution."""
@@ -20,27 +20,26 @@ DISTINCT = 0.5
 """Least distance between distinct solutions: RMS over the quantities, in prior deviations."""
 
 
-class Percents(NamedTuple):
-    """Mean and largest absolute value of relative errors, in percent; NaN without errors."""
-
-    mean: float
-    largest: float
-
-    def named(self, prefix: str = "") -> dict[str, float]:
-        """Return both by name, such as `mean_percent`, for files."""
-        return {f"{prefix}{name}_percent": value for name, value in self._asdict().items()}
-
-    def __str__(self) -> str:
-        """Return both as words."""
-        return f"mean {self.mean:.1f} %, largest {self.largest:.1f} %"
+DIFFERENCE = Quantity("difference", Share(), 1)
+BEYOND = Quantity("difference", Share(), form="{:+.0f}".format)
+LIMIT = Quantity("limit", Share(), form="{:g}".format)
+COST = Quantity("cost", decimals=1)
+VALUE = Quantity("value")
+"""Value of a free quantity, in its own unit."""
 
 
-def percents_of(errors: FloatArray) -> Percents:
-    """Return mean and largest absolute value of relative errors; NaN values are ignored."""
+def sizes_of(errors: FloatArray) -> tuple[float, float]:
+    """Return mean and largest absolute value of errors; NaN values are ignored, NaN of none."""
     if not errors.size:
-        return Percents(np.nan, np.nan)
+        return np.nan, np.nan
     sizes = np.abs(errors)
-    return Percents(100.0 * float(np.nanmean(sizes)), 100.0 * float(np.nanmax(sizes)))
+    return float(np.nanmean(sizes)), float(np.nanmax(sizes))
+
+
+def sizes_text(errors: FloatArray) -> str:
+    """Return mean and largest absolute value of relative errors as words."""
+    mean, largest = map(DIFFERENCE.text, sizes_of(errors))
+    return f"mean {mean}, largest {largest}"
 
 
 @dataclass(frozen=True)
@@ -91,8 +90,7 @@ class Solution:
 
     def verdicts(self) -> list[str]:
         """Return what determines each quantity: "data", "prior", "data and prior" or "bound"."""
-        lower, upper = self.parameter_map.lower, self.parameter_map.upper
-        at_bound = np.minimum(self.point - lower, upper - self.point) < AT_BOUND * (upper - lower)
+        at_bound = np.array([estimate.at_bound != "" for estimate in self.posterior.estimates])
         spread = self.posterior.spread()
         cases = [at_bound, spread < DETERMINED, spread > UNDETERMINED]
         return list(map(str, np.select(cases, ["bound", "data", "prior"], "data and prior")))
@@ -103,13 +101,13 @@ class Solution:
         loads = [f"{name}{'' if gasket else ' without gasket'}" for name, gasket in targets.loads]
         names = [f"{load} {sensor}" for load in loads for sensor in targets.sensors]
         names += [
-            " ".join(filter(None, (target.load, target.response.name, target.factor and target.of)))
-            for target in targets.responses
+            f"{t.load} {t.response.name}{f' {t.of}' if t.is_linear else ''}"
+            for t in targets.responses
         ]
         errors = np.concatenate([self.errors.ravel(), self.response_errors])
         used = [(name, e) for name, e in zip(names, errors, strict=True) if e == e]
         return [
-            f"{name} {100.0 * error:+.0f} % ({100.0 * limit:g} %)"
+            f"{name} {BEYOND.text(error)} ({LIMIT.text(limit)})"
             for (name, error), limit in zip(used, targets.limit_of_each(), strict=True)
             if abs(error) > limit
         ]
@@ -118,14 +116,14 @@ class Solution:
 def distinct(solutions: list[Solution]) -> list[Solution]:
     """Return the good solutions, best first, without those that are close to a better one."""
     ordered = sorted(solutions, key=lambda solution: solution.cost)
-    limit = GOOD * percents_of(ordered[0].errors).mean
+    limit = GOOD * sizes_of(ordered[0].errors)[0]
     kept: list[Solution] = []
     for solution in ordered:
         far = all(
             np.sqrt(np.mean((solution.coordinates - other.coordinates) ** 2)) > DISTINCT
             for other in kept
         )
-        if far and percents_of(solution.errors).mean <= limit:
+        if far and sizes_of(solution.errors)[0] <= limit:
             kept.append(solution)
     return kept
 
@@ -170,16 +168,16 @@ def fit_texts(solution: Solution) -> list[str]:
     """Return for each quantity ``damper_friction 27.5 ± 2.1 N (expected 35 ± 9 N)``."""
     parameter_map, texts = solution.parameter_map, []
     values = parameter_map.in_units(_rounded(solution))
-    expected, deviation = map(parameter_map.in_units, parameter_map.prior)
+    expected, deviation = map(
+        parameter_map.in_units, (parameter_map.expected, parameter_map.deviation)
+    )
     posterior = solution.posterior.spread() * deviation
-    for index, (name, unit) in enumerate(
-        zip(parameter_map.names, parameter_map.units, strict=True)
-    ):
+    for index, unknown in enumerate(parameter_map.unknowns):
         after, before = (
-            f"{n[index]:.10g} ± {_short(s[index])} {unit}".rstrip()
+            f"{n[index]:.10g} ± {_short(s[index])} {unknown.unit.shown}".rstrip()
             for n, s in ((values, posterior), (expected, deviation))
         )
-        texts.append(f"{name} {after} (expected {before})")
+        texts.append(f"{unknown.name} {after} (expected {before})")
     return texts
 
 
@@ -189,7 +187,8 @@ def _rounded(solution: Solution) -> FloatArray:
     The rounding is decimal in the unit in which each quantity is written.
     """
     parameter_map, point = solution.parameter_map, []
-    for index, unit in enumerate(parameter_map.units):
+    for index, unknown in enumerate(parameter_map.unknowns):
+        unit = unknown.unit.shown
         value, deviation = (
             from_base(float(a[index]), unit) for a in (solution.point, parameter_map.deviation)
         )

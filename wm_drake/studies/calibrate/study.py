@@ -13,15 +13,10 @@ from wm_drake.studies.calibrate.computed import Evaluation, PointRunner
 from wm_drake.studies.calibrate.parameter_map import ParameterMap, parameter_map_of
 from wm_drake.studies.calibrate.solutions import Solution, distinct
 from wm_drake.studies.calibrate.targets import Targets
-from wm_drake.studies.fitting.kinks import (
-    DRAWS,
-    least_squares_search,
-    smooth_jacobian,
-    start_number,
-)
 from wm_drake.studies.fitting.posterior import Posterior
-from wm_drake.studies.fitting.problem import PriorProblem, Residuals, Unknown
-from wm_drake.studies.fitting.search import Search
+from wm_drake.studies.fitting.problem import PriorProblem, Residuals
+from wm_drake.studies.fitting.search import Search, descended, smooth_slopes
+from wm_drake.studies.fitting.starts import DRAWS, start_number
 
 RELATIVE_DEVIATION = 0.05
 """Relative standard deviation of a measured amplitude from the computed one.
@@ -139,7 +134,7 @@ def calibrate(
     for number in range(plan.starts):
         search = Search(problem, runner.report_of(number))
         start = start_number(search, number, plan.seed, plan.start_draws)
-        end = least_squares_search(search, start, plan.iterations or ITERATIONS)
+        end = descended(search, start, plan.iterations or ITERATIONS)
         ended.append(_solution(number, search, end.point, values))
     return Calibration(parameter_map, targets, plan, tuple(distinct(ended)), tuple(ended))
 
@@ -152,14 +147,6 @@ def calibration_problem(values: Evaluation, plan: SearchPlan) -> PriorProblem:
     """
     parameter_map, targets = values.parameter_map, values.targets
     spread = plan.spread(targets.amplitude)
-    m = parameter_map
-    columns = np.stack([m.lower, m.upper, np.clip(m.start, m.lower, m.upper), *m.prior])
-    unknowns = tuple(
-        Unknown(name, lower, upper, start=start, prior=(expected, deviation))
-        for name, (lower, upper, start, expected, deviation) in zip(
-            m.names, columns.T.tolist(), strict=True
-        )
-    )
 
     def residuals(points: FloatArray) -> Residuals:
         computed = values(points)
@@ -171,7 +158,7 @@ def calibration_problem(values: Evaluation, plan: SearchPlan) -> PriorProblem:
         )
         return Residuals(exact, smooth)
 
-    return PriorProblem(unknowns, residuals)
+    return PriorProblem(parameter_map.unknowns, residuals)
 
 
 def costs_at(problem: PriorProblem, point: FloatArray, targets: Targets) -> tuple[float, float]:
@@ -195,7 +182,9 @@ def _solution(
     # a limit is a wish: it does not make a quantity more certain
     limited = int(np.isfinite(targets.limit_of_each()).sum())
     limits = slice(targets.count, targets.count + limited)
-    slopes = np.delete(smooth_jacobian(search, coordinates), limits, axis=0)
+    here = search.evaluated(coordinates[None]).smooth
+    slopes = smooth_slopes(search, coordinates, here, problem.descent.steps[0])
+    slopes = np.delete(slopes[: here.shape[1]], limits, axis=0)
     return Solution(
         parameter_map=values.parameter_map,
         targets=targets,
@@ -205,6 +194,6 @@ def _solution(
         responses=computed.responses[0],
         data_cost=data,
         prior_cost=prior,
-        posterior=Posterior(coordinates, slopes, targets.count),
+        posterior=Posterior(coordinates, slopes, targets.count, problem.unknowns),
         evaluations=search.evaluations,
     )

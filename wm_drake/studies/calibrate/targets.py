@@ -5,18 +5,23 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 
 from wm_drake.errors import InputError, Problem, check_known, input_error, nearest_names
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.measured import EXPERIMENT, NamedValue
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
+from wm_drake.report.quantity import Quantity
 from wm_drake.studies.calibrate.response_targets import ResponseTarget, response_targets_of
 
-MILLIMETRE = Unit("m", "mm")
+MEASURED = Quantity("amplitude", Unit("m", "mm"), 1)
 
 AMPLITUDE = "amplitudes"
 """Name of all amplitudes, for limits."""
+
+GASKET = ("no", "yes")
+"""Labels of a case without and with gasket."""
 
 
 @dataclass(frozen=True)
@@ -68,10 +73,7 @@ class Targets:
         return np.where(self.weight > 0.0, amplitude / self.amplitude - 1.0, np.nan)
 
     def response_errors(self, responses: FloatArray) -> FloatArray:
-        """Return (computed - target) / target (response); NaN where the weight is 0.
-
-        Effects are compared as fractions of the mean, contributions as fractions of the variance.
-        """
+        """Return (computed - target) / target (response); NaN where the weight is 0."""
         errors = [t.errors(responses[..., k]) for k, t in enumerate(self.responses)]
         return np.where(self._used, _stacked(errors, responses), np.nan)
 
@@ -80,7 +82,7 @@ class Targets:
     ) -> FloatArray:
         """Return the weighted logarithms of the ratios of computed to wanted values.
 
-        Effects and contributions, which may be 0 or below, enter with their differences.
+        Linear responses, which may be 0 or below, enter with their differences.
 
         Args:
             amplitude: (..., case, sensor) computed amplitudes. [m]
@@ -106,9 +108,9 @@ class Targets:
         limit = self.limit_of_each()
         limited = np.isfinite(limit)
         misfits, limit = self._misfits(amplitude, responses)[..., limited], limit[limited]
-        of_factor = np.array([bool(target.factor) for target in self.responses], dtype=bool)
+        responses = np.array([target.is_linear for target in self.responses], dtype=bool)
         amplitudes = np.zeros(np.count_nonzero(self.weight > 0.0), dtype=bool)
-        is_linear = np.concatenate([amplitudes, of_factor[self._used]])[limited]
+        is_linear = np.concatenate([amplitudes, responses[self._used]])[limited]
         with np.errstate(divide="ignore"):  # no value is 100 % too small
             above = np.where(is_linear, limit, np.log1p(limit))
             below = np.where(is_linear, -limit, np.log1p(-np.minimum(limit, 1.0)))
@@ -228,6 +230,28 @@ class Targets:
             if not gasket and (name, True) in row
         }
 
+    def labelled(self, by_source: Mapping[str, FloatArray], quantity: Quantity) -> xr.DataArray:
+        """Return values (case, sensor) of sources over load, gasket (no, yes), source and sensor.
+
+        They are NaN for what was not measured.
+        """
+        loads = list(dict.fromkeys(load for load, _ in self.loads))
+        labels = {
+            "load": loads,
+            "gasket": list(GASKET),
+            "source": list(by_source),
+            "sensor": list(self.sensors),
+        }
+        values = np.full([len(of_dim) for of_dim in labels.values()], np.nan)
+        for case, (load, gasket) in enumerate(self.loads):
+            values[loads.index(load), int(gasket)] = [of[case] for of in by_source.values()]
+        return xr.DataArray(quantity.variable(list(labels), values), labels)
+
+
+def case_title(load: str, gasket: bool) -> str:
+    """Return a measured case in words."""
+    return f"{load} ({'with' if gasket else 'without'} gasket)"
+
 
 def _stacked(columns: list[FloatArray], like: FloatArray) -> FloatArray:
     """Return columns (...) as an array (..., column), which may be empty."""
@@ -280,7 +304,7 @@ def targets_of(
     return Targets(
         tuple(loads),
         sensors,
-        amplitude / MILLIMETRE.from_si(1.0),
+        MEASURED.to_si(amplitude),
         np.ones(amplitude.shape),
         response_targets_of(parameters, responses),
     )

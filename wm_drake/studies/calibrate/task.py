@@ -14,20 +14,21 @@ from wm_drake.parameters import MachineParameters, located
 from wm_drake.parameters.free import load_free
 from wm_drake.parameters.measured import measured_amplitudes, measured_responses
 from wm_drake.parameters.units import plain_number
+from wm_drake.simulation.cases import case_of
+from wm_drake.simulation.records import Record
+from wm_drake.studies.answer import Answer
 from wm_drake.studies.calibrate.computed import PointRunner
 from wm_drake.studies.calibrate.options import CalibrateOptions
-from wm_drake.studies.calibrate.page import CalibrateResult
+from wm_drake.studies.calibrate.page import calibrate_answer
 from wm_drake.studies.calibrate.parameter_map import parameter_map_of
 from wm_drake.studies.calibrate.prediction import check_held_out, predict
 from wm_drake.studies.calibrate.response_targets import with_deviations
-from wm_drake.studies.calibrate.study import (
-    RELATIVE_DEVIATION,
-    SearchPlan,
-    calibrate,
-)
-from wm_drake.studies.calibrate.targets import AMPLITUDE, Targets, targets_of
+from wm_drake.studies.calibrate.solutions import DIFFERENCE, solved_machine
+from wm_drake.studies.calibrate.study import RELATIVE_DEVIATION, SearchPlan, calibrate
+from wm_drake.studies.calibrate.targets import AMPLITUDE, MEASURED, Targets, targets_of
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import existing_file, pairs_of, with_measured
+from wm_drake.studies.modes.natural import natural_modes
 from wm_drake.studies.study import Task
 
 
@@ -49,7 +50,7 @@ class CalibrateTask(Task):
             self.targets = targets.limited(_fractions(options.limit, "--limit"))
         # the calibrated machine names the targets as its measurements
         self.machine = build_machine(measured) if options.targets else machine
-        resolution = 1e-3 * options.resolution
+        resolution = float(MEASURED.to_si(options.resolution))
         self.plan = SearchPlan(
             options.starts, options.seed, options.iterations, amplitude, resolution
         )
@@ -70,15 +71,23 @@ class CalibrateTask(Task):
             "leave_out": "; ".join(map(",".join, self.held_out)),
         }
 
-    def run(self, executor: Executor) -> CalibrateResult:
-        """Calibrate, and predict the held-out loads."""
+    def run(self, executor: Executor) -> Answer:
+        """Calibrate, predict the held-out loads, and run the best machine."""
         assert executor.ledger is not None  # the study is declared with runs
         runner = PointRunner(self.machine, executor.ledger, executor.workers)
         with _searches(executor, runner, self.plan.starts) as shown:
             calibration = calibrate(shown, self.free, self.targets, self.plan)
         with _searches(executor, runner, len(self.held_out) * self.plan.starts) as shown:
             predictions = predict(shown, self.free, calibration, self.held_out)
-        return CalibrateResult(calibration, predictions)
+        best = build_machine(solved_machine(calibration.solutions[0]))
+        parameters, records = best.parameters, dict[int, Record]()
+        cases = [case_of(parameters, name, gasket=gasket) for name, gasket in self.targets.loads]
+        executor.records(best, cases, records.__setitem__)
+        titles = {False: "without gasket", True: "with gasket"}
+        states = titles if parameters.gasket else {False: "modes"}
+        modes = {title: natural_modes(best, gasket=gasket) for gasket, title in states.items()}
+        runs = [records[number] for number in range(len(cases))]
+        return calibrate_answer(calibration, predictions, parameters, runs, modes)
 
 
 @contextmanager
@@ -124,7 +133,8 @@ def _fractions(entries: Sequence[str], option: str) -> dict[str, float]:
         )
     named = [entry for entry in entries if "=" in entry]
     named += [f"{AMPLITUDE}={entry}" for entry in plain]
-    return {name: number / 100.0 for name, number in _numbers(named, option, zero=False).items()}
+    numbers = _numbers(named, option, zero=False)
+    return {name: float(DIFFERENCE.to_si(number)) for name, number in numbers.items()}
 
 
 def _numbers(entries: Sequence[str], option: str, zero: bool = True) -> dict[str, float]:

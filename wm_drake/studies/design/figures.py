@@ -9,7 +9,7 @@ import xarray as xr
 from wm_drake.report import figure as fig
 from wm_drake.report.quantity import TIME, quantity_of, shown
 from wm_drake.studies.design.problem import MachineDesigns
-from wm_drake.studies.design.study import COMPROMISE, EVALUATIONS, HYPERVOLUME
+from wm_drake.studies.design.study import EVALUATIONS, HYPERVOLUME, PROPOSED
 
 PICKED = "picked design"
 """Label of what belongs to the picked design."""
@@ -25,9 +25,9 @@ COLUMNS = 3
 
 
 def first_picked(front: xr.Dataset) -> int:
-    """Return the number of the design that is picked first: the compromise, if there is one."""
+    """Return the number of the design that is picked first: the proposed one, if there is one."""
     chosen: dict[str, int] = front.attrs["chosen"]
-    return chosen.get(COMPROMISE, next(iter(chosen.values())))
+    return chosen.get(PROPOSED, next(iter(chosen.values())))
 
 
 def pairs_of(designs: MachineDesigns) -> list[tuple[int, int]]:

@@ -12,6 +12,7 @@ from wm_drake.report.formatting import listed
 from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.page import as_json, fragment, picture
 from wm_drake.report.quantity import quantity_of, shown, text_of
+from wm_drake.simulation.measures.responses import GAP
 from wm_drake.studies.answer import Answer, Part, Plot
 from wm_drake.studies.design.figures import (
     DESIGNS,
@@ -23,7 +24,9 @@ from wm_drake.studies.design.figures import (
     pairs_of,
 )
 from wm_drake.studies.design.problem import MachineDesigns
-from wm_drake.studies.design.study import COMPROMISE, FRESH
+from wm_drake.studies.design.study import FRESH, PROPOSED, design_proposal
+from wm_drake.studies.proposal import MOST_LOSS, SHARE
+from wm_drake.studies.proposal_page import proposal_part
 
 
 def design_answer(
@@ -50,7 +53,7 @@ def design_answer(
     ]
     return Answer(
         f"Designs of machine {designs.parameters.name}",
-        summary(designs, front, robust, envelopes),
+        summary(designs, front, robust),
         designs.parameters,
         (
             Part("Front", numbers, body=picker),
@@ -71,6 +74,7 @@ def design_answer(
         about,
         _machine_files(designs, front),
         () if picker else ("No design meets all constraints.",),
+        None if envelopes is None else _short(designs, front, envelopes),
         script=Path(__file__).with_name("pick.js") if picker else None,
     )
 
@@ -91,26 +95,32 @@ def machine_file_name(name: str) -> str:
     return f"machine_{name.replace(' ', '_')}.yaml"
 
 
-def summary(
-    designs: MachineDesigns, front: xr.Dataset, robust: xr.Dataset, envelopes: xr.Dataset | None
-) -> str:
-    """Return the findings as one paragraph."""
-    evaluations, chosen = text_of(front.evaluations[-1]), front.attrs["chosen"]
-    if envelopes is None:
+def summary(designs: MachineDesigns, front: xr.Dataset, robust: xr.Dataset) -> str:
+    """Return the answer: how many designs the front has, and whether they keep their promises."""
+    evaluations = text_of(front.evaluations[-1])
+    if not front.sizes["design"]:
         return f"None of {evaluations} designs meets all constraints."
     goals = listed([goal.given.quantity for goal in designs.objectives])
-    best = front.sel(design=first_picked(front))
-    parts = [
-        f"{goal.given.quantity} {text_of(best[goal.name])} in place of "
-        f"{text_of(front[f'nominal_{goal.name}'])}"
-        for goal in designs.objectives
-    ]
-    name = "The compromise" if COMPROMISE in chosen else "The best design"
     return (
-        f"{evaluations} designs give a front of {front.sizes['design']} for {goals}. {name} has "
-        f"{listed(parts)} of the machine itself.{_growth(envelopes, first_picked(front))}"
+        f"{evaluations} designs give a front of {front.sizes['design']} for {goals}."
         f"{_kept_text(designs, robust)}"
     )
+
+
+def _short(designs: MachineDesigns, front: xr.Dataset, envelopes: xr.Dataset) -> Part:
+    """Return the part in short: the proposed design, why, and its costs."""
+    is_made = PROPOSED in front.attrs["chosen"]
+    command = f"wm-drake spin --machine {machine_file_name(PROPOSED)}" if is_made else ""
+    aim = "gap" if GAP in [goal.name for goal in designs.objectives] else "desirability"
+    limit = f"no objective worse by more than {SHARE.text(MOST_LOSS)}"
+    why = (
+        f"Of the designs of the front that make {limit}, it has the largest {aim}."
+        if is_made
+        else f"No design of the front is clearly better and makes {limit}."
+    )
+    growth = _growth(envelopes, front.attrs["chosen"][PROPOSED]) if is_made else ""
+    proposal = design_proposal(designs, front, command)
+    return proposal_part(proposal, why, {}, [("Larger amplitudes", growth)])
 
 
 def _kept_text(designs: MachineDesigns, robust: xr.Dataset) -> str:
@@ -126,7 +136,7 @@ def _kept_text(designs: MachineDesigns, robust: xr.Dataset) -> str:
 
 
 def _growth(envelopes: xr.Dataset, number: int) -> str:
-    """Return a sentence about the amplitudes that are larger in a design than in the machine."""
+    """Return the amplitudes that are larger in a design than in the machine; "" if none is."""
     grown = []
     for sensor in envelopes["sensor"].values.tolist():
         of_sensor = envelopes.sel(sensor=sensor)
@@ -136,7 +146,7 @@ def _growth(envelopes: xr.Dataset, number: int) -> str:
         )
         if new > old and text_of(old) != text_of(new):
             grown.append(f"{sensor} from {quantity_of(old).number(old)} to {text_of(new)}")
-    return f" It increases amplitudes: {listed(grown)}." if grown else ""
+    return listed(grown) if grown else ""
 
 
 def _picker(designs: MachineDesigns, front: xr.Dataset, envelopes: xr.Dataset) -> str:
@@ -185,11 +195,8 @@ def _rows(designs: MachineDesigns, one: xr.Dataset) -> list[tuple[str, str, str]
         margin = goal.quantity.text(abs(one[goal.name] - limit))
         text = f"{text_of(one[goal.name])}, {side} {goal.quantity.text(limit)}: margin {margin}"
         rows.append(("constraint", goal.given.quantity, text))
-    for dimension in designs.dimensions:
-        value = one[dimension.name]
-        is_text = value.dtype.kind not in "fiu"
-        rows.append(("variable", dimension.name, str(value.item()) if is_text else text_of(value)))
-    return rows
+    variables = [("variable", d.name, d.text(one[d.name])) for d in designs.dimensions]
+    return [*rows, *variables]
 
 
 def _chosen(designs: MachineDesigns, front: xr.Dataset) -> LabelledTable:
@@ -212,8 +219,7 @@ def _chosen(designs: MachineDesigns, front: xr.Dataset) -> LabelledTable:
             }
         ),
         "Chosen designs of the front",
-        "Chosen designs. The compromise is nearest to the best of all objectives, each scaled to "
-        "the range of the front. Each has a machine file for --machine.",
+        "Chosen designs. Each has a machine file for --machine.",
         is_in_terminal=True,
     )
 

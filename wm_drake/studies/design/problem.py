@@ -14,7 +14,7 @@ from wm_drake.parameters.tolerances import fraction
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.parameters.variation import value_at
-from wm_drake.report.quantity import Quantity
+from wm_drake.report.quantity import Quantity, text_of
 from wm_drake.simulation.cases import Case, load_of
 from wm_drake.simulation.measures.responses import Response, chosen_responses
 from wm_drake.studies.experiment import Experiment, response_of
@@ -45,6 +45,15 @@ class Range:
         place = (self.variation.nominal - self.low) / (self.high - self.low)
         return float(np.clip(place, 0.0, 1.0))
 
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Key paths of what it changes."""
+        return self.variation.keys
+
+    def text(self, value: xr.DataArray) -> str:
+        """Return the value of a design as text."""
+        return text_of(value)
+
     def changes(self, place: float) -> dict[str, Any]:
         """Return new values of the machine by key path, at a place from 0 to 1."""
         return self.variation.changes(self.number(place))
@@ -74,6 +83,15 @@ class OptionVariable:
     def nominal(self) -> float:
         """Place of the first option."""
         return 0.5 / len(self.options)
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Key paths of what it changes."""
+        return tuple(dict.fromkeys(key for values in self.options.values() for key in values))
+
+    def text(self, value: xr.DataArray) -> str:
+        """Return the value of a design as text."""
+        return str(value.item())
 
     def changes(self, place: float) -> dict[str, Any]:
         """Return new values of the machine by key path, at a place from 0 to 1."""
@@ -206,7 +224,7 @@ class MachineDesigns:
         """Return the cases whose histories represent a design: all loads, or the median sample."""
         if self.scattered is None or self.scores is None:
             return self.runs_of(parameters, name)
-        return self.scattered(parameters).cases(np.zeros((1, self.scores.shape[1])))
+        return list(self.scattered(parameters).cases(np.zeros((1, self.scores.shape[1]))))
 
     def evaluate(
         self, designs: FloatArray, experiment: Experiment

@@ -1,9 +1,9 @@
 """The design study: search, chosen designs, check of robust designs, envelopes of the front."""
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -13,21 +13,22 @@ from wm_drake.parameters.tolerances import fraction
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.report.quantity import TIME, Quantity
-from wm_drake.simulation.cases import Case
 from wm_drake.simulation.displacements import envelopes
+from wm_drake.simulation.measures.kind import Better
 from wm_drake.simulation.records import Record, sample_period
 from wm_drake.studies.design.problem import DesignGoal, MachineDesigns
 from wm_drake.studies.design.search import DesignProblem, SearchSettings, search_front
 from wm_drake.studies.design.surrogate import search_with_surfaces
 from wm_drake.studies.experiment import Experiment
+from wm_drake.studies.proposal import AFTER, BEFORE, Aim, compared, proposal_of
 from wm_drake.studies.tolerance.distributions import base_samples
 from wm_drake.studies.tolerance.shares import CONFIDENCE, Percentile, percentile_of
 
 SEARCHES = {"genetic": search_front, "surfaces": search_with_surfaces}
 """Searches by name."""
 
-COMPROMISE = "compromise"
-"""Name of the chosen design that is nearest to the best of all objectives."""
+PROPOSED = "proposed"
+"""Name of the chosen design that the rule of `wm_drake.studies.proposal` proposes."""
 
 
 EVALUATIONS = Quantity("evaluated designs", decimals=0)
@@ -51,7 +52,7 @@ def run_designs(
         variables, and the `place` of the design in the unit cube, over `dimension` too. Over
         `generation`: `evaluations` and `hypervolume`. Over no dimension: the objectives of the
         machine itself, moved into the bounds, as `nominal_Dx`. Attribute `chosen`: numbers of
-        chosen designs by name: best Dx, ..., compromise.
+        chosen designs by name: best Dx, ..., and the proposed one, if there is any.
     """
     problem = DesignProblem(
         lambda x: designs.costs(x, experiment),
@@ -80,15 +81,19 @@ def run_designs(
             },
         },
         {"design": np.arange(len(result.designs)) + 1},
-        {"chosen": chosen_designs(designs.objectives, result.objectives)},
+        {"chosen": chosen_designs(designs.objectives, result.objectives, nominal[0])},
     )
 
 
-def chosen_designs(goals: tuple[DesignGoal, ...], costs: FloatArray) -> dict[str, int]:
-    """Return the number of the best design of each objective, and of a compromise, by name.
+def chosen_designs(
+    goals: tuple[DesignGoal, ...], costs: FloatArray, machine: FloatArray
+) -> dict[str, int]:
+    """Return the number of the best design of each objective, and of the proposed one, by name.
 
-    The compromise has the smallest distance to the best of all objectives, which are scaled to the
-    range of the front.
+    Args:
+        goals: Objectives.
+        costs: What the search made small. (n, objectives)
+        machine: Objectives of the machine itself. [unit for reading] (objectives,)
     """
     if not len(costs):
         return {}
@@ -96,11 +101,36 @@ def chosen_designs(goals: tuple[DesignGoal, ...], costs: FloatArray) -> dict[str
         f"best {g.given.quantity}": 1 + int(np.argmin(c))
         for g, c in zip(goals, costs.T, strict=True)
     }
-    if len(goals) > 1:
-        low, high = costs.min(axis=0), costs.max(axis=0)
-        scaled = (costs - low) / np.where(high > low, high - low, 1.0)
-        chosen[COMPROMISE] = 1 + int(np.argmin(np.linalg.norm(scaled, axis=1)))
-    return chosen
+    values = costs * [1.0 if goal.is_small_better else -1.0 for goal in goals]
+    aim = Aim(objectives_of(goals), np.vstack([machine, values]), machine)
+    number = aim.proposed(values, [1] * len(values))
+    return chosen if number is None else {**chosen, PROPOSED: 1 + number}
+
+
+def objectives_of(goals: tuple[DesignGoal, ...]) -> dict[str, Better]:
+    """Return which change of each objective is an improvement, by the name of the goal."""
+    return {goal.name: "smaller" if goal.is_small_better else "larger" for goal in goals}
+
+
+def design_proposal(designs: MachineDesigns, front: xr.Dataset, command: str) -> xr.Dataset:
+    """Return the proposed design of a front; its runs are those of the search.
+
+    Args:
+        command: Command that runs it.
+    """
+    number, changes = front.attrs["chosen"].get(PROPOSED), []
+    names = [goal.name for goal in designs.objectives]
+    rows = {BEFORE: [front[f"nominal_{name}"].item() for name in names]}
+    if number is not None:
+        one = front.sel(design=number)
+        rows[AFTER] = [one[name].item() for name in names]
+        changes = [(d.name, d.text(one[d.name]), ", ".join(d.keys)) for d in designs.dimensions]
+    quantities = {goal.name: goal.quantity for goal in designs.objectives}
+    values = Quantity("").of_each("response", quantities, ("setting", "response"), [*rows.values()])
+    runs = xr.DataArray(values, {"setting": [*rows], "response": names})
+    is_made = number is not None
+    compared_runs = compared(runs, objectives_of(designs.objectives))
+    return proposal_of(compared_runs, changes, is_confirmed=is_made, command=command)
 
 
 def _values(goal: DesignGoal, cost: FloatArray) -> FloatArray:
@@ -206,32 +236,33 @@ def summary_of(goal: DesignGoal, values: FloatArray) -> Percentile:
     return Percentile(value, estimate.lower, estimate.upper)
 
 
-Histories: TypeAlias = Callable[[Sequence[Case], Callable[[int, Record], None]], None]
-"""Function that runs cases and calls its second argument with number and record of each."""
-
 INTERVALS = 120
 """Number of intervals of time, each with the largest value of an envelope in it."""
 
 
-def front_envelopes(designs: MachineDesigns, front: xr.Dataset, histories: Histories) -> xr.Dataset:
+def front_envelopes(
+    designs: MachineDesigns, front: xr.Dataset, experiment: Experiment
+) -> xr.Dataset:
     """Return the envelopes of the filtered displacements, the largest over the loads of a design.
 
     Returns:
         Over `sensor` and `time`, the middle of each interval [s]: `envelope` over `design` too, and
-        `nominal`, that of the machine itself [m]. NaN behind the end of a run that failed.
+        `nominal`, that of the machine itself [m]. NaN if its runs failed.
     """
     points = [*front.place.values, designs.nominal()]
     runs = [designs.shown_runs(designs.machine_at(p), f"{i}") for i, p in enumerate(points, 1)]
-    owners = [number for number, cases in enumerate(runs) for _ in cases]
+    labels = {"design": range(len(runs)), "scenario": range(len(runs[0]))}
+    cases = [case for of_design in runs for case in of_design]
+    duration = max(case.profile.duration for case in cases)
     sensors = list(designs.parameters.sensors)
-    largest = np.full((len(points), len(sensors), INTERVALS), np.nan)
-    duration = max(case.profile.duration for cases in runs for case in cases)
-
-    def add(number: int, record: Record) -> None:
-        owner = owners[number]
-        largest[owner] = np.fmax(largest[owner], envelope_of(record, duration))
-
-    histories([case for cases in runs for case in cases], add)
+    values = experiment.records(
+        labels,
+        cases,
+        lambda record: envelope_of(record, duration).ravel(),
+        len(sensors) * INTERVALS,
+        "envelopes of the front",
+    )
+    largest = np.fmax.reduce(values, axis=1).reshape(len(points), len(sensors), INTERVALS)
     time = (np.arange(INTERVALS) + 0.5) * duration / INTERVALS
     return xr.Dataset(
         {

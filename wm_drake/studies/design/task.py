@@ -1,6 +1,5 @@
 """The task of the design study: options and files checked, and runs."""
 
-from functools import partial
 from typing import Any
 
 from wm_drake.errors import check_known
@@ -90,13 +89,14 @@ class DesignTask(Task):
     def run(self, executor: Executor) -> Answer:
         """Search the front, check a robust one on fresh samples, and run it with histories."""
         options = self.options
-        experiment = Experiment(self.machine, self.measures, executor.simulate)
+        experiment = Experiment(
+            self.machine, self.measures, executor.simulate, record=executor.records
+        )
         total = (options.evaluations + 1) * self.designs.scenarios  # and the machine itself
         with executor.progress(total):
             front = run_designs(self.designs, experiment, self.settings, options.search)
         checked = promises(self.designs, front, experiment, options.seed)
         envelopes = None
         if front.sizes["design"]:
-            histories = partial(executor.records, self.machine, what="envelopes of the front")
-            envelopes = front_envelopes(self.designs, front, histories)
+            envelopes = front_envelopes(self.designs, front, experiment)
         return design_answer(self.designs, front, checked, envelopes, self.file.about)

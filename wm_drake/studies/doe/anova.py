@@ -49,7 +49,7 @@ class Term:
 
     Attributes:
         factors: Names of the factors; one for a main effect, two for an interaction.
-        percent: Contribution: mean square of the effects over all level combinations, in percent of
+        share: Contribution: mean square of the effects over all level combinations, as a part of
             the total variance there.
         sum_sq: Sum of squares of type III over the trials. [unit of the response, squared]
         df: Degrees of freedom.
@@ -60,7 +60,7 @@ class Term:
     """
 
     factors: tuple[str, ...]
-    percent: float
+    share: float
     sum_sq: float
     df: int
     f: float
@@ -80,9 +80,9 @@ class AnovaTable:
     Attributes:
         constant: Mean over all level combinations. [unit of the response]
         terms: Main effects, then interactions, in the order of the factors.
-        main_percent, interaction_percent, residual_percent: Contributions of all main effects, all
-            interactions and the residual; they sum to 100. [%] If there are as many coefficients
-            as trials, the residual is unknown: NaN, and the other two sum to 100.
+        main, interaction, unexplained: Contributions of all main effects, all interactions and the
+            residual; they sum to 1. If there are as many coefficients as trials, the residual is
+            unknown: NaN, and the other two sum to 1.
         total_sum_sq, residual_sum_sq: Sums of squares over the trials, about the mean and about the
             fit. [unit of the response, squared]
         residual_df: Degrees of freedom of the residual.
@@ -96,9 +96,9 @@ class AnovaTable:
 
     constant: float
     terms: tuple[Term, ...]
-    main_percent: float
-    interaction_percent: float
-    residual_percent: float
+    main: float
+    interaction: float
+    unexplained: float
     total_sum_sq: float
     residual_sum_sq: float
     residual_df: int
@@ -106,10 +106,6 @@ class AnovaTable:
     predicted_r2: float
     fitted: FloatArray
     residual: FloatArray
-
-    def percents(self) -> pd.Series:
-        """Return the contribution of each term, by its name. [%]"""
-        return pd.Series({term.name: term.percent for term in self.terms})
 
 
 class SumCoding:
@@ -236,7 +232,7 @@ def _analysed(coding: SumCoding, response: FloatArray) -> AnovaTable:
     unexplained = coding.residual_variance(ssr)
     variance = sum(variances.values()) + (0.0 if math.isnan(unexplained) else unexplained)
     # the variance of a constant response is not 0 but about 1e-32 of its square, by rounding
-    scale = 100.0 / variance if variance > 1e-20 * float(np.mean(response**2)) else np.nan
+    scale = 1.0 / variance if variance > 1e-20 * float(np.mean(response**2)) else np.nan
     terms = []
     for term, columns in coding.columns.items():
         df, coefficients = columns.stop - columns.start, params[columns]
@@ -256,9 +252,9 @@ def _analysed(coding: SumCoding, response: FloatArray) -> AnovaTable:
     return AnovaTable(
         constant=float(params[0]),
         terms=tuple(terms),
-        main_percent=sum(term.percent for term in terms if len(term.factors) == 1),
-        interaction_percent=sum(term.percent for term in terms if len(term.factors) > 1),
-        residual_percent=scale * unexplained,
+        main=sum(term.share for term in terms if len(term.factors) == 1),
+        interaction=sum(term.share for term in terms if len(term.factors) > 1),
+        unexplained=scale * unexplained,
         total_sum_sq=total,
         residual_sum_sq=ssr,
         residual_df=df_resid,

@@ -1,6 +1,5 @@
-"""Designs of experiments: make one of a kind, write it and read it as CSV."""
+"""Designs of experiments: make one of a kind, or read it from a CSV file."""
 
-import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,10 +17,6 @@ DESIGNS = ("d-optimal", "orthogonal", "full")
 
 TRIAL = "trial"
 """Name of the CSV column with the numbers of the trials, which start at 1."""
-
-
-_VALUES = re.compile(r".* \[[^\]]*\]")
-"""Name of a column with physical values."""
 
 
 @dataclass(frozen=True)
@@ -53,9 +48,19 @@ class Design:
         return len(LEVELS) ** len(self.factors)
 
     @property
+    def is_complete(self) -> bool:
+        """Whether it has all level combinations, so that nothing is left to predict."""
+        return self.trials == self.combinations
+
+    @property
+    def coefficients(self) -> int:
+        """Number of coefficients of the model."""
+        return columns(len(self.factors), self.model)
+
+    @property
     def residual_df(self) -> int:
         """Number of trials beyond the coefficients of the model."""
-        return self.trials - columns(len(self.factors), self.model)
+        return self.trials - self.coefficients
 
     def efficiency(self, model: str | None = None) -> float:
         """Return the D-efficiency for a model; for the design's own model if None. [%]"""
@@ -131,22 +136,12 @@ def _check_size(trials: int) -> None:
         )
 
 
-def write_design(design: Design, path: Path, values: pd.DataFrame | None = None) -> None:
-    """Write a design as CSV: number of the trial, then one column of levels per factor.
-
-    Args:
-        values: More columns, with the physical values of each trial. Their names end with a unit in
-            brackets, so that `read_design` ignores them.
-    """
-    pd.concat([design.frame(), values], axis=1).to_csv(path, index=False, float_format="%.9g")
-
-
 def read_design(path: Path, factors: tuple[str, ...], model: str = "main+2fi") -> Design:
     """Read a design from a CSV file.
 
     The file has one column per factor, in any order, with the levels -1, 0 and 1. A column `trial`
-    is optional. Columns whose names end with a unit in brackets, such as `C_L [N s/mm]`, are for
-    the reader and are ignored.
+    is optional. Columns with the name of a factor and more, such as `C_L_Ns_per_mm` for its values,
+    are for the reader and are ignored.
 
     Args:
         model: Model to estimate, key of `MODELS`.
@@ -156,7 +151,9 @@ def read_design(path: Path, factors: tuple[str, ...], model: str = "main+2fi") -
             not determine the model.
     """
     named = list(read_header(path))
-    factor_columns = [name for name in named if name != TRIAL and not _VALUES.fullmatch(name)]
+    more = tuple(f"{factor}{end}" for factor in factors for end in ("_", " "))
+    read = {TRIAL, *(name for name in named if name.startswith(more))} - set(factors)
+    factor_columns = [name for name in named if name not in read]
     if sorted(factor_columns) != sorted(factors):
         raise input_error(
             f"needs the columns {','.join(factors)} (and may have {TRIAL}), has {','.join(named)}",

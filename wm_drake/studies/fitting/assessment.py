@@ -10,7 +10,7 @@ from wm_drake.parameters.types import FloatArray, IndexArray
 from wm_drake.studies.fitting.fit import Direction, Estimate, Fit, SearchLog, TestError
 from wm_drake.studies.fitting.problem import FitProblem, rmse
 from wm_drake.studies.fitting.profile import Profile
-from wm_drake.studies.fitting.search import descended
+from wm_drake.studies.fitting.search import Search, descended
 
 CONFIDENCE = 0.95
 
@@ -51,7 +51,8 @@ def assess(problem: FitProblem, point: FloatArray, log: SearchLog) -> Fit:
 
     The covariance is the sandwich of generalised least squares: each test has its own variance,
     larger by the correlation of its samples where they follow each other. So a densely sampled test
-    does not count for more than it contains. An interval that would leave the bounds ends by its
+    does not count for more than it contains. Values with errors of different size have a variance
+    each (`Measurement.heteroscedastic`). An interval that would leave the bounds ends by its
     profile (`wm_drake.studies.fitting.profile`).
 
     Args:
@@ -267,8 +268,9 @@ def _variances(problem: FitProblem, residuals: FloatArray, jacobian: FloatArray)
     """Return the variance of each scaled residual (n,).
 
     Samples of one test have a variance of their own; its degrees of freedom are less by its
-    baseline and by its share of the unknowns (its leverages). Values that are no samples share one
-    variance.
+    baseline and by its share of the unknowns (its leverages). Of heteroscedastic values each has
+    the square of its residual over 1 - leverage: HC3 of MacKinnon and White, Journal of
+    Econometrics 29 (1985) 305-325. Other values share one variance.
     """
     leverage = np.sum(np.square(np.linalg.svd(jacobian, full_matrices=False)[0]), axis=1)
     pooled = float(np.sum(np.square(residuals))) / max(
@@ -277,11 +279,13 @@ def _variances(problem: FitProblem, residuals: FloatArray, jacobian: FloatArray)
     parts = []
     for where, m in zip(problem.slices, problem.measurements, strict=True):
         series = residuals[where]
-        variance = pooled
+        variance = np.full(len(series), pooled)
         if m.correlated:
             freedom = max(len(series) - m.basis.shape[1] - float(np.sum(leverage[where])), 1e-12)
-            variance = float(np.sum(np.square(series))) / freedom * correlation_time(series)
-        parts.append(np.full(len(series), variance))
+            variance[:] = float(np.sum(np.square(series))) / freedom * correlation_time(series)
+        elif m.heteroscedastic:
+            variance = np.square(series / np.maximum(1.0 - leverage[where], 1e-6))
+        parts.append(variance)
     return np.concatenate(parts)
 
 
@@ -360,7 +364,7 @@ def left_out_errors(fit: Fit, part: Callable[[Sequence[int]], FitProblem]) -> Fl
         moved[free] -= inverse @ (slope - rows.T @ residuals[where])
         if np.max(np.abs(moved - point)) > FAR:
             rest = part([k for k in range(count) if k != index])
-            moved = descended(rest.residuals, point, most=MOST_STEPS).point
+            moved = descended(Search(rest), point, MOST_STEPS).point
         left_out = part([index])
         error = rmse(left_out.residuals(np.clip(moved, 0.0, 1.0)[None])[0])
         errors[index] = float(error) * left_out.measurements[0].scale

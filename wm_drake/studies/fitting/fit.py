@@ -1,12 +1,12 @@
 """Result of an identification."""
 
 from dataclasses import dataclass, replace
-from typing import Any, Literal, TypeAlias
+from typing import Literal, Protocol, TypeAlias
 
 import numpy as np
 
 from wm_drake.parameters.types import FloatArray
-from wm_drake.studies.fitting.problem import FitProblem
+from wm_drake.studies.fitting.problem import FitProblem, Unknown
 
 FitVerdict: TypeAlias = Literal["good", "fair", "poor"]
 
@@ -55,6 +55,22 @@ class Estimate:
     upper: float
     determined: bool
     at_bound: str
+
+
+class Assessed(Protocol):
+    """Unknowns with estimates: a `Fit`, or the `Posterior` of a problem with priors."""
+
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """The unknowns."""
+
+    @property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """Estimate of each."""
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Covariance of the unknowns (p, p). [SI]"""
 
 
 @dataclass(frozen=True)
@@ -117,6 +133,11 @@ class Fit:
     condition: float
     undetermined: tuple[Direction, ...]
 
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """The unknowns."""
+        return self.problem.unknowns
+
     def without_intervals(self, reason: str) -> "Fit":
         """Return the fit without intervals and covariance, with the reason as a note."""
         bare = tuple(replace(estimate, lower=np.nan, upper=np.nan) for estimate in self.estimates)
@@ -135,34 +156,3 @@ class Fit:
     def __getitem__(self, name: str) -> Estimate:
         """Return the estimate of an unknown."""
         return next(estimate for estimate in self.estimates if estimate.name == name)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the fit for JSON, in SI.
-
-        Numbers that are not finite become null, and so does the value of an undetermined unknown.
-        """
-        return {
-            "method": self.log.method,
-            "seed": self.log.seed,
-            "rmse": self.rmse,
-            "unknowns": {
-                e.name: {
-                    "value": e.value if e.determined else None,
-                    "interval_95": None if np.isnan(e.lower) else [e.lower, e.upper],
-                    "unit": u.unit.si,
-                    "determined": e.determined,
-                    "at_bound": e.at_bound or None,
-                }
-                for e, u in zip(self.estimates, self.problem.unknowns, strict=True)
-            },
-            "tests": [
-                {"name": t.name, "rmse": t.rmse, "rmse_normalised": t.normalised}
-                for t in self.tests
-            ],
-            "condition": self.condition if np.isfinite(self.condition) else None,
-            "undetermined": [
-                {"unknowns": list(d.names), "parts": list(d.parts)} for d in self.undetermined
-            ],
-            "evaluations": self.log.evaluations,
-            "notes": list(self.log.notes),
-        }

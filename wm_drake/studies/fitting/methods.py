@@ -1,10 +1,11 @@
 """Methods of search: response surfaces as in [A], least squares from many starts, evolution.
 
-All take the same problem, evaluate the model at many points at once, are repeated by their seed,
-and return the same type `Fit`.
+Each is a function that returns the optimum of a search. All evaluate the model at many points at
+once and are repeated by their seed. `identify` assesses the optimum of any of them.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from scipy import optimize
@@ -36,13 +37,13 @@ POLISHED_EVERY = 5
 
 
 def least_squares(
-    problem: FitProblem,
+    search: Search[FitProblem],
     *,
     seed: int = 0,
     starts: int = 4,
     screened: int = 32,
     progress: Progress = silent,
-) -> Fit:
+) -> Optimum:
     """Search by trust-region least squares from several starts, until two searches agree.
 
     The starts are the problem's start and the best of many scattered points.
@@ -52,7 +53,7 @@ def least_squares(
         screened: Points that are evaluated (a power of two), of which the best become starts.
         progress: Called after every step.
     """
-    search = Search(problem)
+    problem = search.problem
     points = scattered(len(problem.unknowns), screened, seed)
     order = np.argsort(search.costs(points), kind="stable")
     begins = [problem.start, *points[order[: starts - 1]]]
@@ -65,15 +66,13 @@ def least_squares(
         def step_done(fraction: float, index: int = index) -> None:
             progress((index + fraction) / len(begins), search.least)
 
-        ends.append(descended(search.residuals, begin, step_done))
+        ends.append(descended(search, begin, step_done=step_done))
         search.round_done()
     note = f"{agreeing(problem, ends)} of {len(ends)} starts came to the same least RMSE"
-    progress(1.0, search.least)
-    best = min(ends, key=lambda end: end.cost)
-    return assess(problem, best.point, search.log("least-squares", seed, note))
+    return replace(min(ends, key=lambda end: end.cost), note=note)
 
 
-def evolution(problem: FitProblem, *, seed: int = 0, progress: Progress = silent) -> Fit:
+def evolution(search: Search[FitProblem], *, seed: int = 0, progress: Progress = silent) -> Optimum:
     """Search by differential evolution, with least squares from its best point now and then.
 
     The evolution has to find the valley only, not its floor: it ends when least squares from the
@@ -82,7 +81,7 @@ def evolution(problem: FitProblem, *, seed: int = 0, progress: Progress = silent
     Args:
         progress: Called after every generation.
     """
-    search = Search(problem)
+    problem = search.problem
     ends: list[Optimum] = []
     last: FloatArray = np.full(len(problem.unknowns), np.nan)
 
@@ -91,7 +90,7 @@ def evolution(problem: FitProblem, *, seed: int = 0, progress: Progress = silent
         nonlocal last
         if agreeing(problem, ends) < AGREEING and not np.array_equal(point, last):
             last = point.copy()
-            ends.append(descended(search.residuals, point))
+            ends.append(descended(search, point))
         return agreeing(problem, ends) >= AGREEING
 
     def generation_done(intermediate_result: optimize.OptimizeResult) -> bool:
@@ -114,13 +113,11 @@ def evolution(problem: FitProblem, *, seed: int = 0, progress: Progress = silent
     )
     agrees_from(end.x)
     search.round_done()
-    progress(1.0, search.least)
     note = (
         f"least squares from the best of {len(ends)} of {end.nit} generations: "
         f"{agreeing(problem, ends)} came to the same least RMSE"
     )
-    best = min(ends, key=lambda end: end.cost)
-    return assess(problem, best.point, search.log("evolution", seed, note))
+    return replace(min(ends, key=lambda end: end.cost), note=note)
 
 
 def refined(problem: FitProblem, fit: Fit, note: str) -> Fit:
@@ -133,12 +130,14 @@ def refined(problem: FitProblem, fit: Fit, note: str) -> Fit:
     """
     search = Search(problem)
     begin = np.clip(problem.coordinates_of(fit.values), 0.0, 1.0)
-    end = descended(search.residuals, begin)
+    end = descended(search, begin)
     search.round_done()
     return assess(problem, end.point, search.log(fit.log.method, fit.log.seed, note))
 
 
-METHODS: dict[str, Callable[..., Fit]] = {
+NO_END = "the search had not come to an end: no optimum, and no intervals are claimed"
+
+METHODS: dict[str, Callable[..., Optimum]] = {
     "response-surface": response_surface,
     "least-squares": least_squares,
     "evolution": evolution,
@@ -151,8 +150,12 @@ def identify(
     *,
     seed: int = 0,
     progress: Progress = silent,
+    **settings: int,
 ) -> Fit:
     """Search by the method of a name; without unknowns, evaluate the model.
+
+    Args:
+        settings: Arguments of the method, such as `starts`.
 
     Raises:
         InputError: There is no such method.
@@ -161,4 +164,8 @@ def identify(
     if not problem.unknowns:
         progress(1.0, 0.0)
         return evaluated(problem)
-    return METHODS[method](problem, seed=seed, progress=progress)
+    search = Search(problem)
+    end = METHODS[method](search, seed=seed, progress=progress, **settings)
+    progress(1.0, search.least)
+    fit = assess(problem, end.point, search.log(method, seed, end.note))
+    return fit if end.is_end else fit.without_intervals(NO_END)

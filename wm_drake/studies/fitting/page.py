@@ -1,62 +1,27 @@
 """What the pages of all fits share: values with intervals, what is not determined, the search."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
-import pandas as pd
 import xarray as xr
 
 from wm_drake.parameters.units import Unit
-from wm_drake.report.figure import Axis, Figure, Line, Numbers, Panel
-from wm_drake.report.formatting import MISSING, number
+from wm_drake.report.figure import Axis, Figure, Line, Panel
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.page import Picture, picture
-from wm_drake.report.quantity import Quantity, quantity_of, shown
-from wm_drake.report.table import Table, line
+from wm_drake.report.quantity import Quantity, shown
 from wm_drake.studies.answer import Part, Plot
-from wm_drake.studies.fitting.fit import Estimate, Fit
+from wm_drake.studies.fitting.fit import Assessed, Estimate, Fit
+from wm_drake.studies.fitting.problem import Unknown
 
 FixedNumber: TypeAlias = tuple[str, float, Unit]
 """Name, SI value and unit of a number that was not searched."""
 
+MOST_CORRELATED = 20
+"""Largest number of unknowns whose correlations a page shows."""
+
 FIXED = "fixed"
 """Remark on a number that was not searched."""
-
-
-def estimate_rows(fit: Fit) -> list[dict[str, Any]]:
-    """Return value, interval, unit and bounds of each unknown, in its unit for reading."""
-    rows = []
-    for e, unknown in zip(fit.estimates, fit.problem.unknowns, strict=True):
-        value, lower, upper = (
-            unknown.unit.from_si(v) if np.isfinite(v) else np.nan
-            for v in (e.value, e.lower, e.upper)
-        )
-        rows.append(
-            {
-                "unknown": e.name,
-                "value": value if e.determined else np.nan,
-                "lower_95": lower,
-                "upper_95": upper,
-                "unit": unknown.unit.shown,
-                "lower_bound": unknown.unit.from_si(unknown.lower),
-                "upper_bound": unknown.unit.from_si(unknown.upper),
-            }
-        )
-    return rows
-
-
-def estimates_frame(fit: Fit, fixed: Sequence[FixedNumber] = ()) -> pd.DataFrame:
-    """Return `estimate_rows` with remarks, and the fixed numbers, as a table for a file."""
-    return pd.DataFrame(_rows(fit, fixed))
-
-
-def _rows(fit: Fit, fixed: Sequence[FixedNumber]) -> list[dict[str, Any]]:
-    pairs = zip(estimate_rows(fit), fit.estimates, strict=True)
-    return [row | {"remark": _remark(e)} for row, e in pairs] + [
-        {"unknown": name, "value": unit.from_si(value), "unit": unit.shown, "remark": FIXED}
-        for name, value, unit in fixed
-    ]
 
 
 def _remark(e: Estimate) -> str:
@@ -84,43 +49,6 @@ def undetermined_sentences(fit: Fit) -> list[str]:
     return sentences
 
 
-def values_table(fit: Fit, fixed: Sequence[FixedNumber] = ()) -> Table:
-    """Return value, interval, unit and remark of each unknown and fixed number."""
-    groups = []
-    for row in _rows(fit, fixed):
-        interval = MISSING
-        if np.isfinite(row.get("lower_95", np.nan)):
-            interval = f"{row['lower_95']:.5g} to {row['upper_95']:.5g}"
-        value = f"{row['value']:.5g}" if np.isfinite(row["value"]) else MISSING
-        unit = row["unit"].replace("*", " ")
-        groups.append(line(row["unknown"], (value, interval, unit, row["remark"])))
-    caption = (
-        "Estimated values with 95 % confidence intervals. There is no interval if the value is at "
-        "a bound, if the data do not determine it or if it was fixed."
-    )
-    heads = ("unknown", "value", "95 % interval", "unit", "remark")
-    return Table(caption, heads, tuple(groups), text_columns=5)
-
-
-def correlations_table(fit: Fit) -> Table:
-    """Return the standard deviations of the unknowns, and the correlations between them."""
-    deviation = np.sqrt(np.diag(fit.covariance))
-    correlation = correlations_of(fit).correlation.values
-    groups = []
-    for u, s, row in zip(fit.problem.unknowns, deviation, correlation, strict=True):
-        size = u.unit.reading(s, 3) if np.isfinite(s) else MISSING
-        groups.append(line(u.name, [size, *(number(value, 2) for value in row)]))
-    caption = "Standard deviations of the unknowns, and the correlations between them."
-    names = [u.name for u in fit.problem.unknowns]
-    return Table(caption, ("unknown", "standard deviation", *names), tuple(groups), text_columns=2)
-
-
-def history_picture(fit: Fit, unit: str) -> Picture:
-    """Return the smallest RMSE, with its unit, after each round of the search."""
-    plot = _history_plot(fit.log.history, f"smallest RMSE, {unit}")
-    return picture(plot.figure, plot.alternative, plot.caption)
-
-
 def search_facts(fit: Fit) -> list[tuple[str, str]]:
     """Return how the search went, as pairs of word and text."""
     return [
@@ -136,8 +64,11 @@ def search_facts(fit: Fit) -> list[tuple[str, str]]:
 
 
 def fit_parts(
-    fit: Fit, error: Quantity, planted: Mapping[str, float] | None = None
-) -> tuple[Part, ...]:
+    fit: Fit,
+    error: Quantity,
+    planted: Mapping[str, float] | None = None,
+    fixed: Sequence[FixedNumber] = (),
+) -> tuple[Part, Part, Part, Part]:
     """Return the parts of an answer that every fit has: search, values, correlations, errors.
 
     The picture of the search comes first, as pictures do on every page.
@@ -145,85 +76,134 @@ def fit_parts(
     Args:
         error: Quantity of the data, of which the RMSE is one.
         planted: True values of the unknowns, of a virtual experiment. [SI]
+        fixed: Numbers that were not searched.
     """
     values = LabelledTable(
         "estimates",
-        estimates_of(fit, planted),
+        estimates_of(fit, planted, fixed),
         "Estimated values",
         "Estimated values with 95 % confidence intervals. There is no interval if the value is at "
-        "a bound, or if the data do not determine it.",
+        "a bound, if the data do not determine it or if it was fixed.",
         is_in_terminal=True,
     )
-    correlations = LabelledTable(
-        "correlations", correlations_of(fit), "Correlations", "Correlations of the errors of the "
-        "estimates.", across="with"
-    )  # fmt: skip
-    rmse = error.named("RMSE")
-    errors = xr.Dataset(
-        {
-            "rmse": rmse.variable("test", [test.rmse for test in fit.tests]),
-            "rmse_normalised": Quantity("RMSE by the largest value", decimals=4).variable(
-                "test", [test.normalised for test in fit.tests]
-            ),
-        },
-        {"test": [test.name for test in fit.tests]},
-    )
     of_tests = LabelledTable(
-        "errors", errors, "Errors", "What the fit misses of each measured curve."
+        "errors", errors_of(fit, error), "Errors", "What the fit misses of each measured curve."
     )
-    history = xr.Dataset(
-        {"least_rmse": rmse.named("least RMSE").variable("round", fit.log.history)},
-        {"round": np.arange(1, len(fit.log.history) + 1)},
-    )
-    least, least_label = history.least_rmse, quantity_of(history.least_rmse).label
     return (
-        Part(
-            "Search", (_history_plot(shown(least), least_label), LabelledTable("search", history))
-        ),
+        Part("Search", _history(fit, error) if fit.log.history else ()),
         Part("Estimated values", (values,), remarks=undetermined_sentences(fit)),
-        Part("Correlations", (correlations,)),
+        correlations_part(fit),
         Part("Errors of the fit", (of_tests,)),
     )
 
 
-def estimates_of(fit: Fit, planted: Mapping[str, float] | None = None) -> xr.Dataset:
-    """Return value, interval, unit, bounds and remark over the unknowns.
+def correlations_part(fit: Assessed) -> Part:
+    """Return the correlations of the errors of the estimates; of many, in the file only."""
+    data = correlations_of(fit)
+    heading = "Correlations" if len(fit.estimates) <= MOST_CORRELATED else ""
+    caption = "Correlations of the errors of the estimates."
+    table = LabelledTable("correlations", data, heading, caption, across="with")
+    return Part("Correlations", (table,) if fit.estimates else ())
+
+
+def errors_of(fit: Fit, error: Quantity) -> xr.Dataset:
+    """Return `rmse` of each test and `rmse_normalised`, by the largest measured value."""
+    normalised = Quantity("RMSE by the largest value", decimals=4)
+    return xr.Dataset(
+        {
+            "rmse": error.named("RMSE").variable("test", [test.rmse for test in fit.tests]),
+            "rmse_normalised": normalised.variable("test", [t.normalised for t in fit.tests]),
+        },
+        {"test": [test.name for test in fit.tests]},
+    )
+
+
+def _history(fit: Fit, error: Quantity) -> tuple[Plot, LabelledTable]:
+    """Return the least RMSE after each round of the search."""
+    least = error.named("least RMSE")
+    rounds = np.arange(1, len(fit.log.history) + 1)
+    history = xr.Dataset(
+        {"least_rmse": least.variable("round", fit.log.history)}, {"round": rounds}
+    )
+    curve = Line(rounds, np.maximum(shown(history.least_rmse), 1e-300), symbol="circle", size=5.0)
+    x, y = Axis(label="round of the search"), Axis(label=least.label, is_log=True)
+    plot = Plot(
+        Figure(panels=(Panel(marks=(curve,), x=x, y=y),), height=180.0),
+        "Smallest RMSE after each round of the search.",
+        "Smallest RMSE that was found up to the end of each round of the search.",
+    )
+    return plot, LabelledTable("search", history)
+
+
+def estimates_of(
+    fit: Assessed,
+    planted: Mapping[str, float] | None = None,
+    fixed: Sequence[FixedNumber] = (),
+) -> xr.Dataset:
+    """Return value, standard deviation, interval, unit, bounds and remark over the unknowns.
 
     The numbers are in the unit for reading of each unknown, which the variable `unit` names: their
     units differ.
+
+    Args:
+        planted: True values of the unknowns. [SI]
+        fixed: Numbers that were not searched; they have a value only.
     """
-    rows = pd.DataFrame(estimate_rows(fit))
-    rows["remark"] = [_remark(estimate) for estimate in fit.estimates]
-    rows["unit"] = [text.replace("*", " ") for text in rows["unit"]]
-    words = {"value": "value", "lower_95": "95 % from", "upper_95": "95 % to"}
+    words = {
+        "value": "value",
+        "deviation": "± standard deviation",
+        "lower_95": "95 % from",
+        "upper_95": "95 % to",
+        "unit": "unit",
+    }
+    words |= {"lower_bound": "lower bound", "upper_bound": "upper bound", "remark": "remark"}
+    deviations = np.sqrt(np.diag(fit.covariance)).tolist()
+    rows = list(map(_row, fit.estimates, fit.unknowns, deviations))
+    rows += [
+        (unit.from_si(value), *[np.nan] * 3, _unit_text(unit), *[np.nan] * 2, FIXED)
+        for _, value, unit in fixed
+    ]
+    names = [*(e.name for e in fit.estimates), *(name for name, *_ in fixed)]
+    columns = zip(words.items(), zip(*rows, strict=True), strict=True)
+    data = xr.Dataset(
+        {
+            name: ("unknown", list(values), Quantity(text).attributes())
+            for (name, text), values in columns
+        },
+        {"unknown": names},
+    )
     if planted is not None:
-        units = {unknown.name: unknown.unit for unknown in fit.problem.unknowns}
-        rows["planted"] = [units[name].from_si(planted[name]) for name in rows["unknown"]]
-    data = rows.set_index("unknown").to_xarray()
-    for name, text in words.items():
-        data[name].attrs = Quantity(text).attributes()
+        units = {unknown.name: unknown.unit for unknown in fit.unknowns}
+        truth = [units[name].from_si(planted[name]) for name in names]
+        data["planted"] = Quantity("planted").variable("unknown", truth)
     return data
 
 
-def correlations_of(fit: Fit) -> xr.Dataset:
+def _row(e: Estimate, unknown: Unknown, deviation: float) -> tuple[float | str, ...]:
+    """Return value, deviation, interval, unit, bounds and remark of an unknown."""
+    values = (e.value if e.determined else np.nan, deviation, e.lower, e.upper)
+    bounds = (unknown.lower, unknown.upper)
+    unit = unknown.unit
+    return (
+        *map(unit.from_si, values),
+        _unit_text(unit),
+        *map(unit.from_si, bounds),
+        _remark(e),
+    )
+
+
+def _unit_text(unit: Unit) -> str:
+    return unit.shown.replace("*", " ")
+
+
+def correlations_of(fit: Assessed) -> xr.Dataset:
     """Return the correlations of the errors of the unknowns."""
     deviation = np.sqrt(np.diag(fit.covariance))
     with np.errstate(invalid="ignore", divide="ignore"):
         correlation = fit.covariance / np.outer(deviation, deviation)
-    names = [unknown.name for unknown in fit.problem.unknowns]
+    names = [unknown.name for unknown in fit.unknowns]
     quantity = Quantity("correlation", decimals=2)
     return xr.Dataset(
         {"correlation": quantity.variable(("unknown", "with"), correlation)},
         {"unknown": names, "with": names},
-    )
-
-
-def _history_plot(least: Numbers, label: str) -> Plot:
-    """Return the least RMSE, in the unit of the label, after each round of the search."""
-    curve = Line(range(1, len(least) + 1), np.maximum(least, 1e-300), symbol="circle", size=5.0)
-    x, y = Axis(label="round of the search"), Axis(label=label, is_log=True)
-    return Plot(
-        Figure(panels=(Panel(marks=(curve,), x=x, y=y),), height=180.0),
-        "Smallest RMSE after each round of the search.",
-        "Smallest RMSE that was found up to the end of each round of the search.",
     )

@@ -9,7 +9,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple, TypeAlias
+from typing import ClassVar, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -91,6 +91,37 @@ class Residuals(NamedTuple):
     smooth: FloatArray
 
 
+@dataclass(frozen=True)
+class Descent:
+    """How finely least squares go down in a problem.
+
+    Attributes:
+        steps: Step sizes of the finite differences, in coordinates. Where a search with one of them
+            stops, it goes on with the next, until none reduces the cost.
+        side: Differences are forward up to this part of the range below the upper bound, backward
+            above, where the step itself is not longer.
+        inside: Distance of a first point from the bounds, as a part of the range.
+        cost, point, gradient: Tolerances by which scipy ends a search.
+    """
+
+    steps: tuple[float, ...]
+    side: float
+    inside: float
+    cost: float
+    point: float
+    gradient: float
+
+
+SMOOTH = Descent((1e-5,), 0.5, 1e-4, 1e-9, 1e-9, 1e-14)
+"""Descent where the residuals are smooth."""
+
+KINKED = Descent((0.1, 0.3, 0.03), 0.0, 1e-6, 1e-3, 1e-4, 1e-6)
+"""Descent where the residuals have kinks, such as amplitudes (largest values). Coarse differences
+of the smooth residuals pass a kink at which fine ones would stop. The steps are in standard
+deviations of the prior; the first one is larger than the noise of amplitudes that comes from
+sampling."""
+
+
 class CostProblem(ABC):
     """Problem of finding the unknowns with the least cost.
 
@@ -100,14 +131,23 @@ class CostProblem(ABC):
     """
 
     unknowns: tuple[Unknown, ...]
+    descent: ClassVar[Descent] = SMOOTH
 
     @abstractmethod
     def evaluated(self, coordinates: FloatArray) -> Residuals:
         """Return the residuals at points (k, p)."""
 
     @abstractmethod
+    def costs_of(self, rows: FloatArray) -> FloatArray:
+        """Return what a search makes small (k,), of `rows` (k, m)."""
+
+    def rows(self, residuals: FloatArray, coordinates: FloatArray) -> FloatArray:  # noqa: ARG002
+        """Return the numbers whose squares count (k, m), of residuals (k, n) at points (k, p)."""
+        return residuals
+
     def costs(self, residuals: FloatArray, coordinates: FloatArray) -> FloatArray:
         """Return what a search makes small (k,), of residuals (k, n) at points (k, p)."""
+        return self.costs_of(self.rows(residuals, coordinates))
 
     def residuals(self, coordinates: FloatArray) -> FloatArray:
         """Return the residuals (k, n) at points (k, p)."""
@@ -196,9 +236,18 @@ class _Restricted(CostProblem):
         full[:, self.free] = coordinates
         return self.whole.evaluated(full)
 
-    def costs(self, residuals: FloatArray, coordinates: FloatArray) -> FloatArray:
-        """Return the costs of the whole problem, with the priors of the free unknowns only."""
-        return self.whole.costs(residuals, coordinates)
+    @property
+    def descent(self) -> Descent:  # type: ignore[override]
+        """Descent of the whole problem."""
+        return self.whole.descent
+
+    def rows(self, residuals: FloatArray, coordinates: FloatArray) -> FloatArray:
+        """Return the rows of the whole problem, with the priors of the free unknowns only."""
+        return self.whole.rows(residuals, coordinates)
+
+    def costs_of(self, rows: FloatArray) -> FloatArray:
+        """Return the costs of the whole problem."""
+        return self.whole.costs_of(rows)
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,13 +262,19 @@ class PriorProblem(CostProblem):
     evaluate: Callable[[FloatArray], Residuals]
     """Points (k, p), in SI -> residuals."""
 
+    descent: ClassVar[Descent] = KINKED
+
     def evaluated(self, coordinates: FloatArray) -> Residuals:
         """Return the residuals of the data at points (k, p)."""
         return self.evaluate(self.points_at(coordinates))
 
-    def costs(self, residuals: FloatArray, coordinates: FloatArray) -> FloatArray:
+    def rows(self, residuals: FloatArray, coordinates: FloatArray) -> FloatArray:
+        """Return residuals, then coordinates: the distances from the expected values."""
+        return np.hstack([residuals, coordinates])
+
+    def costs_of(self, rows: FloatArray) -> FloatArray:
         """Return half the sums of squares (k,)."""
-        costs = 0.5 * (np.sum(residuals**2, axis=1) + np.sum(coordinates**2, axis=1))
+        costs = 0.5 * np.sum(np.square(rows), axis=1)
         return np.where(np.isfinite(costs), costs, np.inf)
 
 
@@ -235,6 +290,8 @@ class Measurement:
         scale: Expected error, by which residuals are divided before tests are put together.
         correlated: Whether errors of neighbouring values are correlated (samples over time), which
             widens the intervals.
+        heteroscedastic: Whether each value has an error of its own size, for example a part of the
+            value. Large values then do not count for more than their errors allow.
     """
 
     name: str
@@ -242,6 +299,7 @@ class Measurement:
     baseline: FloatArray | None = None
     scale: float = 1.0
     correlated: bool = False
+    heteroscedastic: bool = False
 
     @property
     def largest(self) -> float:
@@ -309,9 +367,9 @@ class FitProblem(CostProblem):
         residuals = np.concatenate(parts, axis=1)
         return Residuals(residuals, residuals)
 
-    def costs(self, residuals: FloatArray, coordinates: FloatArray) -> FloatArray:  # noqa: ARG002
+    def costs_of(self, rows: FloatArray) -> FloatArray:
         """Return the root mean square errors (k,)."""
-        return rmse(residuals)
+        return rmse(rows)
 
 
 def point_by_point(model: Callable[[FloatArray], Sequence[FloatArray]]) -> EvaluatePoints:

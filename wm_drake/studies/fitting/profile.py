@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.fitting.problem import FitProblem
-from wm_drake.studies.fitting.search import descended
+from wm_drake.studies.fitting.search import Search, descended
 
 MOST_STEPS = 12
 """Most steps of a search with one unknown held."""
@@ -72,5 +72,5 @@ class Profile:
         problem = self.problem.restricted(others, held)
         if len(others):
             begin = self.point[others]
-            return descended(problem.residuals, begin, most=MOST_STEPS).cost
+            return descended(Search(problem), begin, MOST_STEPS).cost
         return float(np.sqrt(np.mean(np.square(problem.residuals(np.zeros((1, 0)))[0]))))

@@ -1,8 +1,9 @@
 """Shared by all methods of search: count of evaluations, starts, least squares from one point."""
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Generic, TypeAlias, TypeVar
+from typing import Generic, TypeVar
 
 import numpy as np
 from scipy import optimize
@@ -10,7 +11,7 @@ from scipy.stats import qmc
 
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.fitting.fit import SearchLog
-from wm_drake.studies.fitting.problem import CostProblem, FitProblem, Residuals, rmse
+from wm_drake.studies.fitting.problem import FAILED, CostProblem, FitProblem, Residuals, rmse
 
 SAME_END = 1e-3
 """Searches whose costs differ by less than this part have the same end."""
@@ -27,11 +28,15 @@ class Optimum:
         point: Coordinates (p,).
         cost: Cost there.
         evaluations: Points that this search evaluated.
+        note: Remark on how it ended, for the reader.
+        is_end: Whether it came to an end; otherwise no intervals are claimed.
     """
 
     point: FloatArray
     cost: float
     evaluations: int = 0
+    note: str = ""
+    is_end: bool = True
 
 
 def silent(fraction: float, least: float) -> None:
@@ -111,55 +116,97 @@ def agreeing(problem: FitProblem, ends: list[Optimum]) -> int:
     return int(np.sum(errors <= (1.0 + SAME_END) * errors.min() + floor))
 
 
-STEP = 1e-5
-"""Step of one-sided differences during a search, in ranges."""
-
-ResidualFunction: TypeAlias = Callable[[FloatArray], FloatArray]
-"""Points in coordinates (k, p) -> residuals (k, n)."""
+LEAST_GAIN = 0.01
+"""A search ends when no difference step reduces the cost by this fraction."""
 
 
 def descended(
-    evaluate: ResidualFunction,
+    search: Search[AnyProblem],
     begin: FloatArray,
-    step_done: Callable[[float], None] = lambda fraction: None,
     most: int = 60,
+    step_done: Callable[[float], None] = lambda fraction: None,
 ) -> Optimum:
-    """Return where least squares from one point within the unit cube end, with the RMSE as cost.
+    """Return where least squares from one point end.
 
-    The method is scipy's trust-region reflective one.
+    The method is scipy's trust-region reflective one, as finely as the problem's `Descent` says.
 
     Args:
-        evaluate: Residuals of the problem.
-        begin: First point (p,), moved a little into the cube.
-        step_done: Called before every step with the fraction of a usual search.
+        begin: First point (p,), moved a little into the bounds.
         most: Evaluations of the residuals at most, without those of derivatives.
+        step_done: Called before every step with the fraction of a usual search.
     """
-    steps = 0
-    last: tuple[FloatArray, FloatArray] = (np.full(len(begin), np.nan), np.empty(0))
+    before, problem, descent = search.evaluations, search.problem, search.problem.descent
+    margin = descent.inside * (problem.upper - problem.lower)
+    point, cost, remaining, failed = begin, np.inf, most, 0
+    for step in itertools.cycle(descent.steps):
+        point = np.clip(point, problem.lower + margin, problem.upper - margin)
+        end = _gauss_newton(search, point, step, remaining, step_done)
+        failed = failed + 1 if end.cost > (1.0 - LEAST_GAIN) * cost else 0
+        point, cost, remaining = end.x, float(end.cost), remaining - end.nfev
+        if remaining <= 0 or failed == len(descent.steps) or len(descent.steps) == 1:
+            break
+    least = float(problem.costs_of(end.fun[None])[0])
+    return Optimum(point, least, search.evaluations - before)
 
-    def residuals(z: FloatArray) -> FloatArray:
+
+def _gauss_newton(
+    search: Search[AnyProblem],
+    begin: FloatArray,
+    step: float,
+    most: int,
+    step_done: Callable[[float], None],
+) -> optimize.OptimizeResult:
+    """Search with one size of the difference steps, until none of scipy's tolerances is missed."""
+    problem, descent = search.problem, search.problem.descent
+    steps = 0
+    last: tuple[FloatArray, Residuals] = (np.full(len(begin), np.nan), NO_RESIDUALS)
+
+    def evaluated(point: FloatArray) -> Residuals:
         nonlocal last
-        last = (z.copy(), np.asarray(evaluate(z[None])[0]))
+        if not np.array_equal(point, last[0]):
+            last = (point.copy(), search.evaluated(point[None]))
         return last[1]
 
-    def jacobian(z: FloatArray) -> FloatArray:
+    def rows(point: FloatArray) -> FloatArray:
+        values = problem.rows(evaluated(point).exact, point[None])[0]
+        # without residuals, a large value makes the trust region reject and shorten the step
+        return np.where(np.isfinite(values), values, FAILED)
+
+    def slopes(point: FloatArray) -> FloatArray:
         nonlocal steps
         steps += 1
         step_done(min(1.0, steps / 25))
-        here = last[1] if np.array_equal(z, last[0]) else evaluate(z[None])[0]
-        sign = np.where(z > 0.5, -1.0, 1.0)
-        moved = evaluate(z + np.diag(STEP * sign))
-        return np.asarray(((moved - here) / (STEP * sign)[:, None]).T)
+        return smooth_slopes(search, point, evaluated(point).smooth, step)
 
-    end = optimize.least_squares(
-        residuals,
-        np.clip(begin, 1e-4, 1.0 - 1e-4),
-        jacobian,
-        bounds=(0.0, 1.0),
+    return optimize.least_squares(
+        rows,
+        begin,
+        slopes,
+        bounds=(problem.lower, problem.upper),
         x_scale=1.0,
-        ftol=1e-9,
-        xtol=1e-9,
-        gtol=1e-14,
+        ftol=descent.cost,
+        xtol=descent.point,
+        gtol=descent.gradient,
         max_nfev=most,
     )
-    return Optimum(end.x, float(rmse(end.fun)))
+
+
+NO_RESIDUALS = Residuals(np.empty((1, 0)), np.empty((1, 0)))
+
+
+def smooth_slopes(
+    search: Search[AnyProblem], point: FloatArray, here: FloatArray, step: float
+) -> FloatArray:
+    """Return the derivatives (m, p) of the rows of smooth residuals; 0 where one is NaN.
+
+    Args:
+        point: In coordinates (p,).
+        here: Smooth residuals there (1, n).
+        step: Size of the difference steps, in coordinates.
+    """
+    problem = search.problem
+    ahead = np.maximum(step, problem.descent.side * (problem.upper - problem.lower))
+    steps = np.where(point + ahead <= problem.upper, step, -step)
+    moved = point + np.diag(steps)
+    rows = problem.rows(search.evaluated(moved).smooth, moved)
+    return np.nan_to_num(((rows - problem.rows(here, point[None])) / steps[:, None]).T)

@@ -13,10 +13,8 @@ import numpy as np
 from scipy import optimize
 
 from wm_drake.parameters.types import FloatArray
-from wm_drake.studies.fitting.assessment import assess
-from wm_drake.studies.fitting.fit import Fit
 from wm_drake.studies.fitting.problem import FitProblem, Progress
-from wm_drake.studies.fitting.search import Search, scattered, silent, underway
+from wm_drake.studies.fitting.search import Optimum, Search, scattered, silent, underway
 
 WIDEST = 0.5
 """Longest half axis of a region, in ranges; all half axes of the first region."""
@@ -39,13 +37,13 @@ SLENDEREST = 1e3
 
 
 def response_surface(
-    problem: FitProblem,
+    search: Search[FitProblem],
     *,
     seed: int = 0,
     screened: int = 32,
     rounds: int = 80,
     progress: Progress = silent,
-) -> Fit:
+) -> Optimum:
     """Search by iterated response surfaces.
 
     In each round the model is evaluated at designed points of a region, a quadratic surface is
@@ -59,8 +57,7 @@ def response_surface(
         rounds: Rounds at most.
         progress: Called after every round.
     """
-    search = Search(problem)
-    design = surface_design(len(problem.unknowns))
+    design = surface_design(len(search.problem.unknowns))
     region = _first_region(search, seed, screened)
     done, ended = 0, False
     while done < rounds and not ended:
@@ -68,14 +65,8 @@ def response_surface(
         region, ended = _round(search, region, design)
         search.round_done()
         progress(underway(done, USUAL_ROUNDS), search.least)
-    progress(1.0, search.least)
     note = f"{done} rounds, last region {2.0 * region.longest:.2g} of the ranges"
-    fit = assess(problem, region.centre, search.log("response-surface", seed, note))
-    if ended:
-        return fit
-    return fit.without_intervals(
-        "the search had not come to an end: no optimum, and no intervals are claimed"
-    )
+    return Optimum(region.centre, float(np.sqrt(region.value)), search.evaluations, note, ended)
 
 
 @dataclass(frozen=True, eq=False)

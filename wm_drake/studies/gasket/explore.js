@@ -1,14 +1,15 @@
 "use strict";
-/* Explores the fitted models of a gasket study: profiler, interactions, contours, best setting.
+/* Explores the fitted models of a gasket study: profiler, interactions, contours.
 
    The model is that of studies/gasket/surface.py: sum-coded parabolas of each factor and their
    products, at places from -1 to 1 of the factors. */
 const Explore = (() => {
   const box = document.getElementById("explore");
   const data = JSON.parse(document.getElementById("models").textContent);
-  const SVG = "http://www.w3.org/2000/svg", STEPS = 24, MOST_GRID = 20000, HUES = ["#0072b2", "#6b7280", "#b34700"];
+  const SVG = "http://www.w3.org/2000/svg", STEPS = 24, HUES = ["#0072b2", "#6b7280", "#b34700"];
   const { factors, responses, loads } = data;
-  const state = { places: factors.map(() => 0), load: loads[0], response: responses[0].name, x: 0, y: Math.min(1, factors.length - 1) };
+  const middle = factors.map(() => 0);
+  const state = { places: data.proposed ? data.proposed.slice() : middle.slice(), load: loads[0], response: responses[0].name, x: 0, y: Math.min(1, factors.length - 1) };
   const unpacked = new Map();
 
   function numbers(packed) {
@@ -59,7 +60,6 @@ const Explore = (() => {
     return Math.min(1, Math.max(-1, place));
   }
   const short = Pictures.short;
-  const shownValue = (factor, k) => [short(valueAt(factor, state.places[k])), factor.unit].filter(Boolean).join(" ");
 
   // ---- elements --------------------------------------------------------------------------------
   function make(tag, attributes = {}, ...children) {
@@ -119,6 +119,11 @@ const Explore = (() => {
 
   function move(k, place) {
     state.places[k] = place;
+    update();
+  }
+
+  function set(places) {
+    state.places = places.slice();
     update();
   }
 
@@ -236,122 +241,6 @@ const Explore = (() => {
     }, { displaylogo: false, displayModeBar: false, responsive: false });
   }
 
-  // ---- best setting ------------------------------------------------------------------------------
-  const GOALS = [["", "ignore"], ["smallest", "as small as possible"], ["largest", "as large as possible"], ["most", "at most"], ["least", "at least"]];
-
-  function goals() {
-    const body = box.querySelector(".goals tbody");
-    for (const response of responses) {
-      const select = make("select", { "aria-label": `goal of ${response.name}` }, ...GOALS.map(([value, text]) => make("option", { value }, text)));
-      const limit = make("input", { type: "number", step: "any", "aria-label": `limit of ${response.name}, ${response.unit}`, disabled: "" });
-      select.addEventListener("change", () => {
-        limit.disabled = !["most", "least"].includes(select.value);
-        if (!limit.disabled && limit.value === "") limit.value = Number((0.5 * (response.low + response.high)).toPrecision(3));
-      });
-      body.append(make("tr", { "data-response": response.name }, make("th", { scope: "row" }, response.title), make("td", {}, select), make("td", { class: "number" }, limit, ` ${response.unit}`), make("td", { class: "number result" })));
-    }
-    box.querySelector(".find").addEventListener("click", () => find());
-  }
-
-  function wanted() {
-    return [...box.querySelectorAll(".goals tbody tr")].map(line => ({
-      name: line.dataset.response, kind: line.querySelector("select").value, limit: Number(line.querySelector("input").value),
-      response: responses.find(r => r.name === line.dataset.response),
-    })).filter(goal => goal.kind);
-  }
-
-  /* The value over all loads that is worst for a goal. */
-  function worst(goal, of) {
-    const values = loads.map(load => fitted(load, goal.name, of));
-    return ["smallest", "most"].includes(goal.kind) ? Math.max(...values) : Math.min(...values);
-  }
-
-  /* Overall desirability (Derringer and Suich): geometric mean over the goals, from 0 at the worst
-     to 1 at the best value that any run had; less than 0 by how far limits are exceeded. */
-  function desirability(all, places) {
-    const of = row(places);
-    let log = 0, count = 0, excess = 0;
-    for (const goal of all) {
-      const value = worst(goal, of), { low, high } = goal.response, span = high - low || 1;
-      if (goal.kind === "most") excess += Math.max(0, value - goal.limit) / span;
-      else if (goal.kind === "least") excess += Math.max(0, goal.limit - value) / span;
-      else {
-        const part = goal.kind === "smallest" ? (high - value) / span : (value - low) / span;
-        log += Math.log(Math.min(1, Math.max(1e-6, part)));
-        count++;
-      }
-    }
-    if (excess > 1e-12) return -excess;
-    return count ? Math.exp(log / count) : 1;
-  }
-
-  function starts() {
-    const found = [], count = 3 ** factors.length;
-    const total = Math.min(count, MOST_GRID), stride = count / total;
-    for (let k = 0; k < total; k++) {
-      let code = Math.floor(k * stride);
-      found.push(factors.map(() => { const level = code % 3 - 1; code = Math.floor(code / 3); return level; }));
-    }
-    return found;
-  }
-
-  /* The best setting: all level combinations, then moves from the best few. */
-  function best(all) {
-    const ranked = starts().map(places => ({ places, value: desirability(all, places) }));
-    ranked.sort((a, b) => b.value - a.value);
-    let top = ranked[0];
-    for (const start of ranked.slice(0, 4)) {
-      const found = climbed(all, start);
-      if (found.value > top.value) top = found;
-    }
-    return top;
-  }
-
-  /* Numbers from -1 to 1 that look random and are the same each time (mulberry32). */
-  function spread(seed) {
-    let at = seed;
-    return () => {
-      at = (at + 0x6d2b79f5) | 0;
-      let word = Math.imul(at ^ (at >>> 15), 1 | at);
-      word = (word + Math.imul(word ^ (word >>> 7), 61 | word)) ^ word;
-      return ((word ^ (word >>> 14)) >>> 0) / 2147483648 - 1;
-    };
-  }
-
-  /* Moves along single factors, and in many directions, which follows limits, while they help. */
-  function climbed(all, { places, value }) {
-    const next = spread(1), axes = places.flatMap((_, k) => [-1, 1].map(sign => places.map((__, j) => (j === k ? sign : 0))));
-    const directions = [...axes, ...Array.from({ length: 20 * places.length }, () => places.map(next))];
-    const tried = (direction, step) => {
-      const moved = places.map((place, k) => Math.min(1, Math.max(-1, place + step * direction[k])));
-      const found = desirability(all, moved);
-      if (found <= value + 1e-9) return false;
-      [places, value] = [moved, found];
-      return true;
-    };
-    for (let step = 0.5; step > 0.004; step /= 2)
-      for (let round = 0; round < 20; round++)
-        if (!directions.filter(direction => tried(direction, step)).length) break;
-    return { places, value };
-  }
-
-  function find() {
-    const all = wanted(), said = box.querySelector(".found");
-    if (!all.length) { said.textContent = "Choose a goal for at least one response."; return null; }
-    const found = best(all);
-    state.places = found.places.map(place => Number(place.toFixed(4)));
-    update();
-    const of = row(state.places);
-    for (const line of box.querySelectorAll(".goals tbody tr")) {
-      const goal = all.find(one => one.name === line.dataset.response);
-      line.querySelector(".result").textContent = goal ? loads.map(load => `${load}: ${short(fitted(load, goal.name, of))} \u00b1 ${short(Number(halfWidth(load, goal.name, leverage(load, of)).toPrecision(2)))}`).join("; ") : "";
-    }
-    said.textContent = found.value < 0
-      ? "No setting in the range meets all limits; this one comes nearest. The sliders above show it."
-      : `Desirability ${found.value.toFixed(3)} of 1. The sliders above show the setting: ${factors.map((f, k) => `${f.name} ${shownValue(f, k)}`).join(", ")}. Check it with a run: add the option below to the command and repeat it.`;
-    return found;
-  }
-
   // ---- all together --------------------------------------------------------------------------------
   let waiting = 0;
   function update() {
@@ -364,7 +253,8 @@ const Explore = (() => {
     const names = responses.map(r => [r.name, `${r.title}, ${r.unit}`]), own = factors.map((f, k) => [String(k), f.title]);
     box.querySelector(".choose-load").append(
       choice("Load", loads.map(load => [load, load]), state.load, value => { state.load = value; update(); matrix(); }),
-      make("button", { type: "button", onclick: () => { state.places = factors.map(() => 0); update(); } }, "all factors to the middle"));
+      make("button", { type: "button", onclick: () => set(middle) }, "all factors to the middle"),
+      ...(data.proposed ? [make("button", { type: "button", onclick: () => set(data.proposed) }, "proposed setting")] : []));
     const response = () => choice("Response", names, state.response, value => {
       state.response = value;
       box.querySelectorAll("select.response-choice").forEach(select => { select.value = value; });
@@ -381,7 +271,6 @@ const Explore = (() => {
   }
 
   profiler();
-  goals();
   controls();
   updateProfiler();
   matrix();
@@ -390,7 +279,7 @@ const Explore = (() => {
   addEventListener("resize", () => { clearTimeout(waiting); waiting = setTimeout(contour, 150); });
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", again);
   return {
-    predict, find, move, state, desirability, best,
+    predict, move, state,
     halfWidth: (load, name, places) => halfWidth(load, name, leverage(load, row(places))),
   };
 })();

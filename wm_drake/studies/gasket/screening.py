@@ -1,30 +1,46 @@
 """Screening: run a design and divide the variance of each response among factors and interactions.
 
-It is independent of machines: the function `evaluate` returns the responses of the trials. `Words`
-has the words for factors and responses.
+It is independent of machines: the function `evaluate` returns the responses of the trials, as
+`runs_of` makes them. Everything is one labelled dataset, a screening. With `load` and `response`:
+
+- of each `trial`: `value`, and `fitted` and `residual` of the model; NaN where the run failed;
+- of the response: `mean`, `smallest`, `largest`, standard `deviation`; the shares `main`,
+  `interaction` and `unexplained` of its variance; `residual_df`, `residual_deviation`,
+  `adjusted_r2`, `predicted_r2`;
+- of each `term`: `share` of the variance, `sum_sq_share` (type III, of the total), `df`, `f`, `p`;
+- `effect` of each term at the `level` of its first factor, and `other_level`, "" for a main effect.
+
+Over `load` and `trial` there are `failed`, the reason of a failed run, `overlap`, the gap of a run
+in which the tub touches the housing, and `slack`, names of springs that go slack. Over `response`
+there are `kind`, `about` and `better`. The attribute `design` has the `Design`.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from itertools import product
-from typing import Literal, TypeAlias
+import itertools
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 
 from wm_drake.errors import input_error
-from wm_drake.parameters import FactorLevels, PublishedResults, PublishedTerm
-from wm_drake.parameters.published import CONSTANT, INTERACTIONS, MAIN, OF_RESPONSE, RANGE
-from wm_drake.report.formatting import significant
-from wm_drake.studies.doe.anova import AnovaTable, Combination, Term, anova
+from wm_drake.parameters import PublishedResults, PublishedTerm
+from wm_drake.parameters.published import CONSTANT, INTERACTIONS, MAIN, RANGE
+from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import Share, Unit
+from wm_drake.report.formatting import number, three_digits
+from wm_drake.report.quantity import Quantity
+from wm_drake.simulation.measures.kind import Better
+from wm_drake.studies.doe.anova import AnovaTable, Term, anova
 from wm_drake.studies.doe.coding import LEVELS, efficiency
 from wm_drake.studies.doe.design import Design
 
-LEADING_MAIN_PERCENT = 10.0
-"""Contribution above which a main effect is a leading term ([B] Table 5). [%]"""
+LEADING_MAIN = 0.1
+"""Contribution above which a main effect is a leading term ([B] Table 5)."""
 
-LEADING_INTERACTION_PERCENT = 5.0
-"""Contribution above which an interaction is a leading term ([B] Table 5). [%]"""
+LEADING_INTERACTION = 0.05
+"""Contribution above which an interaction is a leading term ([B] Table 5)."""
 
 FEW_TRIALS = 1.5
 """Trials per coefficient below which a design cannot tell how well its model predicts.
@@ -36,98 +52,73 @@ fresh trials at 150 trials, twice at 200, and a tenth more at 1000.
 LEAST_PREDICTED_R2 = 0.9
 """Predicted R2 below which the model of a response is called poor."""
 
+FAR = 0.3
+"""Difference above which a result is named beside the published one: of a mean, as a share of it;
+of a contribution."""
+
 Label: TypeAlias = tuple[str, str]
 """Name of a load and name of a response."""
 
 
-Improvement: TypeAlias = Literal["smaller", "larger", ""]
-"""Which change of a response is an improvement; "" if neither is."""
+def r2_text(r2: float) -> str:
+    """Return an R2 with three decimals; "below 0" if it is negative, a dash if it is NaN."""
+    return "below 0" if r2 < 0.0 else number(r2, 3)
 
 
-@dataclass(frozen=True)
-class Meaning:
-    """Meaning of a response, for reading.
+VALUE = Quantity("run", form=three_digits)
+MEAN = Quantity("mean", form=three_digits)
+SHARE = Quantity("contribution", Share(), 1)
+PREDICTED_R2 = Quantity("predicted R²", form=r2_text)
+ADJUSTED_R2 = Quantity("adjusted R²", form=r2_text)
+OVERLAP = Quantity("gap", Unit("m", "mm"), form=three_digits)
+EFFECT = Quantity("effect", form=three_digits)
+COUNT = Quantity("degrees of freedom", decimals=0)
 
-    Attributes:
-        title: Name in words, without the symbol.
-        about: What is measured of a run, as part of a sentence.
-        kind: Quantity, such as displacement; responses of one kind share a unit and a figure.
-        goal: Which change is an improvement.
+OTHER_LEVELS = ("", *map(str, LEVELS))
+"""Labels of the level of the second factor of a term; "" if it has none."""
+
+
+def runs_of(
+    values: Mapping[str, Mapping[str, Any]],
+    quantities: Mapping[str, Quantity],
+    better: Mapping[str, Better] | None = None,
+    kinds: Mapping[str, str] | None = None,
+) -> xr.Dataset:
+    """Return the responses of trials, without failed runs, contact and slack springs.
+
+    Args:
+        values: By load and response: one number for each trial, NaN where the run failed. [SI]
+        quantities: Quantity of each response, with its words.
+        better: Which change of a response is an improvement; "smaller" without.
+        kinds: Kind of each response, such as displacement; its name without.
     """
-
-    title: str
-    about: str = ""
-    kind: str = ""
-    goal: Improvement = "smaller"
-
-
-@dataclass(frozen=True)
-class Responses:
-    """Responses of the trials of a design.
-
-    Attributes:
-        values: By load: one row per trial, one column per response; NaN where a run failed.
-        units: Unit of each response, by its name.
-        failed: Reason of each failed run, by index of the trial (from 0) and load.
-        meanings: Words for each response, by its name; a response may have none.
-        touching: Smallest gap of each run in which the tub touches the housing, by index of the
-            trial (from 0) and load. [mm] At most 0.
-        slack: Names of the springs that go slack in a run, by index of the trial (from 0) and load.
-    """
-
-    values: dict[str, pd.DataFrame]
-    units: dict[str, str]
-    failed: dict[tuple[int, str], str]
-    meanings: dict[str, Meaning] = field(default_factory=dict)
-    touching: dict[tuple[int, str], float] = field(default_factory=dict)
-    slack: dict[tuple[int, str], list[str]] = field(default_factory=dict)
+    names = list(quantities)
+    array = np.array([[of_load[name] for name in names] for of_load in values.values()], float)
+    data = xr.Dataset(
+        {
+            "value": VALUE.of_each(
+                "response", quantities, ("load", "trial", "response"), np.moveaxis(array, 1, 2)
+            )
+        },
+        {"load": list(values), "trial": np.arange(array.shape[2]) + 1, "response": names},
+    )
+    size = (len(values), array.shape[2])
+    texts = np.full(size, "", dtype=object)
+    return data.assign(
+        failed=(("load", "trial"), texts),
+        slack=(("load", "trial"), texts.copy()),
+        overlap=OVERLAP.variable(("load", "trial"), np.full(size, np.nan)),
+        better=("response", [(better or {}).get(name, "smaller") for name in names]),
+        kind=("response", [(kinds or {}).get(name, name) for name in names]),
+        about=("response", ["" for _ in names]),
+    )
 
 
-EvaluateFactors: TypeAlias = Callable[[Design], Responses]
+EvaluateFactors: TypeAlias = Callable[[Design], xr.Dataset]
+"""Function that returns the responses of the trials of a design, as of `runs_of`."""
 
 
-@dataclass(frozen=True)
-class Screening:
-    """A design with its responses and their analysis of variance.
-
-    Attributes:
-        tables: Analysis of variance by label, without the trials whose run with this load failed.
-    """
-
-    design: Design
-    responses: Responses
-    tables: dict[Label, AnovaTable]
-
-    @property
-    def loads(self) -> list[str]:
-        """Names of the loads, in the order of the runs."""
-        return list(self.responses.values)
-
-    @property
-    def names(self) -> list[str]:
-        """Names of the responses."""
-        return list(self.responses.units)
-
-    @property
-    def is_complete(self) -> bool:
-        """Whether the design has all level combinations, so that nothing is left to predict."""
-        return self.design.trials == self.design.combinations
-
-    @property
-    def has_few_trials(self) -> bool:
-        """Whether the trials are too few to judge the model."""
-        enough = FEW_TRIALS * (self.design.trials - self.design.residual_df)
-        return self.design.trials < enough and not self.is_complete
-
-    def poor(self) -> dict[Label, float]:
-        """Return the responses that the model predicts poorly, with their predicted R2."""
-        if self.is_complete:
-            return {}
-        predicted = {label: table.predicted_r2 for label, table in self.tables.items()}
-        return {label: r2 for label, r2 in predicted.items() if r2 < LEAST_PREDICTED_R2}
-
-
-def run_screening(design: Design, evaluate: EvaluateFactors) -> Screening:
+def run_screening(design: Design, evaluate: EvaluateFactors) -> xr.Dataset:
     """Run a design and analyse its responses.
 
     Raises:
@@ -144,262 +135,279 @@ def check_degrees_of_freedom(design: Design) -> None:
     The model then meets all trials exactly, whatever they are, and nothing shows how wrong it is.
     The full factorial is allowed: it has no other trials.
     """
-    if design.residual_df < 1 and design.trials < design.combinations:
+    if design.residual_df < 1 and not design.is_complete:
         raise input_error(
-            f"{design.trials} trials for {design.trials - design.residual_df} coefficients of "
-            f"{design.model} leave no degree of freedom, so nothing shows how well the model fits; "
-            "add trials, or use the model main",
+            f"{design.trials} trials for {design.coefficients} coefficients of {design.model} "
+            "leave no degree of freedom, so nothing shows how well the model fits; add trials, or "
+            "use the model main",
             key="trials",
         )
 
 
-def analyse(design: Design, responses: Responses) -> Screening:
-    """Analyse the variance of the responses of a design.
+def analyse(design: Design, runs: xr.Dataset) -> xr.Dataset:
+    """Return the screening of a design: the runs with the analysis of their variance.
+
+    The trials whose run with a load failed are left out for this load.
 
     Raises:
         InputError: so many runs failed that the others do not determine the effects.
     """
     levels = pd.DataFrame(design.levels, columns=list(design.factors))
-    tables: dict[Label, AnovaTable] = {}
-    for load, values in responses.values.items():
-        good = np.isfinite(values.to_numpy()).all(axis=1)
+    names, tables, trials = runs.response.values.tolist(), [], []
+    for load in runs["load"].values.tolist():
+        values = runs.value.sel(load=load)
+        good = good_trials(values)
         if not good.all() and efficiency(design.levels[good], design.model) == 0.0:
             raise input_error(
                 f"{np.sum(~good)} of {len(good)} runs failed; the others do not determine the "
                 f"effects of {design.model}",
                 where=f"load {load}",
             )
-        by_response = anova(levels[good], values[good], interactions=design.model != "main")
-        tables |= {(load, name): table for name, table in by_response.items()}
-    return Screening(design, responses, tables)
+        frame = pd.DataFrame(values.values[good], columns=names)
+        by_response = anova(levels[good], frame, interactions=design.model != "main")
+        tables.append([by_response[name] for name in names])
+        trials.append(good)
+    screening = runs.assign(_of_runs(runs.value) | _of_tables(tables, runs.value.attrs["each"]))
+    for name in ("fitted", "residual"):
+        array = np.full(runs.value.shape, np.nan)
+        for of_load, good, rows in zip(tables, trials, array, strict=True):
+            rows[good] = np.column_stack([getattr(table, name) for table in of_load])
+        screening[name] = runs.value.copy(data=array)
+    terms = [term.name for term in tables[0][0].terms]
+    labels = {"term": terms, "level": list(LEVELS), "other_level": list(OTHER_LEVELS)}
+    return screening.assign_coords(labels).assign_attrs(design=design)
 
 
-def leading_terms(table: AnovaTable) -> list[Term]:
-    """Return the terms above the thresholds of [B] Table 5, largest first."""
-    least = {1: LEADING_MAIN_PERCENT, 2: LEADING_INTERACTION_PERCENT}
-    leading = [term for term in table.terms if term.percent > least[len(term.factors)]]
-    return sorted(leading, key=lambda term: -term.percent)
+def good_trials(values: xr.DataArray) -> np.ndarray:
+    """Return which trials of a load have all responses. (trials,)
+
+    Args:
+        values: Over `trial` and `response`.
+    """
+    return np.asarray(np.isfinite(values.values).all(axis=1))
 
 
-def main_effects(table: AnovaTable) -> list[Term]:
-    """Return the main effects, largest first."""
-    return sorted(
-        (term for term in table.terms if len(term.factors) == 1), key=lambda term: -term.percent
-    )
+def _of_runs(values: xr.DataArray) -> dict[str, xr.DataArray]:
+    """Return smallest and largest value and standard deviation of each response."""
+    numbers = {
+        "smallest": values.min("trial", keep_attrs=True),
+        "largest": values.max("trial", keep_attrs=True),
+        "deviation": values.std("trial", ddof=1, keep_attrs=True),
+    }
+    for name, array in numbers.items():
+        words = "standard deviation" if name == "deviation" else name
+        array.attrs |= VALUE.named(words).attributes()
+    return numbers
 
 
-def contributions(screening: Screening) -> pd.DataFrame:
-    """Return the contributions of the terms: one row per term, one column per label. [%]"""
-    return pd.DataFrame({label: table.percents() for label, table in screening.tables.items()})
+def _of_tables(
+    tables: Sequence[Sequence[AnovaTable]], each: Mapping[str, Quantity]
+) -> dict[str, xr.Variable]:
+    """Return the variables of analyses of variance.
+
+    Args:
+        tables: By load and response.
+        each: Quantities of the responses.
+    """
+
+    def of(
+        quantity: Quantity, pick: Callable[[AnovaTable], Any], *dims: str, is_response: bool = False
+    ) -> xr.Variable:
+        values = np.array([[pick(table) for table in of_load] for of_load in tables], dtype=float)
+        named = ("load", "response", *dims)
+        if is_response:
+            return quantity.of_each("response", each, named, values)
+        return quantity.variable(named, values)
+
+    def of_terms(quantity: Quantity, pick: Callable[[AnovaTable, Term], float]) -> xr.Variable:
+        return of(quantity, lambda table: [pick(table, term) for term in table.terms], "term")
+
+    return {
+        "mean": of(MEAN, lambda t: t.constant, is_response=True),
+        "main": of(SHARE.named("main effects"), lambda t: t.main),
+        "interaction": of(SHARE.named("interactions"), lambda t: t.interaction),
+        "unexplained": of(SHARE.named("residual"), lambda t: t.unexplained),
+        "residual_deviation": of(
+            MEAN.named("residual standard deviation"), _residual_deviation, is_response=True
+        ),
+        "residual_df": of(COUNT, lambda t: t.residual_df),
+        "adjusted_r2": of(ADJUSTED_R2, lambda t: t.adjusted_r2),
+        "predicted_r2": of(PREDICTED_R2, lambda t: t.predicted_r2),
+        "share": of_terms(SHARE, lambda _, term: term.share),
+        "sum_sq_share": of_terms(
+            SHARE.named("sum of squares"), lambda t, term: term.sum_sq / (t.total_sum_sq or np.nan)
+        ),
+        "df": of_terms(COUNT, lambda _, term: term.df),
+        "f": of_terms(Quantity("F"), lambda _, term: term.f),
+        "p": of_terms(Quantity("p"), lambda _, term: term.p),
+        "effect": of(EFFECT, _effects, "term", "level", "other_level", is_response=True),
+    }
 
 
-def mean_at(
-    screening: Screening, label: Label, factors: Sequence[str]
-) -> dict[tuple[int, ...], float]:
-    """Return the mean response at each level combination of one or two factors.
+def _residual_deviation(table: AnovaTable) -> float:
+    return math.sqrt(table.residual_sum_sq / table.residual_df) if table.residual_df else math.nan
 
-    The mean is that of the fitted model over all levels of the other factors.
+
+def _effects(table: AnovaTable) -> FloatArray:
+    """Return the effects of all terms. (terms, levels, other levels) NaN where a term has none."""
+    effects = np.full((len(table.terms), len(LEVELS), len(OTHER_LEVELS)), np.nan)
+    for number_of_term, term in enumerate(table.terms):
+        for (first, *second), effect in term.effects.items():
+            place = OTHER_LEVELS.index(str(second[0]) if second else "")
+            effects[number_of_term, LEVELS.index(first), place] = effect
+    return effects
+
+
+Labelled = TypeVar("Labelled", xr.Dataset, xr.DataArray)
+
+
+def labels_of(data: Labelled) -> list[Label]:
+    """Return all loads and responses of a screening, or of numbers beside it."""
+    return list(itertools.product(data["load"].values.tolist(), data["response"].values.tolist()))
+
+
+def at(data: Labelled, label: Label) -> Labelled:
+    """Return the part of a screening, or of numbers beside it, of a load and response."""
+    return data.sel(load=label[0], response=label[1])
+
+
+def has_few_trials(design: Design) -> bool:
+    """Return whether a design has too few trials to judge its model."""
+    return design.trials < FEW_TRIALS * design.coefficients and not design.is_complete
+
+
+def poor(screening: xr.Dataset) -> dict[Label, float]:
+    """Return the responses that the model predicts poorly, with their predicted R2."""
+    if screening.design.is_complete:
+        return {}
+    known = {label: at(screening.predicted_r2, label).item() for label in labels_of(screening)}
+    return {label: value for label, value in known.items() if value < LEAST_PREDICTED_R2}
+
+
+def is_main(terms: xr.DataArray) -> np.ndarray:
+    """Return whether terms are main effects."""
+    return np.array([":" not in name for name in terms.values.tolist()], dtype=bool)
+
+
+def mains(of_label: xr.Dataset) -> xr.Dataset:
+    """Return the main effects of a response, largest first.
+
+    Args:
+        of_label: As of `at`.
+    """
+    main = of_label.isel(term=is_main(of_label.term))
+    return main.isel(term=np.argsort(-main.share.values, kind="stable"))
+
+
+def leading(of_label: xr.Dataset) -> list[str]:
+    """Return the terms of a response above the thresholds of [B] Table 5, largest first."""
+    least = np.where(is_main(of_label.term), LEADING_MAIN, LEADING_INTERACTION)
+    kept = of_label.share.isel(term=of_label.share.values > least)
+    return [str(name) for name in kept.term.values[np.argsort(-kept.values, kind="stable")]]
+
+
+def mean_at(of_label: xr.Dataset, first: str, second: str = "") -> FloatArray:
+    """Return the mean of a response at the levels of one or two factors, over all others.
 
     Returns:
-        Mean response by level combination, in the order of `factors`. [unit of the response]
+        (3,) or (3, 3), the first factor first. [SI]
     """
-    table = screening.tables[label]
-    order = [name for name in screening.design.factors if name in factors]
-    parts = {
-        term.factors: term.effects for term in table.terms if set(term.factors) <= set(factors)
-    }
-    combinations = np.indices((3,) * len(order)).reshape(len(order), -1).T - 1
-    means = {}
-    for combination in combinations:
-        level = dict(zip(order, map(int, combination), strict=True))
-        deviation = sum(
-            effects[tuple(level[name] for name in names)] for names, effects in parts.items()
-        )
-        means[tuple(level[name] for name in factors)] = table.constant + deviation
-    return means
+    main = of_label.effect.sel(other_level="")
+    mean = of_label["mean"].item() + main.sel(term=first).values
+    if not second:
+        return np.asarray(mean)
+    names = of_label.term.values.tolist()
+    both = np.add.outer(mean, main.sel(term=second).values)
+    for term, is_turned in ((f"{first}:{second}", False), (f"{second}:{first}", True)):
+        if term in names:
+            pair = of_label.effect.sel(term=term).values[:, 1:]
+            both = both + (pair.T if is_turned else pair)
+    return np.asarray(both)
 
 
-class Words:
-    """Names, physical values and units for reading."""
+def published_for(results: PublishedResults, screening: xr.Dataset, source: str = "") -> xr.Dataset:
+    """Return the published numbers that belong to a screening; no variables if there are none.
 
-    def __init__(self, factors: Sequence[FactorLevels], meanings: Mapping[str, Meaning]) -> None:
-        """Store the words."""
-        self._factors = {factor.name: factor for factor in factors}
-        self._meanings = meanings
-
-    def factor(self, name: str) -> str:
-        """Return a factor for reading, such as `linear damping C_L`."""
-        about = self._factors[name].about if name in self._factors else ""
-        return f"{about.split(',')[0]} {name}" if about else name
-
-    def term(self, name: str) -> str:
-        """Return a term for reading: its factors, joined by a multiplication sign."""
-        return " × ".join(map(self.factor, name.split(":")))
-
-    def unit(self, factor: str) -> str:
-        """Return the unit of a factor's levels; "" if it has none."""
-        return next(iter(self._factors[factor].units.values()), "")
-
-    def number(self, factor: str, level: int) -> str:
-        """Return the physical value of a level, without unit."""
-        numbers = next(iter(self._factors[factor].numbers.values()))
-        return significant(numbers[level + 1])
-
-    def value(self, factor: str, level: int) -> str:
-        """Return the physical value of a level with its unit."""
-        return f"{self.number(factor, level)} {self.unit(factor)}".strip()
-
-    def span(self, factor: str) -> str:
-        """Return the lowest and the highest value of a factor with the unit."""
-        return f"{self.number(factor, -1)} to {self.value(factor, 1)}"
-
-    def axis(self, factor: str) -> str:
-        """Return the label of an axis of a factor: name, symbol, unit."""
-        return ", ".join(filter(None, (self.factor(factor), self.unit(factor))))
-
-    def meaning(self, response: str) -> Meaning:
-        """Return the meaning of a response; one without words has its name as title and kind."""
-        return self._meanings.get(response) or Meaning(response, kind=response, goal="")
-
-    def response(self, name: str) -> str:
-        """Return a response for reading, such as `displacement x (Dx)`."""
-        title = self.meaning(name).title
-        is_in_name = title.replace(" ", "_") == name or name in title.split()
-        return title if is_in_name else f"{title} ({name})"
-
-
-FAR = 30.0
-"""Difference above which a result is named in the summary: of a mean, in percent of the published
-one; of a contribution, in points of percent."""
-
-
-@dataclass(frozen=True)
-class Published:
-    """Published numbers that belong to a screening.
-
-    Attributes:
-        terms: Terms by label, as in `PublishedResults`. Empty if nothing is compared.
-        source: Where they are from, for reading.
+    Returns:
+        `mean`, `smallest`, `largest`, `main`, `interaction`, `share` and `effect` as in the
+        screening, NaN where nothing was published. Attribute `source`: where they are from.
     """
-
-    terms: Mapping[Label, Mapping[str, PublishedTerm]] = field(default_factory=dict)
-    source: str = ""
-
-    def __bool__(self) -> bool:
-        """Return whether there is anything to compare with."""
-        return bool(self.terms)
-
-    @property
-    def has_terms(self) -> bool:
-        """Whether anything else than grand means was published."""
-        return any(set(terms) - set(OF_RESPONSE) for terms in self.terms.values())
-
-    def mean(self, label: Label) -> float | None:
-        """Return the published grand mean of a response. [unit of the response]"""
-        term = self.terms.get(label, {}).get(CONSTANT)
-        return None if term is None else term.effects[0]
-
-    def range(self, label: Label) -> tuple[float, ...]:
-        """Return the published smallest and largest value; empty without. [unit of the response]"""
-        term = self.terms.get(label, {}).get(RANGE)
-        return () if term is None else term.effects
-
-    def sums(self, label: Label) -> tuple[float | None, float | None]:
-        """Return the published percentages of all main effects and of all interactions. [%]"""
-        terms = self.terms.get(label, {})
-        main, interactions = (
-            terms[name].percent if name in terms else None for name in (MAIN, INTERACTIONS)
-        )
-        return main, interactions
-
-    def mean_difference(self, screening: Screening, label: Label) -> float | None:
-        """Return how much our grand mean is above the published one. [%]
-
-        It is None if there is no published one, or if that is zero.
-        """
-        mean = self.mean(label)
-        return 100.0 * (screening.tables[label].constant - mean) / mean if mean else None
-
-    def percent(self, label: Label, term: Term) -> float | None:
-        """Return the published contribution of a term. [%]"""
-        published, _ = self._published_term(label, term.factors)
-        return None if published is None else published.percent
-
-    def effects(self, label: Label, term: Term) -> dict[Combination, float]:
-        """Return the published effects of a term by level; empty without. [unit of the response]"""
-        published, is_turned = self._published_term(label, term.factors)
-        if published is None or not published.effects:
-            return {}
-        levels = product(LEVELS, repeat=len(term.factors))
-        turned = (combination[::-1] if is_turned else combination for combination in levels)
-        return dict(zip(turned, published.effects, strict=True))
-
-    def sign_differs(self, label: Label, term: Term) -> bool:
-        """Return whether the effect at the lowest levels has another sign than the published one.
-
-        It is False if no effects were published, or if the published one is zero.
-        """
-        effects = self.effects(label, term)
-        lowest = (LEVELS[0],) * len(term.factors)
-        return bool(effects) and effects[lowest] * term.effects[lowest] < 0.0
-
-    def compared_terms(self, screening: Screening) -> Iterator[tuple[Label, Term]]:
-        """Yield the terms of a screening of which a contribution or effects were published."""
-        for label, table in screening.tables.items():
-            for term in table.terms:
-                if self.percent(label, term) is not None or self.effects(label, term):
-                    yield label, term
-
-    def other_signs(self, screening: Screening) -> list[tuple[Label, str]]:
-        """Return label and name of the terms whose effects have another sign."""
-        terms = self.compared_terms(screening)
-        return [(label, term.name) for label, term in terms if self.sign_differs(label, term)]
-
-    def differences(self, screening: Screening) -> dict[tuple[Label, str], float]:
-        """Return contribution less published contribution, by label and term. [points]"""
-        return {
-            (label, term.name): term.percent - published
-            for label, term in self.compared_terms(screening)
-            if (published := self.percent(label, term)) is not None
-        }
-
-    def leaders(self, screening: Screening) -> dict[Label, tuple[str, str]]:
-        """Return our largest main effect and the published one of each response with any."""
-        largest = {}
-        for label, table in screening.tables.items():
-            mains = [term for term in table.terms if len(term.factors) == 1]
-            known = {term.name: self.percent(label, term) or 0.0 for term in mains}
-            if any(known.values()):
-                ours = max(mains, key=lambda term: term.percent).name
-                largest[label] = (ours, max(known, key=lambda name: known[name]))
-        return largest
-
-    def _published_term(
-        self, label: Label, factors: tuple[str, ...]
-    ) -> tuple[PublishedTerm | None, bool]:
-        """Return a published term, and whether its factors are in the reverse order."""
-        terms = self.terms.get(label, {})
-        straight, turned = ":".join(factors), ":".join(factors[::-1])
-        return terms.get(straight, terms.get(turned)), straight not in terms
-
-    def far_means(self, screening: Screening) -> dict[Label, float]:
-        """Return the means that differ from the published ones by more than `FAR`. [%]"""
-        differences = {label: self.mean_difference(screening, label) for label in screening.tables}
-        return {label: d for label, d in differences.items() if d is not None and abs(d) > FAR}
-
-    def far_contributions(self, screening: Screening) -> dict[tuple[Label, str], float]:
-        """Return the contributions that differ by more than `FAR`, by label and term. [points]"""
-        return {key: d for key, d in self.differences(screening).items() if abs(d) > FAR}
+    compared = [label for label in labels_of(screening) if label in results]
+    if not compared:
+        return xr.Dataset()
+    names = ("mean", "smallest", "largest", "main", "interaction", "share", "effect")
+    published = screening[list(names)].map(
+        lambda array: xr.full_like(array, np.nan), keep_attrs=True
+    )
+    for label in compared:
+        _fill(published, label, results[label])
+    return published.assign_attrs(source=source)
 
 
-NOT_PUBLISHED = Published()
-"""No published results."""
+def _fill(published: xr.Dataset, label: Label, terms: Mapping[str, PublishedTerm]) -> None:
+    """Write the published numbers of a response into arrays of NaN."""
+    load, name = label
+    quantity = published["mean"].attrs["each"][name]
+    place = {"load": load, "response": name}
+
+    def write(variable: str, value: Any, **where: Any) -> None:
+        published[variable].loc[{**place, **where}] = value
+
+    for variable, term, place_of_effect in (
+        ("mean", CONSTANT, 0),
+        ("smallest", RANGE, 0),
+        ("largest", RANGE, 1),
+    ):
+        if term in terms:
+            write(variable, quantity.to_si(terms[term].effects[place_of_effect]))
+    for variable, term in (("main", MAIN), ("interaction", INTERACTIONS)):
+        if term in terms:
+            write(variable, SHARE.to_si(terms[term].percent))
+    for term in published.term.values.tolist():
+        straight, turned = terms.get(term), terms.get(":".join(reversed(term.split(":"))))
+        known = straight or turned
+        if known is None:
+            continue
+        if known.percent is not None:
+            write("share", SHARE.to_si(known.percent), term=term)
+        if known.effects:
+            shape = (len(LEVELS),) * (term.count(":") + 1)
+            effects = quantity.to_si(known.effects).reshape(shape)
+            effects = effects if straight else effects.T
+            others = list(OTHER_LEVELS[1:]) if len(shape) > 1 else ""
+            write("effect", effects, term=term, other_level=others)
 
 
-def published_for(
-    results: PublishedResults, labels: Iterable[Label], source: str = ""
-) -> Published:
-    """Return those published results that belong to some loads and responses."""
-    compared = set(labels)
-    kept = {label: terms for label, terms in results.items() if label in compared}
-    return Published(kept, source if kept else "")
+def sign_differs(screening: xr.Dataset, published: xr.Dataset) -> xr.DataArray:
+    """Return whether effects have another sign than the published ones, over the terms.
+
+    The effects at the lowest levels are compared. It is False if none were published.
+    """
+    lowest = (data.effect.sel(level=LEVELS[0]) for data in (screening, published))
+    ours, theirs = (
+        effect.sel(other_level="").fillna(effect.sel(other_level=str(LEVELS[0])))
+        for effect in lowest
+    )
+    return ours * theirs < 0.0
+
+
+def compared_terms(published: xr.Dataset) -> xr.DataArray:
+    """Return whether a contribution or effects of a term were published."""
+    return published.share.notnull() | published.effect.notnull().any(["level", "other_level"])
+
+
+def mean_difference(screening: xr.Dataset, published: xr.Dataset) -> xr.DataArray:
+    """Return by how much means are above the published ones, as a share of those."""
+    theirs = published["mean"].where(published["mean"] != 0.0)
+    return (screening["mean"] - theirs) / theirs
+
+
+def leaders(screening: xr.Dataset, published: xr.Dataset) -> dict[Label, tuple[str, str]]:
+    """Return our largest main effect and the published one of each response with any."""
+    pairs = {}
+    for label in labels_of(screening):
+        theirs = mains(at(published[["share"]].fillna(0.0), label))
+        if theirs.share.values[0] > 0.0:
+            ours = mains(at(screening[["share"]], label))
+            pairs[label] = ours.term.values[0].item(), theirs.term.values[0].item()
+    return pairs

@@ -17,12 +17,9 @@ A run has no noise: what is random is only where in the range it is. Both interv
 settings like those of the design, not for each single setting.
 """
 
-import functools
 import itertools
-import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import pandas as pd
@@ -31,13 +28,18 @@ from scipy.special import stdtrit
 
 from wm_drake.parameters import at_places
 from wm_drake.parameters.types import FloatArray
-from wm_drake.simulation.cases import Case
-from wm_drake.studies.doe.anova import AnovaTable, SumCoding
-from wm_drake.studies.gasket.screening import Label, Responses, Screening
-from wm_drake.studies.gasket.study import GasketTrials, as_responses
+from wm_drake.report.formatting import three_digits
+from wm_drake.report.quantity import Quantity
+from wm_drake.studies.doe.anova import SumCoding
+from wm_drake.studies.experiment import Experiment
+from wm_drake.studies.gasket.screening import MEAN, good_trials
+from wm_drake.studies.gasket.study import GasketTrials, responses_of
 
 CONFIDENCE = 0.95
 """Probability of the intervals."""
+
+HALF_WIDTH = Quantity("± 95 %", form=three_digits)
+"""Half width of the 95 % interval of a new run."""
 
 
 def codes(places: FloatArray) -> FloatArray:
@@ -67,93 +69,111 @@ def model_rows(places: FloatArray, *, interactions: bool) -> FloatArray:
     return np.concatenate(blocks, axis=1)
 
 
-def model_row(places: Sequence[float], *, interactions: bool) -> FloatArray:
-    """Return the row of the model at places of all factors: constant, mains, interactions. (p,)"""
-    row: FloatArray = model_rows(np.array([places], dtype=float), interactions=interactions)[0]
-    return row
+def models_of(screening: xr.Dataset) -> xr.Dataset:
+    """Return the fitted models of a screening; its design has three levels of each factor.
 
-
-@dataclass(frozen=True)
-class Surfaces:
-    """Fitted models of all responses of a screening.
-
-    Attributes:
-        interactions: Whether the model has two-factor interactions.
-        coefficients: By label: of the row of the model (p,). [unit of the response]
-        deviations: By label: residual standard deviation s; NaN without degrees of freedom.
-        quantiles: By label: quantile of Student's t for the intervals.
-        inverses: By load: (X' X)^-1 of its trials (p, p).
+    Returns:
+        Over `load` and `response`: `coefficient` of the row of the model, over `column` too, and
+        `spread`, the residual standard deviation times the quantile of Student's t; NaN without
+        degrees of freedom. Over `load`, `column` and `other`: `inverse`, (X' X)^-1 of its trials.
+        Attributes: `factors`, their names, and `interactions`, whether the model has them.
     """
-
-    factors: tuple[str, ...]
-    interactions: bool
-    coefficients: Mapping[Label, FloatArray]
-    deviations: Mapping[Label, float]
-    quantiles: Mapping[Label, float]
-    inverses: Mapping[str, FloatArray]
-
-    def prediction(self, label: Label, places: Sequence[float]) -> float:
-        """Return the fitted response at places of the factors. [unit of the response]"""
-        row = model_row(places, interactions=self.interactions)
-        return float(row @ self.coefficients[label])
-
-    def half_width(self, label: Label, places: Sequence[float], *, of_run: bool) -> float:
-        """Return the half width of the interval of a new run, or of the mean."""
-        row = model_row(places, interactions=self.interactions)
-        return self._half_width(label, row, of_run=of_run)
-
-    def mean_half_width(self, label: Label, factor: str, place: float) -> float:
-        """Return the half width of the mean over all levels of the other factors."""
-        row = model_row([0.0] * len(self.factors), interactions=self.interactions) * 0.0
-        row[0], at = 1.0, 1 + 2 * self.factors.index(factor)
-        row[at : at + 2] = codes(np.array(place))
-        return self._half_width(label, row, of_run=False)
-
-    def _half_width(self, label: Label, row: FloatArray, *, of_run: bool) -> float:
-        leverage = float(row @ self.inverses[label[0]] @ row)
-        scale = self.quantiles[label] * self.deviations[label]
-        return scale * math.sqrt(leverage + (1.0 if of_run else 0.0))
-
-
-def surfaces(screening: Screening) -> Surfaces:
-    """Return the fitted models of a screening; its design has three levels of each factor."""
-    design = screening.design
+    design, each = screening.design, screening.value.attrs["each"]
     interactions = design.model != "main"
-    inverses = {}
-
-    @functools.cache
-    def inverse(good: bytes) -> FloatArray:
-        rows = design.levels[np.frombuffer(good, dtype=bool)]
-        matrix = SumCoding(pd.DataFrame(rows, columns=list(design.factors)), interactions).matrix
-        return np.asarray(np.linalg.inv(matrix.T @ matrix))
-
-    for load, values in screening.responses.values.items():
-        good = np.isfinite(values.to_numpy()).all(axis=1)
-        inverses[load] = inverse(good.tobytes())
-    deviations, quantiles = {}, {}
-    for label, table in screening.tables.items():
-        df = table.residual_df
-        deviations[label] = math.sqrt(table.residual_sum_sq / df) if df else math.nan
-        quantiles[label] = float(stdtrit(df, 0.5 + 0.5 * CONFIDENCE)) if df else math.nan
-    coefficients = {label: _coefficients(table) for label, table in screening.tables.items()}
-    return Surfaces(
-        tuple(design.factors), interactions, coefficients, deviations, quantiles, inverses
+    # of sum-coded columns, the coefficients are the effects at -1 and 0
+    effects = screening.effect.sel(level=[-1, 0])
+    pairs = [":" in term for term in screening.term.values.tolist()]
+    of_mains, of_pairs = (
+        effects.isel(term=np.flatnonzero(np.array(pairs) == is_pair)).sel(other_level=others).values
+        for is_pair, others in ((False, [""]), (True, ["-1", "0"]))
+    )
+    shape = (screening.sizes["load"], screening.sizes["response"], -1)
+    coefficients = np.concatenate(
+        [screening["mean"].values[..., None], of_mains.reshape(shape), of_pairs.reshape(shape)], -1
+    )
+    df = screening.residual_df.values
+    quantile = np.where(df > 0, stdtrit(np.maximum(df, 1), 0.5 + 0.5 * CONFIDENCE), np.nan)
+    labels = ("load", "response")
+    return xr.Dataset(
+        {
+            "coefficient": MEAN.of_each("response", each, (*labels, "column"), coefficients),
+            "spread": MEAN.of_each(
+                "response", each, labels, quantile * screening.residual_deviation.values
+            ),
+            "inverse": (("load", "column", "other"), _inverses(screening, interactions)),
+        },
+        {name: screening[name] for name in labels},
+        {"factors": design.factors, "interactions": interactions},
     )
 
 
-def _coefficients(table: AnovaTable) -> FloatArray:
-    """Return the coefficients: of sum-coded columns they are the effects at -1 and 0."""
-    coefficients = [table.constant]
-    for term in table.terms:
-        coefficients += [
-            term.effects[at] for at in itertools.product((-1, 0), repeat=len(term.factors))
-        ]
-    return np.array(coefficients)
+def _inverses(screening: xr.Dataset, interactions: bool) -> FloatArray:
+    """Return (X' X)^-1 of the good trials of each load. (loads, p, p)"""
+    design, known, inverses = screening.design, dict[bytes, FloatArray](), []
+    for load in screening["load"].values:
+        good = good_trials(screening.value.sel(load=load))
+        if good.tobytes() not in known:
+            rows = pd.DataFrame(design.levels[good], columns=list(design.factors))
+            matrix = SumCoding(rows, interactions).matrix
+            known[good.tobytes()] = np.asarray(np.linalg.inv(matrix.T @ matrix), dtype=float)
+        inverses.append(known[good.tobytes()])
+    return np.array(inverses)
+
+
+def predicted(models: xr.Dataset, places: FloatArray) -> xr.Dataset:
+    """Return the responses that the models predict at settings, and their intervals.
+
+    Args:
+        models: As of `models_of`.
+        places: Places of all factors. (n, factors)
+
+    Returns:
+        Over `setting`, `load` and `response`: `predicted`, and `half_width` of the 95 % interval of
+        a new run.
+    """
+    rows = model_rows(np.asarray(places, dtype=float), interactions=models.interactions)
+    each, dims = models.coefficient.attrs["each"], ("setting", "load", "response")
+    values = np.einsum("np,lrp->nlr", rows, models.coefficient.values)
+    widths = half_widths(models, rows, of_run=True)
+    return xr.Dataset(
+        {
+            "predicted": MEAN.named("predicted").of_each("response", each, dims, values),
+            "half_width": HALF_WIDTH.of_each("response", each, dims, widths),
+        },
+        {name: models[name] for name in dims[1:]},
+    )
+
+
+def half_widths(models: xr.Dataset, rows: FloatArray, *, of_run: bool) -> FloatArray:
+    """Return the half widths of the intervals of new runs, or of means. (n, loads, responses)
+
+    Args:
+        models: As of `models_of`.
+        rows: Rows of the model. (n, p)
+        of_run: Whether they are those of runs.
+    """
+    leverage = np.einsum("np,lpq,nq->nl", rows, models.inverse.values, rows)
+    return np.asarray(np.sqrt(leverage + float(of_run))[..., None] * models.spread.values)
+
+
+def mean_half_widths(models: xr.Dataset, places: Sequence[float]) -> FloatArray:
+    """Return the half widths of the means over all levels of the other factors.
+
+    Returns:
+        (factors, places, loads, responses) [SI]
+    """
+    count = len(models.factors)
+    rows = np.zeros((count, len(places), models.sizes["column"]))
+    rows[..., 0] = 1.0
+    for factor in range(count):
+        rows[factor, :, 1 + 2 * factor : 3 + 2 * factor] = codes(np.array(places))
+    widths = half_widths(models, rows.reshape(-1, rows.shape[-1]), of_run=False)
+    return widths.reshape(count, len(places), *widths.shape[1:])
 
 
 @dataclass(frozen=True)
 class Setting:
-    """Setting of the factors that is to be checked.
+    """Setting of the factors that is to be run.
 
     Attributes:
         text: As the user wrote it.
@@ -164,61 +184,54 @@ class Setting:
     places: tuple[float, ...]
 
 
-@dataclass(frozen=True)
-class Check:
-    """Settings with their predictions and runs.
-
-    Attributes:
-        responses: Responses of the runs, one row per setting.
-    """
-
-    settings: tuple[Setting, ...]
-    surfaces: Surfaces
-    responses: Responses
-
-    def frame(self) -> pd.DataFrame:
-        """Return prediction, 95 % half width, run and difference of each setting and response."""
-        return self._frame.copy()
-
-    @cached_property
-    def _frame(self) -> pd.DataFrame:
-        rows = []
-        for number, setting in enumerate(self.settings):
-            for load, values in self.responses.values.items():
-                for name in map(str, values):
-                    label = (load, name)
-                    run = float(values[name].iloc[number])
-                    rows.append(self._row(setting, label, run))
-        return pd.DataFrame(rows)
-
-    def _row(self, setting: Setting, label: Label, run: float) -> dict[str, object]:
-        predicted = half = math.nan  # of a load that the study leaves out
-        if label in self.surfaces.coefficients:
-            predicted = self.surfaces.prediction(label, setting.places)
-            half = self.surfaces.half_width(label, setting.places, of_run=True)
-        return {
-            "setting": setting.text,
-            "load": label[0],
-            "response": label[1],
-            "unit": self.responses.units[label[1]],
-            "predicted": predicted,
-            "half_width": half,
-            "run": run,
-            "difference": run - predicted,
-            "is_inside": abs(run - predicted) <= half,
-        }
-
-
-def run_check(
+def run_settings(
     trials: GasketTrials,
     settings: Sequence[Setting],
-    surfaces: Surfaces,
-    run: Callable[[Iterable[Case]], xr.Dataset],
-) -> Check:
-    """Run settings and return them with their predictions."""
-    cases: list[Case] = []
-    for number, setting in enumerate(settings, start=1):
-        changed = at_places(trials.parameters, trials.factors, setting.places)
-        cases += trials.cases_of(changed, f"check {number}")
-    loads = [case.name for case in trials.loads]
-    return Check(tuple(settings), surfaces, as_responses(run(cases), loads, trials.chosen))
+    models: xr.Dataset,
+    experiment: Experiment,
+) -> xr.Dataset:
+    """Run settings and return them with their predictions.
+
+    Args:
+        trials: Machine, factors and responses.
+        settings: The settings.
+        models: As of `models_of`.
+        experiment: Runs of the machine with some loads.
+
+    Returns:
+        Over `setting`, `load` and `response`: `predicted` and `half_width` as of `predicted`, NaN
+        with a load that the models do not have; `run`, `difference` of both, and `is_inside`,
+        whether the run lies in the interval.
+    """
+    machines = (
+        at_places(trials.parameters, trials.factors, setting.places) for setting in settings
+    )
+    names = [f"check {number}" for number in range(1, len(settings) + 1)]
+    data = experiment.at(names, machines, "settings")
+    runs = responses_of(data, trials.chosen).value.rename(trial="setting")
+    runs = runs.transpose("setting", ...)
+    return compared_with_models(models, settings, runs)
+
+
+def compared_with_models(
+    models: xr.Dataset, settings: Sequence[Setting], runs: xr.DataArray
+) -> xr.Dataset:
+    """Return runs of settings beside what the models predict, as `run_settings` does.
+
+    Args:
+        models: As of `models_of`.
+        settings: The settings.
+        runs: Over `setting`, `load` and `response`.
+    """
+    texts = [setting.text for setting in settings]
+    check = predicted(models, np.array([setting.places for setting in settings]))
+    check = check.assign_coords(setting=texts).reindex(load=runs["load"])
+    check["run"] = runs.assign_coords(setting=texts)
+    check["run"].attrs |= MEAN.named("run").attributes()
+    difference = check.run - check.predicted
+    each = runs.attrs["each"]
+    check["difference"] = MEAN.named("difference").of_each(
+        "response", each, difference.dims, difference
+    )
+    check["is_inside"] = np.abs(difference) <= check.half_width
+    return check

@@ -1,8 +1,7 @@
 """The task of the gasket study: options and files checked, and runs."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ from wm_drake.parameters import (
     TABLES,
     FactorLevels,
     MachineParameters,
+    PublishedResults,
     at_levels,
     factor_of_text,
     levels_of,
@@ -24,30 +24,30 @@ from wm_drake.parameters import (
     published_results,
 )
 from wm_drake.simulation.cases import Case, is_as_measured
+from wm_drake.studies.answer import Answer
 from wm_drake.studies.doe.coding import MODELS
 from wm_drake.studies.doe.design import DESIGNS, Design, make_design, read_design
-from wm_drake.studies.executor import Executor, RunCases
+from wm_drake.studies.executor import Executor
+from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.gasket.options import GasketOptions
-from wm_drake.studies.gasket.page import GasketResult
+from wm_drake.studies.gasket.page import Comparisons, gasket_answer
 from wm_drake.studies.gasket.proposal import (
-    Aim,
-    Compared,
-    Proposal,
-    ProposedChange,
-    best_places,
-    change_of,
+    Candidates,
     is_level_zero,
+    sets_of,
     settings_of,
+    text_at,
 )
 from wm_drake.studies.gasket.screening import (
-    Published,
     check_degrees_of_freedom,
     published_for,
     run_screening,
 )
 from wm_drake.studies.gasket.study import GasketTrials, run_level_zero
-from wm_drake.studies.gasket.surface import Check, Setting, run_check, surfaces
+from wm_drake.studies.gasket.surface import Setting, models_of, run_settings
+from wm_drake.studies.gasket.words import Words
 from wm_drake.studies.inputs import existing_file, pairs_of, selected_cases
+from wm_drake.studies.proposal import AFTER, compared, is_confirmed, proposal_of
 from wm_drake.studies.run import machine_text
 from wm_drake.studies.study import Task
 
@@ -66,8 +66,7 @@ class GasketTask(Task):
         middle = at_levels(parameters, levels, [0] * len(levels))
         with problems_at("--response", ""):
             self.trials = GasketTrials(middle, levels, self.cases, options.response)
-            self.verified = replace(self.trials, loads=self._every_load())
-        self.published = self._published()
+        self.published, self.source = self._published()
 
     def _every_load(self) -> list[Case]:
         """Return the loads of the study, then the other ones of the machine."""
@@ -75,8 +74,8 @@ class GasketTask(Task):
         names = [case.name for case in self.cases]
         return [*self.cases, *(case for case in every if case.name not in names)]
 
-    def _published(self) -> Published:
-        """Return the published results that are compared, of some loads."""
+    def _published(self) -> tuple[PublishedResults, str]:
+        """Return the published results that are compared, of some loads, and their files."""
         options, parameters = self.options, self.parameters
         files = [
             str(existing_file(path, "--published").resolve()) for path in options.published
@@ -86,9 +85,9 @@ class GasketTask(Task):
             is_other = options.sets or options.factor or options.factors
             loads = [case.name for case in self.cases if is_as_measured(parameters, case)]
             loads = [] if is_other else loads
-        labels = [(load, response.name) for load in loads for response in self.trials.chosen]
-        names = ", ".join(Path(path).name for path in files)
-        return published_for(published_results(tuple(files)), labels, names)
+        known = published_results(tuple(files))
+        kept = {label: terms for label, terms in known.items() if label[0] in loads}
+        return kept, ", ".join(Path(path).name for path in files)
 
     @property
     def identity(self) -> dict[str, Any]:
@@ -105,56 +104,93 @@ class GasketTask(Task):
             "measures": ", ".join(trials.measures),
         }
 
-    def run(self, executor: Executor) -> GasketResult:
+    def run(self, executor: Executor) -> Answer:
         """Run the trials, level 0 with each treatment of tables, and the settings to check."""
-        trials, options = self.trials, self.options
-        middle = build_machine(trials.parameters)
-        run = partial(executor.simulate, middle, trials.measures)
-        with executor.progress(self.design.trials * len(trials.loads)):
-            screening = run_screening(self.design, lambda design: trials.responses(design, run))
+        trials, machine = self.trials, build_machine(self.trials.parameters)
+        experiment = Experiment(machine, trials.measures, executor.simulate, tuple(self.cases))
+        with executor.progress(self.design.trials * len(self.cases)):
+            screening = run_screening(self.design, lambda d: trials.responses(d, experiment))
+        models = models_of(screening)
+        check, published = xr.Dataset(), xr.Dataset()
+        if self.settings:
+            check = run_settings(trials, self.settings, models, experiment)
+        if self.published:
+            published = published_for(self.published, screening, self.source)
+        zero = self._level_zero(executor)
+        every_load = replace(experiment, loads=tuple(self._every_load()))
+        proposed, proposal = self._proposal(screening, models, every_load)
+        comparisons = Comparisons(published, zero, check, proposed, proposal)
+        return gasket_answer(screening, models, trials, comparisons)
 
-        def run_variant(machine: MachineParameters, cases: Sequence[Case]) -> xr.Dataset:
-            built = build_machine(machine)
-            return executor.simulate(built, trials.measures, cases, "level 0")
-
+    def _level_zero(self, executor: Executor) -> xr.Dataset:
+        """Run the machine and level 0 with each treatment of tables."""
+        options = self.options
         every = {
             name: _factors(self.parameters, options.model_copy(update={"tables": name}))
             for name in TABLES
         }
-        zero = run_level_zero(self.parameters, every, options.tables, trials, run_variant)
-        check: Check | None = None
-        models = surfaces(screening)
-        if self.settings:
-            check = run_check(trials, self.settings, models, partial(run, what="check"))
-        proposal = self._proposal(Aim(screening, models), partial(run, what="proposal"))
-        return GasketResult(screening, trials, Compared(self.published, zero, check, proposal))
+        zero = run_level_zero(self.parameters, every, self.trials, executor.simulate)
+        return zero.assign_attrs(tables=options.tables)
 
-    def _proposal(self, aim: Aim, run: RunCases) -> Proposal:
-        """Choose a setting on the fitted models, and run it and level 0 with all loads."""
-        factors, parameters = self.verified.factors, self.parameters
-        places = best_places(aim) or (0.0,) * len(factors)
-        every = [change_of(parameters, f, x) for f, x in zip(factors, places, strict=True) if x]
-        changes = tuple(change for change in every if change.place)
-        check = run_check(self.verified, settings_of(changes, factors), aim.surfaces, run)
-        return Proposal(
-            changes,
-            check,
-            tuple(case.name for case in self.cases),
-            is_level_zero(parameters, factors),
-            self._command(changes),
-        )
+    def _proposal(
+        self, screening: xr.Dataset, models: xr.Dataset, experiment: Experiment
+    ) -> tuple[xr.Dataset, xr.Dataset]:
+        """Choose a setting on the fitted models, and run it and level 0 with all loads.
 
-    def _command(self, changes: Sequence[ProposedChange]) -> str:
-        """Return the command that runs changes; "" if there is none."""
+        Returns:
+            The runs and the proposal, as of `page.Comparisons`.
+        """
+        factors, parameters = self.trials.factors, self.parameters
+        candidates = Candidates(screening, models)
+        places = candidates.best() or (0.0,) * len(factors)
+        changed = [(f, x) for f, x in zip(factors, places, strict=True) if x]
+        every = [(factor, *text_at(parameters, factor, place)) for factor, place in changed]
+        chosen = [(factor, text, place) for factor, text, place in every if place]
+        settings = settings_of({factor.name: place for factor, _, place in chosen}, factors)
+        runs = run_settings(self.trials, settings, models, experiment)
+        responses = compared(runs.run, candidates.aim.goals)
+        confirmed = is_confirmed(candidates.aim, responses)
+        words = Words(factors, screening)
+        changes = [
+            (words.factor(f.name), _change_text(f, text), ", ".join(f.numbers))
+            for f, text, _ in chosen
+        ]
+        if chosen:
+            responses = responses.assign(_predicted(runs, responses))
+        command = self._command([sets_of(factor, text) for factor, text, _ in chosen])
+        proposal = proposal_of(responses, changes, is_confirmed=confirmed, command=command)
+        about = {
+            "factors": [f.name for f, *_ in chosen],
+            "is_machine": is_level_zero(parameters, factors),
+        }
+        return runs.assign_attrs(places=settings[-1].places), proposal.assign_attrs(about)
+
+    def _command(self, sets: Sequence[Mapping[str, str]]) -> str:
+        """Return the command that runs changes, each the values of `--set`; "" if there is none."""
         options = self.options
-        sets = [f"{name}={text}" for c in changes for name, text in c.sets.items()]
-        if not changes or not all(change.sets for change in changes):
+        if not sets or not all(sets):
             return ""
+        texts = [f"{name}={text}" for of_factor in sets for name, text in of_factor.items()]
         words = ["wm-drake spin"]
         words += [f"--machine {options.machine}"] if options.machine != "reference" else []
-        words += [f'--set "{text}"' for text in (*options.sets, *sets)]
+        words += [f'--set "{text}"' for text in (*options.sets, *texts)]
         words += [f"--profile {options.profile}"] if options.profile else []
         return " ".join(words)
+
+
+def _change_text(factor: FactorLevels, text: str) -> str:
+    """Return the new value of a factor in words, beside the one of the machine."""
+    if text.endswith("%"):
+        return f"{text} of its table"
+    nominal = next(iter(factor.nominal.values()))
+    return text.replace("*", " ") + (f" in place of {nominal}" if nominal else "")
+
+
+def _predicted(runs: xr.Dataset, responses: xr.Dataset) -> dict[str, xr.DataArray]:
+    """Return what the models predict of each response with its worst load after the change."""
+    place = {"load": responses.load_after, "response": responses.response}
+    of_setting = runs[["predicted", "half_width"]].sel(setting=AFTER, drop=True).sel(place)
+    return {str(name): array.drop_vars("load") for name, array in of_setting.items()}
 
 
 def _factors(parameters: MachineParameters, options: GasketOptions) -> tuple[FactorLevels, ...]:

@@ -14,6 +14,7 @@ from wm_drake.report import figure as fig
 from wm_drake.report.formatting import significant
 from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.quantity import Quantity, text_of
+from wm_drake.report.reading import reading_unit
 from wm_drake.solid.curves import AXIAL, RADIAL, TILT, TWIST, Curve, CurvePoint
 from wm_drake.solid.mesh import Ring, axes_at
 from wm_drake.solid.touching import Faces
@@ -28,9 +29,9 @@ from wm_drake.studies.gasket_curves.study import (
     curves_data,
     values_data,
 )
-from wm_drake.studies.rig.units import LINEAR, units_of
+from wm_drake.studies.rig.quantities import LINEAR, loop_quantities
 
-PLACE = LINEAR.displacement
+PLACE = LINEAR["displacement"]
 LARGEST_STRETCH = Quantity("largest stretch", decimals=2)
 PREFIXES = {False: "", True: "rotational_"}
 """Beginning of the names of tables, by whether their curves are about an axis."""
@@ -117,7 +118,7 @@ def curves_answer(
 
 def _warnings_of(checked: Checked, has_contact: bool) -> Iterable[str]:
     name, rotates = checked.curve.motion.name, checked.curve.motion.rotates
-    motion = units_of(rotates).displacement
+    motion = loop_quantities(rotates)["displacement"]
 
     def listed(values: FloatArray) -> str:
         numbers = [motion.number(value) for value in values if np.isfinite(value)]
@@ -181,9 +182,9 @@ def summary(curves: dict[str, Checked], numbers: xr.Dataset) -> str:
     """Return the result in a few sentences."""
     slopes = []
     for motion in (RADIAL, AXIAL, TWIST, TILT):
-        stiffness = units_of(motion.rotates).stiffness.unit
+        stiffness = loop_quantities(motion.rotates)["stiffness"].unit
         slope = curves[motion.name].curve.table.nominal_stiffness
-        slopes.append(f"{motion.name} {stiffness.reading(slope, 3)}")
+        slopes.append(f"{motion.name} {reading_unit(stiffness).reading(slope, 3)}")
     largest = max(max(c.begin.stretch, c.end.stretch) for c in curves.values())
     worst = max(checked.curve.work_error() for checked in curves.values())
     return (
@@ -199,8 +200,9 @@ def _rubber_text(rubber: Rubber, numbers: xr.Dataset) -> str:
     hardness = "" if rubber.shore_a is None else f"{rubber.shore_a:g} Shore A, "
     return (
         f"{hardness}constants of Yeoh {c1}, {c2}, {c3} {STRESS.unit_text}, bulk modulus "
-        f"{STRESS.unit.reading(rubber.bulk, 3)}. At the frequency of the damping its storage and "
-        f"loss modulus are {text_of(numbers.storage_modulus)} and {text_of(numbers.loss_modulus)} "
+        f"{STRESS.reading.reading(rubber.bulk, 3)}. At the frequency of the damping its storage "
+        f"and loss modulus are {text_of(numbers.storage_modulus)} and "
+        f"{text_of(numbers.loss_modulus)} "
         "of the modulus of the curves"
     )
 
@@ -257,8 +259,8 @@ def curves_figure(curves: dict[str, Curve]) -> fig.Figure:
     """Draw force over displacement and moment over angle, with the slope of the first 20 %."""
     panels = []
     for name, curve in curves.items():
-        units, table = units_of(curve.motion.rotates), curve.table
-        motion = units.displacement
+        quantities, table = loop_quantities(curve.motion.rotates), curve.table
+        motion = quantities["displacement"]
         finer = np.linspace(curve.values[0], curve.values[-1], 121)
         slope = fig.Line(
             motion.values(finer),
@@ -273,7 +275,7 @@ def curves_figure(curves: dict[str, Curve]) -> fig.Figure:
         x, y = motion.values(curve.values), curve.wrench()
         points = fig.Line(x, y, width=0.0, symbol="circle", key="equilibria")
         marks: tuple[fig.Mark, ...] = (fig.Rule(0.0, color=fig.QUIET), slope, between, points)
-        x_axis, y_axis = fig.Axis(label=motion.label), fig.Axis(label=units.load.label)
+        x_axis, y_axis = fig.Axis(label=motion.label), fig.Axis(label=quantities["load"].label)
         panels.append(fig.Panel(title=TITLES[name], marks=marks, x=x_axis, y=y_axis))
     return fig.Figure(panels=fig.in_grid(panels, 2), height=230.0)
 
@@ -334,7 +336,7 @@ def rings_figure(curves: dict[str, Curve]) -> fig.Figure:
     """Draw half of the ring from the side at both ends of each curve, by lines of its mesh."""
     panels = []
     for name, curve in curves.items():
-        motion = units_of(curve.motion.rotates).displacement
+        motion = loop_quantities(curve.motion.rotates)["displacement"]
         for point in (curve.points[0], curve.points[-1]):
             lines = np.concatenate(list(_mesh_lines(_surface(curve.ring, point.u))))
             mark = fig.Line(*PLACE.values(lines).T, color=fig.OURS, width=0.7)

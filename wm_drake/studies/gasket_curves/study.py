@@ -19,7 +19,7 @@ from wm_drake.report.quantity import HIDDEN, Quantity
 from wm_drake.solid.curves import AXIAL, MOTIONS, RADIAL, TILT, TWIST, Curve, Mesh, RimMotion
 from wm_drake.solid.deformed import Deformed
 from wm_drake.studies.inputs import quantities_of
-from wm_drake.studies.rig.units import units_of
+from wm_drake.studies.rig.quantities import loop_quantities
 
 WRINKLED = 0.03
 """Amplitude of wrinkles that is reported, in parts of the largest displacement."""
@@ -66,7 +66,7 @@ def curve_values(options: Any, points: int) -> dict[str, list[float]]:
     parts = np.append(NEAR_REST, np.arange(1, points + 1) / points)
     values = {}
     for motion in MOTIONS:
-        unit = units_of(motion.rotates).displacement.unit
+        unit = loop_quantities(motion.rotates)["displacement"].unit
         largest = positive(getattr(options, motion.name), unit, f"--{motion.name}")
         values[motion.name] = (largest * parts).tolist()
     return values
@@ -185,7 +185,7 @@ def curves_data(curves: Mapping[str, Checked], *, rotates: bool) -> xr.Dataset:
         those of x (radial), y (axial), about y (twist) and about z (tilt).
     """
     chosen = {name: c.curve for name, c in curves.items() if c.curve.motion.rotates == rotates}
-    motion = units_of(rotates).displacement
+    motion = loop_quantities(rotates)["displacement"]
     wrenches = {"force_x": RADIAL, "force_y": AXIAL, "moment_y": TWIST, "moment_z": TILT}
     names = [name for name, curve in chosen.items() for _ in curve.points]
     numbers: dict[str, tuple[Quantity, list[Any]]] = {
@@ -194,7 +194,7 @@ def curves_data(curves: Mapping[str, Checked], *, rotates: bool) -> xr.Dataset:
         "work": (ENERGY.named("work"), [curve.work() for curve in chosen.values()]),
     }
     for name, one in wrenches.items():
-        load = units_of(one.rotates).load.named(name.replace("_", " "))
+        load = loop_quantities(one.rotates)["load"].named(name.replace("_", " "))
         numbers[name] = (load, [curve.wrench(one.component) for curve in chosen.values()])
     data = {name: q.variable("point", np.concatenate(v)) for name, (q, v) in numbers.items()}
     return xr.Dataset({"curve": ("point", names), **data})
@@ -210,8 +210,10 @@ def values_data(
         `damping` [N s/m or N m s/rad], and the secant stiffness at both ends of the curve against
         the slope at rest, `change_at_negative_end` and `change_at_positive_end`.
     """
-    units = units_of(rotates)
-    stiffness, damping = (replace(q, decimals=None) for q in (units.stiffness, units.damping))
+    quantities = loop_quantities(rotates)
+    stiffness, damping = (
+        replace(q, decimals=None) for q in (quantities["stiffness"], quantities["damping"])
+    )
     axes = {a: (m, kind) for a, (m, kind) in AXES.items() if m.rotates == rotates}
     chosen = [curves[motion.name].curve for motion, _ in axes.values()]
     rest = np.array([curve.slope_at_rest() for curve in chosen])
@@ -247,7 +249,7 @@ def checks_data(curves: Mapping[str, Checked], *, rotates: bool) -> xr.Dataset:
         the curve `stopped`, if it did.
     """
     chosen = {name: c for name, c in curves.items() if c.curve.motion.rotates == rotates}
-    motion = replace(units_of(rotates).displacement, decimals=2, form=None)
+    motion = replace(loop_quantities(rotates)["displacement"], decimals=2, form=None)
     all_of = list(chosen.values())
     numbers = {
         "from": (motion.named("from"), [c.curve.values[0] for c in all_of]),

@@ -8,7 +8,6 @@ from typing import TypeAlias
 import numpy as np
 import xarray as xr
 
-from wm_drake.batch import RunResult, simulate_many
 from wm_drake.errors import input_error
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
@@ -29,6 +28,7 @@ from wm_drake.simulation.cases import Case
 from wm_drake.simulation.displacements import smooth_envelope
 from wm_drake.simulation.records import read_measured
 from wm_drake.simulation.runs import simulate
+from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.fitting.grid import grid_search
 from wm_drake.studies.fitting.problem import FAILED, FitProblem, Measurement, Unknown
 from wm_drake.studies.inputs import existing_file
@@ -165,18 +165,16 @@ def damping_problem(machine: Machine, measured: MeasuredDisplacements) -> FitPro
         for name, lower, upper, unit in zip(UNKNOWNS, LOWER, UPPER, UNITS, strict=True)
     )
     loads, size = tuple(measured), sum(len(curve.values) for curve in curves)
+    experiment = Experiment(machine, ())
     run_up_of(machine.parameters)  # refuses a machine without gasket, and a short profile
 
     def computed(points: FloatArray) -> FloatArray:
-        values = np.full((len(points), len(loads), size // len(loads)), np.nan)
-        cases = [case for point in points for case in cases_at(machine.parameters, point, loads)]
-
-        def keep(run: RunResult) -> None:
-            if not run.diverged and run.record is not None:
-                envelope = envelopes_of(run.record.displacement)
-                values[divmod(run.number, len(loads))] = envelope.values.T.ravel()
-
-        simulate_many(machine, cases, measures=("extremes",), histories=True, finished=keep)
+        values = experiment.records(
+            {"point": range(len(points)), "load": loads},
+            (case for point in points for case in cases_at(machine.parameters, point, loads)),
+            lambda record: envelopes_of(record.displacement).values.T.ravel(),
+            size // len(loads),
+        )
         return values.reshape(len(points), size)
 
     return FitProblem(unknowns, curves, computed)

@@ -5,7 +5,7 @@ from wm_drake.report.terminal import say
 from wm_drake.simulation.runs import simulate
 from wm_drake.studies.answer import Answer
 from wm_drake.studies.executor import Executor
-from wm_drake.studies.fitting.methods import least_squares
+from wm_drake.studies.fitting.methods import identify
 from wm_drake.studies.gasket_damping.options import GasketDampingOptions
 from wm_drake.studies.gasket_damping.page import gasket_damping_answer
 from wm_drake.studies.gasket_damping.study import (
@@ -48,7 +48,7 @@ class GasketDampingTask(Task):
             records = virtual_experiment(machine.parameters, self.truth, self.options.seed)
         problem = damping_problem(machine, records)
         with executor.fraction("fit") as progress:
-            fit = least_squares(
+            fit = identify(
                 problem,
                 seed=self.options.seed,
                 starts=STARTS,

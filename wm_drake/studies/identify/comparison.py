@@ -4,20 +4,18 @@ import hashlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.stats import t as student
 
 from wm_drake.errors import InputError, Problem
 from wm_drake.parameters.types import FloatArray
-from wm_drake.report.formatting import plain
 from wm_drake.rigs.measured import MeasuredMotion
 from wm_drake.studies.fitting.assessment import correlation_time, evaluated, left_out_errors
 from wm_drake.studies.fitting.fit import Fit, TestError
 from wm_drake.studies.fitting.methods import identify, refined
 from wm_drake.studies.fitting.problem import FitProblem, Progress
-from wm_drake.studies.identify.judgement import Judgement, judge, per_cent
+from wm_drake.studies.identify.judgement import LACK, Judgement, judge
 from wm_drake.studies.identify.models import ComponentModel
 from wm_drake.studies.identify.problem import computed_forces, fit_problem
 
@@ -168,7 +166,7 @@ class LawComparison:
         ranked = sorted(blind, key=lambda seen: seen.fit.rmse)
         texts = [
             f"{seen.law} {seen.fit.rmse:.3g} {self.unit}, "
-            f"lack of fit {per_cent(seen.judgement.missed)}"
+            f"lack of fit {LACK.text(seen.judgement.missed)}"
             for seen in ranked
         ]
         count = len(self.validation)
@@ -209,16 +207,6 @@ class LawComparison:
             for index, measured in enumerate(motions):
                 yield TestedLoop(measured, kind, index, fits)
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the comparison for JSON, in SI."""
-        return {
-            "supported": self.supported.law,
-            "as_good": [r.law for r in self.as_good],
-            "decided_by": "cross-validation" if self.by_left_out else "information criterion",
-            "sentences": list(self.sentences),
-            "laws": {r.law: _law_as_dict(r) for r in self.results},
-        }
-
 
 @dataclass(frozen=True)
 class TestedLoop:
@@ -244,21 +232,6 @@ class TestedLoop:
     def forces(self) -> dict[str, FloatArray]:
         """Return the computed force at each sample by law. [N; N m]"""
         return {law: fit.computed[fit.problem.slices[self.index]] for law, fit in self.fits.items()}
-
-
-def _law_as_dict(r: LawResult) -> dict[str, Any]:
-    return {
-        **r.fit.as_dict(),
-        "judgement": r.judgement.as_dict(),
-        "rmse_left_out": plain(r.left_out_rmse),
-        "bayesian_information_criterion": plain(r.criterion),
-        "prediction": r.prediction
-        and {
-            "rmse": r.prediction.fit.rmse,
-            "missed": r.prediction.judgement.missed,
-            "tests": r.prediction.fit.as_dict()["tests"],
-        },
-    }
 
 
 @dataclass(frozen=True)

@@ -1,23 +1,27 @@
-"""Page and tables of several laws that were fitted to the same tests."""
-
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+"""Show several laws that were fitted to the same tests: loops, blind predictions, errors."""
 
 import numpy as np
-import pandas as pd
+import xarray as xr
 
-from wm_drake.report.formatting import MISSING
-from wm_drake.report.page import Picture, Section, SectionedPage, picture
-from wm_drake.report.table import Column, Group, Row, Table, line, table_of
-from wm_drake.report.terminal import Printed
-from wm_drake.studies.fitting.page import estimates_frame, values_table
-from wm_drake.studies.identify.comparison import FittedLaw, LawComparison
-from wm_drake.studies.identify.figures import evenly_chosen, motion_text, rival_loops_figure
-from wm_drake.studies.identify.judgement import per_cent
-from wm_drake.studies.identify.page import IdentifyResult, frequency_of, motion_sentences
-from wm_drake.studies.rig.units import units_of
-from wm_drake.studies.study import Facts
+from wm_drake.report.labelled import LabelledTable
+from wm_drake.report.quantity import HIDDEN, Quantity
+from wm_drake.studies.answer import Answer, Part, Plot
+from wm_drake.studies.fitting.page import estimates_of
+from wm_drake.studies.identify.comparison import LawComparison
+from wm_drake.studies.identify.figures import evenly_chosen, rival_loops_figure
+from wm_drake.studies.identify.fragment import FittedComponent
+from wm_drake.studies.identify.judgement import LACK
+from wm_drake.studies.identify.page import (
+    files_of,
+    load_of,
+    missing_files,
+    motions_of_tests,
+    samples_of,
+)
+from wm_drake.studies.identify.problem import motion_sentences
+
+UNKNOWNS = Quantity("unknowns", decimals=0)
+CRITERION = Quantity("BIC")
 
 METHOD = (
     "All laws are fitted to the same samples by the least root mean square error. From three tests "
@@ -29,177 +33,146 @@ METHOD = (
 )
 
 
-def comparison_page(result: "IdentifyComparisonResult", facts: Facts) -> str:
-    """Return the page as text of one self-contained HTML file."""
-    comparison = result.comparison
-    count, blind = len(comparison.motions), len(comparison.validation)
-    about = f"{_counted(len(comparison.results), 'law')} fitted to {_counted(count, 'test')}"
-    about += f", {_counted(blind, 'test')} predicted blind." if blind else "."
+def comparison_answer(component: FittedComponent, comparison: LawComparison) -> Answer:
+    """Return the answer of a comparison of laws."""
+    motions = (*comparison.motions, *comparison.validation)
+    laws = {f"identified_{law.law}.yaml": law for law in comparison.results}
+    forces = [tested.forces() for tested in comparison.tested]
+    samples = samples_of(motions, {law: [of[law] for of in forces] for law in forces[0]})
+    kinds = [tested.kind for tested in comparison.tested]
+    counts = [len(m.position) for m in motions]
+    samples = samples.assign_coords(test=("sample", np.repeat(kinds, counts)))
+    loops = LabelledTable("loops", samples, is_in_json=False)
     blind_words = "blind prediction of tests that no fit has seen"
-    predicted = _pictures(comparison, "blind", blind_words)
-    fitted = _pictures(comparison, "fitted", "fit to the tests")
-    sections = [
-        Section("blind", "Blind prediction", predicted),
-        Section("fits", "Measured and fitted loops", fitted),
-        Section("laws", "Laws compared", tables=(laws_shown(comparison),)),
-        Section("errors", "Errors of each test", tables=(_errors(comparison),)),
-        Section("values", "Values", tables=(_estimates(comparison),)),
-    ]
-    motions = motion_sentences((*comparison.motions, *comparison.validation))
-    made = [
-        *(
-            (f"Search, {r.law}", f"{r.fit.log.method}; {'; '.join(r.fit.log.notes)}")
-            for r in comparison.results
-        ),
-        *(("Motion", text) for text in motions),
-        *facts.rows(),
-    ]
-    return SectionedPage(
-        f"Laws of {result.component.title}",
+    return Answer(
+        f"Laws of {component.title}",
         " ".join(comparison.sentences),
-        sections,
-        made,
-        warnings=_warnings(comparison, result.missing),
-        about=about,
-        method=METHOD,
-    ).html()
-
-
-def _counted(count: int, word: str) -> str:
-    return f"{count} {word}{'' if count == 1 else 's'}"
-
-
-def laws_table(comparison: LawComparison) -> pd.DataFrame:
-    """Return the measures of each law, with units in the column names."""
-    unit = comparison.unit.replace(" ", "")
-    return pd.DataFrame(
-        [
-            {
-                "law": r.law,
-                "unknowns": len(r.model.unknowns),
-                "not_determined": " ".join(r.undetermined),
-                "verdict": r.judgement.verdict,
-                f"rmse_{unit}": r.fit.rmse,
-                "lack_of_fit_by_rms_force": r.judgement.missed,
-                f"rmse_left_out_{unit}": r.left_out_rmse,
-                "bayesian_information_criterion": r.criterion,
-                f"rmse_blind_{unit}": r.prediction.fit.rmse if r.prediction else np.nan,
-                "lack_of_fit_blind": r.prediction.judgement.missed if r.prediction else np.nan,
-                "as_good_as_best": r in comparison.as_good,
-                "supported": r is comparison.supported,
-            }
-            for r in comparison.order
-        ]
+        None,
+        (
+            Part("Blind prediction", _plots(comparison, "blind", blind_words)),
+            Part(
+                "Measured and fitted loops",
+                (*_plots(comparison, "fitted", "fit to the tests"), loops),
+                remarks=motion_sentences(motions),
+            ),
+            Part("Laws compared", (_laws(comparison),)),
+            Part("Errors of each test", (_errors(comparison),)),
+            Part("Values", (_estimates(comparison),)),
+        ),
+        (
+            ("Laws", ", ".join(r.law for r in comparison.results)),
+            ("Tests", f"{len(comparison.motions)} fitted, {len(comparison.validation)} blind"),
+            *(
+                (f"Search, {r.law}", f"{r.fit.log.method}; {'; '.join(r.fit.log.notes)}")
+                for r in comparison.results
+            ),
+        ),
+        METHOD,
+        files_of(component, laws),
+        (*_warnings(comparison), *missing_files(component, laws)),
     )
 
 
-def parameters_by_law(comparison: LawComparison) -> pd.DataFrame:
-    """Return value, interval and bounds of each unknown of each law, for reading."""
-    parts = []
-    for r in comparison.results:
-        table = estimates_frame(r.fit, r.model.fixed_numbers)
-        table.insert(0, "law", r.law)
-        parts.append(table)
-    return pd.concat(parts, ignore_index=True)
-
-
-def errors_by_law(comparison: LawComparison) -> pd.DataFrame:
-    """Return the RMSE of each test, one column a law; a column says which tests were predicted."""
-    units = units_of(comparison.motions[0].loop.rotates)
-    rows = []
-    for tested in comparison.tested:
-        row: dict[str, Any] = {
-            "file": tested.measured.loop.path,
-            "test": tested.kind,
-            "frequency_hz": frequency_of(tested.measured),
-            f"amplitude_{units.unit}": units.factor * tested.measured.stroke,
-        }
-        for r, error in zip(comparison.results, tested.errors().values(), strict=True):
-            row[f"rmse_{units.in_heads}_{r.law}"] = error.rmse
-            if tested.kind == "fitted":
-                row[f"rmse_left_out_{units.in_heads}_{r.law}"] = r.left_out[tested.index]
-        rows.append(row)
-    return pd.DataFrame(rows)
-
-
-def loops_by_law(comparison: LawComparison) -> pd.DataFrame:
-    """Return the measured force and that of each law at every sample. [SI]"""
-    parts = [
-        pd.DataFrame(
-            {
-                "file": tested.measured.loop.name,
-                "test": tested.kind,
-                "time_s": tested.measured.loop.time,
-                "measured": tested.measured.loop.force,
-                **tested.forces(),
-            }
-        )
-        for tested in comparison.tested
-    ]
-    return pd.concat(parts, ignore_index=True)
-
-
-def laws_shown(comparison: LawComparison) -> Table:
-    """Return the measures of each law for reading, from the best to the worst law."""
-    unit, in_heads = comparison.unit, comparison.unit.replace(" ", "")
-    columns = {
-        "law": Column("law"),
-        "not_determined": Column("not determined"),
-        "verdict": Column("fit"),
-        "unknowns": Column("unknowns", decimals=0),
-        f"rmse_{in_heads}": Column("RMSE", unit),
-        "lack_of_fit_by_rms_force": Column("lack of fit"),
-        f"rmse_left_out_{in_heads}": Column("RMSE left out", unit),
-        "bayesian_information_criterion": Column("BIC above least"),
+def laws_of(comparison: LawComparison) -> xr.Dataset:
+    """Return the measures of each law, from the best to the worst law."""
+    load, ranked = load_of(comparison.motions), comparison.order
+    least = min(r.criterion for r in ranked)
+    blind = [r.prediction for r in ranked]
+    numbers = {
+        "unknowns": (UNKNOWNS, [len(r.model.unknowns) for r in ranked]),
+        "rmse": (load.named("RMSE"), [r.fit.rmse for r in ranked]),
+        "lack_of_fit": (LACK, [r.judgement.missed for r in ranked]),
+        "rmse_left_out": (load.named("RMSE left out"), [r.left_out_rmse for r in ranked]),
+        "bic": (CRITERION, [r.criterion for r in ranked]),
+        "bic_above_least": (
+            CRITERION.named("BIC above least"),
+            [r.criterion - least for r in ranked],
+        ),
+        "rmse_blind": (load.named("RMSE blind"), [p.fit.rmse if p else np.nan for p in blind]),
+        "lack_of_fit_blind": (
+            LACK.named("lack of fit blind"),
+            [p.judgement.missed if p else np.nan for p in blind],
+        ),
     }
-    if comparison.validation:
-        columns[f"rmse_blind_{in_heads}"] = Column("RMSE blind", unit)
-        columns["lack_of_fit_blind"] = Column("lack of fit blind")
-    frame = laws_table(comparison)
-    frame["bayesian_information_criterion"] -= frame["bayesian_information_criterion"].min()
-    for name in ("lack_of_fit_by_rms_force", "lack_of_fit_blind"):
-        frame[name] = list(map(per_cent, frame[name]))
-    frame["not_determined"] = frame["not_determined"].str.replace(" ", ", ").replace("", MISSING)
-    caption = (
+    texts = {
+        "not_determined": [", ".join(r.undetermined) for r in ranked],
+        "verdict": [r.judgement.verdict for r in ranked],
+    }
+    data = xr.Dataset(
+        {name: ("law", values) for name, values in texts.items()}
+        | {name: quantity.variable("law", values) for name, (quantity, values) in numbers.items()},
+        {"law": [r.law for r in ranked]},
+    )
+    data["bic"].attrs[HIDDEN] = True
+    if not comparison.validation:
+        data["rmse_blind"].attrs[HIDDEN] = data["lack_of_fit_blind"].attrs[HIDDEN] = True
+    as_good = ("law", [r in comparison.as_good for r in ranked], {HIDDEN: True})
+    supported = ("law", [r is comparison.supported for r in ranked])
+    return data.assign(as_good_as_best=as_good, supported=supported)
+
+
+def _laws(comparison: LawComparison) -> LabelledTable:
+    return LabelledTable(
+        "laws",
+        laws_of(comparison),
+        "Laws",
         "Laws from the best to the worst. Lack of fit: what the noise does not explain, by the "
         "root mean square of the measured force. RMSE left out: error of each test at the fit to "
         "all the other tests. BIC: Bayesian information criterion with the number of independent "
         "samples. The data support, of the laws that are as good as the best, the one with the "
-        "fewest unknowns."
+        "fewest unknowns.",
+        marked=("supported", "ours"),
+        is_in_terminal=True,
     )
-    kinds = ["ours" if supported else "" for supported in frame["supported"]]
-    return table_of(frame[list(columns)], caption, columns, kinds)
 
 
-def _estimates(comparison: LawComparison) -> Table:
-    tables = {r.law: values_table(r.fit, r.model.fixed_numbers) for r in comparison.order}
-    groups = tuple(
-        Group(law, tuple(Row((group.heading, *group.rows[0].cells)) for group in table.groups))
-        for law, table in tables.items()
+def _errors(comparison: LawComparison) -> LabelledTable:
+    """Return the RMSE of each test, one column a law; a column says which tests were predicted."""
+    load, tested = load_of(comparison.motions), list(comparison.tested)
+    errors = [list(one.errors().values()) for one in tested]
+    left_out = [
+        [r.left_out[one.index] if one.kind == "fitted" else np.nan for r in comparison.results]
+        for one in tested
+    ]
+    dims = ("test", "law")
+    normalised = LACK.named("RMSE by the largest value")
+    columns = {
+        "rmse": load.named("RMSE").variable(dims, [[e.rmse for e in row] for row in errors]),
+        "rmse_normalised": normalised.variable(
+            dims, [[e.normalised for e in row] for row in errors]
+        ),
+        "rmse_left_out": load.named("RMSE left out").hidden(dims, left_out),
+    }
+    labels = {
+        "test": [one.measured.loop.name for one in tested],
+        "kind": ("test", [one.kind for one in tested]),
+        "law": [r.law for r in comparison.results],
+    }
+    return LabelledTable(
+        "errors",
+        xr.Dataset(motions_of_tests([one.measured for one in tested]) | columns, labels),
+        "Errors",
+        "Root mean square error of each test and law, absolute and by the largest measured.",
+        across="law",
     )
-    caption = "Estimated values of each law with 95 % confidence intervals."
-    columns = next(iter(tables.values())).columns
-    return Table(caption, ("law", *columns), groups, 6)
 
 
-def _errors(comparison: LawComparison) -> Table:
-    groups = tuple(
-        line(
-            tested.measured.loop.name,
-            (
-                motion_text(tested.measured),
-                tested.kind,
-                *(f"{e.rmse:.3g} ({per_cent(e.normalised)})" for e in tested.errors().values()),
-            ),
-        )
-        for tested in comparison.tested
+def _estimates(comparison: LawComparison) -> LabelledTable:
+    parts = []
+    for r in comparison.results:
+        values = estimates_of(r.fit, fixed=r.model.fixed_numbers).rename_dims(unknown="row")
+        laws = ("row", [r.law] * values.sizes["row"])
+        parts.append(values.reset_index("unknown").assign_coords(law=laws))
+    data = xr.concat(parts, "row")
+    return LabelledTable(
+        "estimates",
+        data[["law", "unknown", *data.data_vars]],
+        "Estimated values",
+        "Estimated values of each law with 95 % confidence intervals.",
     )
-    caption = "Root mean square error of each test and law, absolute and by the largest measured."
-    laws = (Column(r.law, comparison.unit) for r in comparison.results)
-    return Table(caption, ("file", "motion", "test", *laws), groups, text_columns=3)
 
 
-def _pictures(comparison: LawComparison, kind: str, what: str) -> tuple[Picture, ...]:
+def _plots(comparison: LawComparison, kind: str, what: str) -> tuple[Plot, ...]:
     every = [tested for tested in comparison.tested if tested.kind == kind]
     if not every:
         return ()
@@ -211,7 +184,7 @@ def _pictures(comparison: LawComparison, kind: str, what: str) -> tuple[Picture,
     )
     best = comparison.supported.law
     return tuple(
-        picture(
+        Plot(
             rival_loops_figure(chosen, best=best, over=over),
             f"Measured samples and the loop of each law over {over}, {what}.",
             f"Force over {over}, {what} (form of [C] Figs. 13, 15-20). {number}The offset and "
@@ -221,54 +194,17 @@ def _pictures(comparison: LawComparison, kind: str, what: str) -> tuple[Picture,
     )
 
 
-def _warnings(comparison: LawComparison, missing: Sequence[str]) -> list[str]:
+def _warnings(comparison: LawComparison) -> list[str]:
     supported = comparison.supported
-    warnings = [*supported.judgement.hints, *missing]
-    if supported.judgement.verdict == "poor":
-        warnings.insert(0, "None of these laws describes the tests.")
-    return [*warnings, *bounds_sentences(comparison)]
-
-
-def bounds_sentences(comparison: LawComparison) -> list[str]:
-    """Return a sentence for each value at a bound of its search."""
+    poor = ["None of these laws describes the tests."]
     return [
-        f"{r.law}: the value of {e.name} is at its {e.at_bound} bound; wider --bounds may fit "
-        "better."
-        for r in comparison.results
-        for e in r.fit.estimates
-        if e.at_bound and ".rise_" not in e.name
+        *(poor if supported.judgement.verdict == "poor" else []),
+        *supported.judgement.hints,
+        *(
+            f"{r.law}: the value of {e.name} is at its {e.at_bound} bound; wider --bounds may fit "
+            "better."
+            for r in comparison.results
+            for e in r.fit.estimates
+            if e.at_bound and ".rise_" not in e.name
+        ),
     ]
-
-
-@dataclass(frozen=True)
-class IdentifyComparisonResult(IdentifyResult):
-    """Several laws that were fitted to the same tests."""
-
-    comparison: LawComparison
-    page = comparison_page
-
-    @property
-    def laws(self) -> dict[str, FittedLaw]:
-        """All laws."""
-        return {f"identified_{law.law}.yaml": law for law in self.comparison.results}
-
-    def tables(self) -> dict[str, pd.DataFrame]:
-        """Return measures, values and errors of the laws, and all samples."""
-        return {
-            "laws": laws_table(self.comparison),
-            "parameters": parameters_by_law(self.comparison),
-            "errors": errors_by_law(self.comparison),
-            "loops": loops_by_law(self.comparison),
-        }
-
-    def fit_as_dict(self) -> dict[str, Any]:
-        """Return the comparison for JSON, in SI."""
-        return self.comparison.as_dict()
-
-    def terminal(self) -> Printed:
-        """Return what the data say about the laws, their measures, and remarks."""
-        comparison = self.comparison
-        table = laws_shown(comparison).terminal(self.component.title)
-        motions = (*comparison.motions, *comparison.validation)
-        sentences = (*comparison.sentences, *motion_sentences(motions))
-        return [*sentences, table, *bounds_sentences(comparison), *self.missing]

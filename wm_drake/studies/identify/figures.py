@@ -11,7 +11,8 @@ from wm_drake.rigs.measured import HarmonicMotion, MeasuredMotion
 from wm_drake.studies.fitting.fit import Fit
 from wm_drake.studies.identify.comparison import TestedLoop
 from wm_drake.studies.rig.figures import loop_panel
-from wm_drake.studies.rig.units import units_of
+from wm_drake.studies.rig.quantities import loop_quantities
+from wm_drake.studies.rig.study import FREQUENCY
 
 COLUMNS = 4
 """Largest number of panels in a row."""
@@ -22,13 +23,13 @@ def motion_text(measured: MeasuredMotion) -> str:
 
     The range goes from the least to the greatest displacement.
     """
-    units = units_of(measured.loop.rotates)
+    motion = loop_quantities(measured.loop.rotates)["displacement"]
     if not isinstance(measured, HarmonicMotion):
-        ends = [float(units.factor * side(measured.position)) for side in (np.min, np.max)]
+        ends = [float(side(measured.position)) for side in (np.min, np.max)]
         negligible = 1e-9 * (ends[1] - ends[0])  # rounding of an end at zero
         low, high = (0.0 if abs(end) < negligible else end for end in ends)
-        return f"as recorded, {low:.3g} to {high:.3g} {units.unit}"
-    return f"{measured.motion.frequency:.3g} Hz, {units.text(measured.motion.amplitude)}"
+        return f"as recorded, {motion.number(low)} to {motion.text(high)}"
+    return f"{FREQUENCY.text(measured.motion.frequency)}, {motion.text(measured.motion.amplitude)}"
 
 
 def loops_figure(fit: Fit, motions: Sequence[MeasuredMotion], *, over: str) -> Figure:
@@ -72,15 +73,17 @@ def _panel(
         lines: By entry of the legend: colour and force (n,).
         over: Abscissa: displacement or velocity.
     """
-    units = units_of(measured.loop.rotates)
-    x = units.factor * (measured.position if over == "displacement" else measured.rate)
+    quantities = loop_quantities(measured.loop.rotates)
+    motion, load = quantities[over], quantities["load"]
+    x = motion.values(measured.position if over == "displacement" else measured.rate)
     order = drawing_order(measured)
-    force = measured.loop.force - offset
+    force = load.values(measured.loop.force - offset)
     samples = Points(x, force, color=MEASURED, size=3.0, opacity=0.4, key="measured")
     marks: list[Mark] = [samples]
     for key, (color, computed) in lines.items():
-        marks.append(Line(x[order], computed[order], color=color, width=2.0, key=key))
-    return loop_panel(motion_text(measured), marks, units.label(over), units.force_label)
+        y = load.values(computed)[order]
+        marks.append(Line(x[order], y, color=color, width=2.0, key=key))
+    return loop_panel(motion_text(measured), marks, motion.label, load.label)
 
 
 MOST_PANELS = 12

@@ -6,14 +6,19 @@ from pathlib import Path
 
 from wm_drake.errors import InputError, Problem, check_known, input_error, nearest_names
 from wm_drake.parameters import DAMPER_LAWS, MeasuredLoop, quantities, read_loops
-from wm_drake.parameters.units import Unit
+from wm_drake.parameters.units import Share, Unit
+from wm_drake.report.quantity import Quantity
 from wm_drake.report.terminal import say
 from wm_drake.rigs.measured import MeasuredMotion, inertia_share, measured_motion, without_inertia
 from wm_drake.studies.components import Target, existing_files
 from wm_drake.studies.fitting.methods import METHODS
 from wm_drake.studies.identify.models import Given, fields_of_law, unit_of_field, units_of_fields
 from wm_drake.studies.identify.options import IdentifyOptions
+from wm_drake.studies.identify.problem import motion_sentences
 from wm_drake.studies.inputs import LOOP_WORDS, channel_names, pairs_of, quantities_of
+from wm_drake.studies.rig.study import FREQUENCY
+
+PART = Quantity("part", Share(), form="{:.3g}".format)
 
 
 def loops_of(files: Sequence[Path], options: IdentifyOptions) -> list[MeasuredLoop]:
@@ -21,7 +26,7 @@ def loops_of(files: Sequence[Path], options: IdentifyOptions) -> list[MeasuredLo
     names, default = channel_names(options, LOOP_WORDS)
     if default:
         raise input_error(f"'{default}' is not NAME=UNIT", where="--unit")
-    units = units_of(options.units)
+    units = units_of(options.file_units)
     return read_loops(existing_files(files), replace(names, units={**units, **names.units}))
 
 
@@ -37,9 +42,9 @@ def motions_of(
     check_known(options.method, METHODS, f"no method '{options.method}'", where="--method")
     cutoff = None
     if options.cutoff is not None:
-        cutoff = quantities_of(options.cutoff, Unit("Hz", "Hz"), "--cutoff")[0]
+        cutoff = quantities_of(options.cutoff, FREQUENCY.unit, "--cutoff")[0]
         if not cutoff > 0.0:
-            raise input_error(f"is {cutoff:g} Hz; allowed is > 0", where="--cutoff")
+            raise input_error(f"is {FREQUENCY.text(cutoff)}; allowed is > 0", where="--cutoff")
     loops = loops_of(files, options)
     if loops[0].rotates != rotates:
         holds, needs = ("angles and moments", "displacements and forces")[
@@ -60,21 +65,23 @@ def motions_of(
             inertia, share = inertia_share(motion, driven_mass)
             say(
                 f"{motion.loop.name}: {driven_mass:g} kg at the driven end take up to "
-                f"{inertia:.3g} N, {100.0 * share:.3g} % of the measured force; taken out.",
+                f"{inertia:.3g} N, {PART.text(share)} of the measured force; taken out.",
                 err=True,
             )
         motions = [without_inertia(motion, driven_mass) for motion in motions]
+    for text in motion_sentences(motions):
+        say(text, err=True)
     return motions
 
 
 def units_of(text: str | None) -> dict[str, str]:
-    """Return the units of time, displacement and force of the option `--units`, by word."""
+    """Return the units of time, displacement and force of the option `--file-units`, by word."""
     if text is None:
         return {}
     parts = [part.strip() for part in text.split(",")]
     if len(parts) != 3:
         raise input_error(
-            f"'{text}' is not three units; write for example 's,mm,N'", where="--units"
+            f"'{text}' is not three units; write for example 's,mm,N'", where="--file-units"
         )
     return dict(zip(LOOP_WORDS, (parts[0], parts[1], parts[1], parts[2], parts[2]), strict=True))
 

@@ -2,12 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.stats import f as fisher
 
 from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import Share
+from wm_drake.report.quantity import Quantity
 from wm_drake.rigs.measured import HarmonicMotion, MeasuredMotion
 from wm_drake.studies.fitting.fit import FAIR, Fit, FitVerdict, verdict_of
 from wm_drake.studies.fitting.problem import rmse
@@ -22,6 +23,14 @@ delay between the sensors."""
 NOISE_FREEDOM = 0.19
 """Degrees of freedom of `noise_of` by the number of samples: 18/35 for the squares of these
 differences (Gasser, Sroka, Jennen-Steinmetz 1986), times 0.37 for a median in place of a mean."""
+
+
+def two_digits(size: float) -> str:
+    """Return a number with two digits, or more above 100."""
+    return f"{size:.0f}" if size >= 10.0 else f"{size:.2g}"
+
+
+LACK = Quantity("lack of fit", Share(), form=two_digits)
 
 
 @dataclass(frozen=True)
@@ -113,7 +122,7 @@ class Judgement:
     @property
     def sentences(self) -> tuple[str, ...]:
         """The verdict in words, then hints on its cause and on single loops."""
-        missed, noise = per_cent(self.missed), per_cent(self.noise)
+        missed, noise = LACK.text(self.missed), LACK.text(self.noise)
         known = (
             f"the lack of fit is {missed} of the measured {self.quantity} (root mean square), "
             f"the noise {noise}"
@@ -156,30 +165,12 @@ class Judgement:
             )
         return tuple(hints)
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the judgement for JSON, in SI."""
-        return {
-            "verdict": self.verdict,
-            "missed": self.missed,
-            "noise": self.noise,
-            "hints": list(self.hints),
-            "loops": [
-                {
-                    "name": loop.name,
-                    "missed": loop.missed,
-                    "noise": loop.noise,
-                    "work_per_cycle_J": loop.work if np.isfinite(loop.work) else None,
-                }
-                for loop in self.loops
-            ],
-        }
-
     def _poor_loops(self) -> list[str]:
         poor = [loop.name for loop in self.loops if loop.missed > FAIR]
         if not poor:
             return []
         return [
-            f"The law misses more than {100.0 * FAIR:.0f} % of the {self.quantity} in {len(poor)} "
+            f"The law misses more than {LACK.text(FAIR)} of the {self.quantity} in {len(poor)} "
             f"of {len(self.loops)} loops: {_named(poor, len(self.loops))}."
         ]
 
@@ -194,12 +185,6 @@ class Judgement:
 
 MOST_NAMED = 3
 """Largest number of loops that a sentence names."""
-
-
-def per_cent(part: float) -> str:
-    """Return a part as a percentage of two digits, or more above 100 %."""
-    size = 100.0 * part
-    return f"{size:.0f} %" if size >= 10.0 else f"{size:.2g} %"
 
 
 def _named(names: Sequence[str], total: int) -> str:

@@ -2,14 +2,9 @@
 
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from wm_drake.studies.component_options import ARM, AXIS, JIG_MASS, OUTER_MASS, ComponentOptions
-from wm_drake.studies.study import Options, Study, imported, option
-
-UNITS: Any = option(
-    None, "Of time, displacement, force, where files do not say: 's,mm,N'.", "UNITS"
-)
+from wm_drake.studies.study import Study, imported, option
 
 
 class IdentifyOptions(ComponentOptions):
@@ -34,7 +29,9 @@ class IdentifyOptions(ComponentOptions):
     fix: tuple[str, ...] = option(
         (), "A number that is known: slider_damping='0.4 N s/mm'. Repeatable.", "KEY=VALUE"
     )
-    units: str | None = UNITS
+    file_units: str | None = option(
+        None, "Of time, displacement, force, where files do not say: 's,mm,N'.", "UNITS"
+    )
     cutoff: str | None = option(
         None,
         "Take each motion as recorded, smoothed so that this frequency is halved: '50 Hz'.",
@@ -86,51 +83,27 @@ class IdentifyAxisOptions(IdentifyOptions):
     arm: str | None = ARM
 
 
-class IdentifyTable2Options(Options):
-    """Options of [C] Table 2."""
-
-    files: tuple[Path, ...] = option(
-        (), "Measured sines; by default loops of the shipped MSTV damper.", "[FILES...]", "argument"
-    )
-    friction_force: str | None = option(
-        None, "f_max of the Coulomb model, not printed in [C]; 45 N by default.", "FORCE"
-    )
-    units: str | None = UNITS
-
-
-IDENTIFY = (
-    *(
-        Study(
-            kind,
-            about,
-            options,
-            partial(imported("wm_drake.studies.identify.task:task_of"), kind),
-            has_runs=False,
-            group="identify",
-            has_machine=False,
-            folder="wm-drake-identify",
-        )
-        for kind, about, options in (
-            (
-                "damper",
-                "Identify a friction damper; a curve of its law is found as a monotone table. "
-                "Several laws are fitted to the same files and compared. Forces of inertia of "
-                "masses at the driven end are printed and taken out of the measured ones.",
-                IdentifyDamperOptions,
-            ),
-            ("bushing", "One axis of a six-component bushing.", IdentifyAxisOptions),
-            ("gasket", "One axis of the gasket.", IdentifyAxisOptions),
-        )
-    ),
+IDENTIFY = tuple(
     Study(
-        "table2",
-        "Fit k1 and c1 of the Coulomb model to each test alone, beside [C] Table 2.",
-        IdentifyTable2Options,
-        imported("wm_drake.studies.identify.table2:IdentifyTable2Task"),
+        kind,
+        about,
+        options,
+        partial(imported("wm_drake.studies.identify.task:task_of"), kind),
         has_runs=False,
         group="identify",
         has_machine=False,
-        folder="wm-drake-table2",
-    ),
+        folder="wm-drake-identify",
+    )
+    for kind, about, options in (
+        (
+            "damper",
+            "Identify a friction damper; a curve of its law is found as a monotone table. Several "
+            "laws are fitted to the same files and compared. Forces of inertia of masses at the "
+            "driven end are printed and taken out of the measured ones.",
+            IdentifyDamperOptions,
+        ),
+        ("bushing", "One axis of a six-component bushing.", IdentifyAxisOptions),
+        ("gasket", "One axis of the gasket.", IdentifyAxisOptions),
+    )
 )
 """Commands that identify a component."""

@@ -1,35 +1,26 @@
-"""Page and tables of a fit to the loops of a component."""
+"""Show the fit of one law to measured loops: loops, values, errors."""
 
-import json
-from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Any, ClassVar
 
 import numpy as np
-import pandas as pd
+import xarray as xr
 
-from wm_drake.report.page import Section, SectionedPage, picture
-from wm_drake.report.table import Column, Table, table_of
-from wm_drake.report.terminal import Printed
-from wm_drake.rigs.measured import HarmonicMotion, MeasuredMotion, RecordedMotion
-from wm_drake.studies.fitting.fit import Fit
-from wm_drake.studies.fitting.page import (
-    correlations_table,
-    estimates_frame,
-    history_picture,
-    search_facts,
-    undetermined_sentences,
-    values_table,
-)
+from wm_drake.parameters.units import Unit
+from wm_drake.report.labelled import LabelledTable
+from wm_drake.report.quantity import HIDDEN, TIME, Quantity
+from wm_drake.rigs.measured import HarmonicMotion, MeasuredMotion
+from wm_drake.studies.answer import Answer, Part, Plot
+from wm_drake.studies.fitting.page import errors_of, fit_parts, search_facts
 from wm_drake.studies.identify.comparison import FittedLaw
-from wm_drake.studies.identify.figures import loops_figure, motion_text
+from wm_drake.studies.identify.figures import loops_figure
 from wm_drake.studies.identify.fragment import FittedComponent, fragment
-from wm_drake.studies.identify.judgement import Judgement, judge, per_cent
-from wm_drake.studies.identify.models import ComponentModel
-from wm_drake.studies.rig.units import units_of
-from wm_drake.studies.study import Facts, Result
+from wm_drake.studies.identify.judgement import LACK
+from wm_drake.studies.identify.problem import motion_sentences
+from wm_drake.studies.rig.quantities import loop_quantities
+from wm_drake.studies.rig.study import ENERGY, FREQUENCY
+
+PHASE = Quantity("phase", Unit("rad", "rad"))
+SAMPLES = Quantity("samples", decimals=0)
 
 METHOD = (
     "The RMSE is that of [A] Eq. (1) and [C] Eq. (5), over all samples of all files. The offset "
@@ -41,158 +32,170 @@ METHOD = (
 )
 
 
-def identify_page(result: "IdentifyFitResult", facts: Facts) -> str:
-    """Return the page as text of one self-contained HTML file."""
-    fit, motions, judgement = result.fit, result.motions, result.judgement
-    loops = tuple(
-        picture(
+def fit_answer(
+    component: FittedComponent, law: FittedLaw, motions: Sequence[MeasuredMotion]
+) -> Answer:
+    """Return the answer of the fit of one law."""
+    fit = law.fit
+    plots = [
+        Plot(
             loops_figure(fit, motions, over=over),
             f"Measured samples and the fitted loop, one panel per file, over {over}.",
             f"Force over {over}: measured samples and fitted loop. The offset and drift of the "
             "instrument are removed from both.",
         )
         for over in ("displacement", "velocity")
+    ]
+    load = load_of(motions)
+    loops = LabelledTable("loops", _samples(law, motions), is_in_json=False)
+    search, values, correlations, _ = fit_parts(fit, load, fixed=law.model.fixed_numbers)
+    laws = {"identified.yaml": law}
+    return Answer(
+        f"Identification of {component.title}, law {law.law}",
+        _summary(law, load),
+        None,
+        (
+            Part("Measured and fitted loops", (*plots, loops), remarks=motion_sentences(motions)),
+            search,
+            values,
+            Part("Errors", (_errors(law, motions), LabelledTable("fit", _whole(law, load)))),
+            correlations,
+        ),
+        (*search_facts(fit), ("Loops", str(len(motions)))),
+        METHOD,
+        files_of(component, laws),
+        (*_warnings(law), *missing_files(component, laws)),
     )
-    unit = units_of(motions[0].loop.rotates).force_unit
-    values = values_table(fit, result.model.fixed_numbers)
-    undetermined = " ".join(undetermined_sentences(fit))
-    correlations = [correlations_table(fit)] if fit.estimates else []
-    sections = [
-        Section("loops", "Measured and fitted loops", loops),
-        Section("search", "Search", [history_picture(fit, unit)] if fit.log.history else []),
-        Section("values", "Values", tables=(values,), text=undetermined),
-        Section("errors", "Errors", tables=(_errors(fit, motions, judgement),)),
-        Section("correlations", "Correlations", tables=correlations),
-    ]
-    made = [*search_facts(fit), *(("Motion", text) for text in motion_sentences(motions))]
-    return SectionedPage(
-        f"Identification of {result.title}",
-        _summary(fit, motions, judgement),
-        sections,
-        [*made, *facts.rows()],
-        warnings=_warnings(fit, judgement),
-        about=f"Fit to {len(motions)} measured loop{'s' if len(motions) > 1 else ''}.",
-        method=METHOD,
-    ).html()
 
 
-def errors_table(fit: Fit, motions: Sequence[MeasuredMotion], judgement: Judgement) -> pd.DataFrame:
-    """Return the RMSE of each test, as [A] Tables 2, 4, 5 and 7, with noise and lack of fit."""
-    rows = []
-    for test, measured, judged in zip(fit.tests, motions, judgement.loops, strict=True):
-        units = units_of(measured.loop.rotates)
-        rows.append(
-            {
-                "file": measured.loop.path,
-                "frequency_hz": frequency_of(measured),
-                f"amplitude_{units.unit}": units.factor * measured.stroke,
-                f"rmse_{units.in_heads}": test.rmse,
-                "rmse_by_largest_force": test.normalised,
-                f"noise_{units.in_heads}": judged.noise,
-                "lack_of_fit_by_rms_force": judged.missed,
-                "work_per_cycle_J": judged.work,
-            }
+def load_of(motions: Sequence[MeasuredMotion]) -> Quantity:
+    """Return the quantity of the force or moment of tests, with significant digits."""
+    load = loop_quantities(motions[0].loop.rotates)["load"]
+    return Quantity(load.words, load.unit)
+
+
+def files_of(component: FittedComponent, laws: Mapping[str, FittedLaw]) -> dict[str, str]:
+    """Return the machine or component files of laws by name, without those that lack numbers."""
+    return {
+        name: fragment(
+            law.fit, law.model, component, component.copies.get(law.law), law.judgement.sentences
         )
-    return pd.DataFrame(rows)
-
-
-def motion_sentences(motions: Sequence[MeasuredMotion]) -> list[str]:
-    """Return a sentence for each test whose own displacement drives the law, on its smoothing."""
-    sentences = []
-    for m in motions:
-        if not isinstance(m, RecordedMotion):
-            continue
-        units = units_of(m.loop.rotates)
-        smoothing = (
-            f"smoothed by a cubic spline that halves a motion at {m.cutoff:.3g} Hz; "
-            f"{units.factor * m.noise:.2g} {units.unit} (root mean square) is taken out as noise"
-            if np.isfinite(m.cutoff)
-            else "interpolated by a cubic spline without smoothing"
-        )
-        begin = (
-            "a sponge begins in the steady state of the first period"
-            if m.repeats
-            else "a sponge begins without deformation"
-        )
-        sentences.append(
-            f"{m.loop.name} is no sine: its displacement drives the law as recorded, {smoothing}; "
-            f"{begin}."
-        )
-    return sentences
-
-
-def frequency_of(measured: MeasuredMotion) -> float:
-    """Return the frequency of a sine; NaN for another motion. [Hz]"""
-    return measured.motion.frequency if isinstance(measured, HarmonicMotion) else float("nan")
-
-
-def fitted_loops(fit: Fit, motions: Sequence[MeasuredMotion]) -> pd.DataFrame:
-    """Return the measured and the fitted force at every sample. [SI]"""
-    parts = [
-        pd.DataFrame(
-            {
-                "file": measured.loop.name,
-                "time_s": measured.loop.time,
-                "phase_rad": measured.phase if isinstance(measured, HarmonicMotion) else np.nan,
-                "measured": measured.loop.force,
-                "fitted": fit.computed[where],
-            }
-        )
-        for measured, where in zip(motions, fit.problem.slices, strict=True)
-    ]
-    return pd.concat(parts, ignore_index=True)
-
-
-def _errors(fit: Fit, motions: Sequence[MeasuredMotion], judgement: Judgement) -> Table:
-    units = units_of(motions[0].loop.rotates)
-    force, in_heads = units.force, units.in_heads
-    columns = {
-        "file": Column("file"),
-        "motion": Column("motion"),
-        "samples": Column("samples", decimals=0),
-        f"rmse_{in_heads}": Column("RMSE", units.force_unit),
-        "rmse_by_largest_force": Column(f"RMSE / largest {force}", decimals=4),
-        f"noise_{in_heads}": Column("noise", units.force_unit),
-        "lack_of_fit_by_rms_force": Column("lack of fit"),
+        for name, law in laws.items()
+        if not component.missing(name, law)
     }
-    frame = errors_table(fit, motions, judgement).assign(
-        file=[measured.loop.name for measured in motions],
-        motion=[motion_text(measured) for measured in motions],
-        samples=[len(measured.position) for measured in motions],
-        lack_of_fit_by_rms_force=[per_cent(judged.missed) for judged in judgement.loops],
-    )
-    caption = (
+
+
+def missing_files(component: FittedComponent, laws: Mapping[str, FittedLaw]) -> list[str]:
+    """Return sentences on files that are not written, because their numbers are not complete."""
+    return [text for name, law in laws.items() for text in component.missing(name, law)]
+
+
+def motions_of_tests(motions: Sequence[MeasuredMotion]) -> dict[str, xr.Variable]:
+    """Return frequency (NaN for a motion that is no sine) and amplitude of tests, over `test`."""
+    amplitude = loop_quantities(motions[0].loop.rotates)["displacement"].named("amplitude")
+    frequencies = [m.motion.frequency if isinstance(m, HarmonicMotion) else np.nan for m in motions]
+    return {
+        "file": xr.Variable("test", [m.loop.path for m in motions], {HIDDEN: True}),
+        "frequency": FREQUENCY.variable("test", frequencies),
+        "amplitude": amplitude.variable("test", [m.stroke for m in motions]),
+        "samples": SAMPLES.variable("test", [len(m.position) for m in motions]),
+    }
+
+
+def _errors(law: FittedLaw, motions: Sequence[MeasuredMotion]) -> LabelledTable:
+    """Return the RMSE of each test, with noise and lack of fit."""
+    load, judged = load_of(motions), law.judgement.loops
+    errors = errors_of(law.fit, load)
+    numbers = {
+        "noise": load.named("noise").variable("test", [loop.noise for loop in judged]),
+        "lack_of_fit": LACK.variable("test", [loop.missed for loop in judged]),
+        "work_per_cycle": ENERGY.variable("test", [loop.work for loop in judged]),
+    }
+    return LabelledTable(
+        "errors",
+        xr.Dataset(motions_of_tests(motions), errors.coords).assign(
+            {**errors.data_vars, **numbers}
+        ),
+        "Errors",
         "Root mean square error (RMSE) of each test, absolute and relative to the largest measured "
-        f"{force}, as [A] Tables 2, 4, 5 and 7. The noise follows from the differences between "
-        "samples of nearly the same phase. The lack of fit is what the noise does not explain, "
-        f"relative to the root mean square of the measured {force}."
+        f"{load.words}, as [A] Tables 2, 4, 5 and 7. The noise follows from the differences "
+        "between samples of nearly the same phase. The lack of fit is what the noise does not "
+        f"explain, relative to the root mean square of the measured {load.words}.",
     )
-    return table_of(frame[list(columns)], caption, columns)
 
 
-def _warnings(fit: Fit, judgement: Judgement) -> list[str]:
+def _whole(law: FittedLaw, load: Quantity) -> xr.Dataset:
+    """Return method, RMSE and judgement of a fit as one row."""
+    fit, judgement = law.fit, law.judgement
+    return xr.Dataset(
+        {
+            "method": ((), fit.log.method),
+            "rmse": load.variable((), fit.rmse),
+            "verdict": ((), judgement.verdict),
+            "lack_of_fit": LACK.variable((), judgement.missed),
+            "noise": LACK.variable((), judgement.noise),
+            "hints": ((), " ".join(judgement.hints)),
+            "condition": ((), fit.condition),
+            "evaluations": ((), fit.log.evaluations),
+        }
+    )
+
+
+def _samples(law: FittedLaw, motions: Sequence[MeasuredMotion]) -> xr.Dataset:
+    """Return the measured and the fitted force at every sample."""
+    computed = {"fitted": [law.fit.computed[where] for where in law.fit.problem.slices]}
+    return samples_of(motions, computed)
+
+
+def samples_of(
+    motions: Sequence[MeasuredMotion], computed: Mapping[str, Sequence[np.ndarray]]
+) -> xr.Dataset:
+    """Return time, phase, measured and computed forces of tests at every sample.
+
+    Args:
+        computed: Forces at the samples of each test, by name. [N; N m]
+    """
+    load = load_of(motions)
+    phases = [
+        m.phase if isinstance(m, HarmonicMotion) else np.full(len(m.position), np.nan)
+        for m in motions
+    ]
+    columns = {
+        "time": (TIME, [m.loop.time for m in motions]),
+        "phase": (PHASE, phases),
+        "measured": (load, [m.loop.force for m in motions]),
+        **{name: (load, forces) for name, forces in computed.items()},
+    }
+    names = np.repeat([m.loop.name for m in motions], [len(m.position) for m in motions])
+    return xr.Dataset(
+        {
+            name: quantity.variable("sample", np.concatenate(parts))
+            for name, (quantity, parts) in columns.items()
+        },
+        {"file": ("sample", names)},
+    )
+
+
+def _warnings(law: FittedLaw) -> list[str]:
+    judgement, estimates = law.judgement, law.fit.estimates
     # A rise of a monotone curve that is zero means a flat piece, which needs no warning.
-    flat = [e.name for e in fit.estimates if ".rise_" in e.name and e.at_bound == "lower"]
-    is_good = judgement.verdict == "good"
-    warnings = [*judgement.sentences[1 if is_good else 0 :]]
+    flat = [e.name for e in estimates if ".rise_" in e.name and e.at_bound == "lower"]
+    warnings = list(judgement.sentences[judgement.verdict == "good" :])
     warnings += [
         f"The value of {e.name} is at its {e.at_bound} bound."
-        for e in fit.estimates
+        for e in estimates
         if e.at_bound and e.name not in flat
     ]
-    unknown = [e.name for e in fit.estimates if not e.determined]
+    unknown = [e.name for e in estimates if not e.determined]
     if unknown:
         warnings.append(f"The data do not determine {', '.join(unknown)}.")
     return warnings
 
 
-def _summary(fit: Fit, motions: Sequence[MeasuredMotion], judgement: Judgement) -> str:
-    units = units_of(motions[0].loop.rotates)
-    name, unit = units.force, units.force_unit
+def _summary(law: FittedLaw, load: Quantity) -> str:
+    fit, judgement = law.fit, law.judgement
     normalised = [test.normalised for test in fit.tests]
     determined = sum(e.determined for e in fit.estimates)
-    least, most = (per_cent(value) for value in (min(normalised), max(normalised)))
-    opening = judgement.sentences[0] + " " if judgement.verdict == "good" else ""
     if not fit.estimates:
         ending = "All numbers were given; nothing was searched."
     elif judgement.verdict == "poor":
@@ -203,103 +206,8 @@ def _summary(fit: Fit, motions: Sequence[MeasuredMotion], judgement: Judgement) 
     else:
         ending = f"The data determine {determined} of {len(fit.estimates)} unknowns."
     return (
-        f"{opening}The root mean square difference (RMSE) between fitted and measured loops is "
-        f"{fit.rmse:.3g} {unit} over all samples. For single tests it is {least} to {most} of "
-        f"the largest {name}. {ending}"
+        f"{judgement.sentences[0]} The root mean square difference (RMSE) between fitted and "
+        f"measured loops is {load.text(fit.rmse)} over all samples. For single tests it is "
+        f"{LACK.text(min(normalised))} to {LACK.text(max(normalised))} of the largest "
+        f"{load.words}. {ending}"
     )
-
-
-@dataclass(frozen=True)
-class IdentifyResult(Result):
-    """Result with identified numbers. CSV files have all digits, but for the samples of loops."""
-
-    component: FittedComponent
-    float_format: ClassVar[str | None] = None
-    float_formats: ClassVar[Mapping[str, str]] = {"loops": "%.7g"}
-
-    @property
-    @abstractmethod
-    def laws(self) -> Mapping[str, FittedLaw]:
-        """Fitted laws by the names of the machine or component files with their numbers."""
-
-    @abstractmethod
-    def fit_as_dict(self) -> dict[str, Any]:
-        """Return the fit or the comparison for JSON, in SI."""
-
-    @property
-    def title(self) -> str:
-        """Component, for headings."""
-        return self.component.title
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the fit or the comparison for JSON, in SI."""
-        return {"component": self.title, **self.fit_as_dict()}
-
-    @property
-    def missing(self) -> list[str]:
-        """Sentences on files that are not written, because their numbers are not complete."""
-        return [
-            text for name in self.laws for text in self.component.missing(name, self.laws[name])
-        ]
-
-    def texts(self) -> dict[str, str]:
-        """Return the identified numbers of each law, and the fit as JSON."""
-        files = {}
-        for name, law in self.laws.items():
-            if not self.component.missing(name, law):
-                copies = self.component.copies.get(law.model.law)
-                remarks = law.judgement.sentences
-                files[name] = fragment(law.fit, law.model, self.component, copies, remarks)
-        return files | {"fit.json": json.dumps(self.fit_as_dict(), indent=1)}
-
-
-@dataclass(frozen=True)
-class IdentifyFitResult(IdentifyResult):
-    """Fit of one law."""
-
-    model: ComponentModel
-    fit: Fit
-    motions: Sequence[MeasuredMotion]
-    page = identify_page
-
-    @property
-    def title(self) -> str:
-        """Component and law, for headings."""
-        return f"{self.component.title}, law {self.model.law}"
-
-    @cached_property
-    def judgement(self) -> Judgement:
-        """Judgement of the fit."""
-        return judge(self.fit, self.motions)
-
-    @property
-    def laws(self) -> dict[str, FittedLaw]:
-        """The fitted law."""
-        return {"identified.yaml": FittedLaw(self.model, self.fit, self.judgement)}
-
-    def tables(self) -> dict[str, pd.DataFrame]:
-        """Return the values, the error of each test, and all samples."""
-        return {
-            "parameters": estimates_frame(self.fit, self.model.fixed_numbers),
-            "errors": errors_table(self.fit, self.motions, self.judgement),
-            "loops": fitted_loops(self.fit, self.motions),
-        }
-
-    def fit_as_dict(self) -> dict[str, Any]:
-        """Return the fit for JSON, in SI."""
-        return {
-            **self.fit.as_dict(),
-            "fixed": {
-                name: {"value": value, "unit": unit.si}
-                for name, value, unit in self.model.fixed_numbers
-            },
-            "judgement": self.judgement.as_dict(),
-        }
-
-    def terminal(self) -> Printed:
-        """Return the judgement, the values, and remarks."""
-        fit, unit = self.fit, units_of(self.motions[0].loop.rotates).force_unit
-        title = f"{self.title}: RMSE {fit.rmse:.4g} {unit} by {fit.log.method}"
-        table = values_table(fit, self.model.fixed_numbers).terminal(title)
-        remarks = [*undetermined_sentences(fit), *fit.log.notes, *self.missing]
-        return [*self.judgement.sentences, *motion_sentences(self.motions), table, *remarks]

@@ -14,6 +14,8 @@ from wm_drake.rigs.measured import HarmonicMotion, MeasuredMotion, RecordedMotio
 from wm_drake.rigs.recorded import recorded_forces
 from wm_drake.studies.fitting.problem import FitProblem, Measurement
 from wm_drake.studies.identify.models import ComponentModel
+from wm_drake.studies.rig.quantities import loop_quantities
+from wm_drake.studies.rig.study import FREQUENCY
 
 MOST_ROWS = 32
 """Benches that are integrated side by side. More of them share hardly more work, and all step as
@@ -111,3 +113,28 @@ def _damper_forces(benches: Sequence[Bench], motions: Sequence[HarmonicMotion]) 
             forces.append(damper_tensions(m.rate, sponge, bench.packed))
         rows.append(np.concatenate(forces))
     return np.array(rows)
+
+
+def motion_sentences(motions: Sequence[MeasuredMotion]) -> list[str]:
+    """Return a sentence for each test whose own displacement drives the law, on its smoothing."""
+    sentences = []
+    for m in motions:
+        if not isinstance(m, RecordedMotion):
+            continue
+        motion = loop_quantities(m.loop.rotates)["displacement"]
+        smoothing = (
+            f"smoothed by a cubic spline that halves a motion at {FREQUENCY.text(m.cutoff)}; "
+            f"{motion.text(m.noise)} (root mean square) is taken out as noise"
+            if np.isfinite(m.cutoff)
+            else "interpolated by a cubic spline without smoothing"
+        )
+        begin = (
+            "a sponge begins in the steady state of the first period"
+            if m.repeats
+            else "a sponge begins without deformation"
+        )
+        sentences.append(
+            f"{m.loop.name} is no sine: its displacement drives the law as recorded, {smoothing}; "
+            f"{begin}."
+        )
+    return sentences

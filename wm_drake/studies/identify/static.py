@@ -2,15 +2,19 @@
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any, TypeAlias
 
 import numpy as np
+import xarray as xr
 
 from wm_drake.errors import input_error
 from wm_drake.parameters import MeasuredLoop
 from wm_drake.parameters.types import FloatArray
+from wm_drake.report.quantity import Quantity
 from wm_drake.rigs.smoothing import smoothed
+from wm_drake.studies.rig.quantities import loop_quantities
+from wm_drake.studies.rig.study import ENERGY
 
 SPONGE = "sponge"
 """Name in place of an axis, and field of a damper type, for the sponge of a free-stroke damper."""
@@ -28,78 +32,10 @@ NOMINAL = 0.2
 """Part of the curve whose linear fit gives the nominal stiffness, as in [B] section 4."""
 
 
+TESTS = Quantity("tests", decimals=0)
+
 StaticSignal: TypeAlias = tuple[FloatArray, FloatArray, FloatArray]
 """Smoothed displacement, force and rate of a test."""
-
-
-@dataclass(frozen=True, eq=False)
-class StaticCurve:
-    """Quasi-static behaviour along or about one axis.
-
-    Attributes:
-        axis: One of `wm_drake.rigs.AXES`, or `SPONGE`.
-        loops: Recorded tests.
-        position: Places over the range, zero among them (m,). [m; rad]
-        loading, unloading: Mean force of the branches that rise and fall in displacement, where
-            friction has developed, without offset; NaN elsewhere (m,). [N; N m]
-        elastic: Their mean, zero at zero (m,). [N; N m]
-        half_width: Half the difference of loading and unloading (m,); NaN where one is missing. [N;
-            N m]
-        offset: What was taken off the force so that the elastic curve goes through zero. [N; N m]
-        stiffness: Slope of a line through zero, fitted to the first 20 % of the elastic curve.
-            [N/m; N m/rad]
-        energy: Mean work that a way through the whole range and back takes. [J]
-        fastest: Median absolute rate. [m/s; rad/s]
-        fallen: Largest fall of the elastic curve that the table cannot have. [N; N m]
-    """
-
-    axis: str
-    loops: tuple[MeasuredLoop, ...]
-    position: FloatArray
-    loading: FloatArray
-    unloading: FloatArray
-    elastic: FloatArray
-    half_width: FloatArray
-    offset: float
-    stiffness: float
-    energy: float
-    fastest: float
-    fallen: float
-
-    @property
-    def rotates(self) -> bool:
-        """Whether it is a curve of moment over angle."""
-        return self.axis.startswith("about")
-
-    @property
-    def friction(self) -> float:
-        """Median half width of the hysteresis. [N; N m]"""
-        return float(np.nanmedian(self.half_width))
-
-    def table(self, knots: int) -> dict[str, tuple[float, ...]]:
-        """Return the monotone table of the elastic curve.
-
-        Args:
-            knots: Points on each side of zero, where the range has that side.
-        """
-        places = _places(float(self.position[0]), float(self.position[-1]), knots)
-        force = np.interp(places, self.position, _never_falling(self.position, self.elastic))
-        names = ("angle", "torque") if self.rotates else ("displacement", "force")
-        return dict(zip(names, (tuple(places.tolist()), tuple(force.tolist())), strict=True))
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the measures for JSON, in SI."""
-        return {
-            "axis": self.axis,
-            "files": [loop.name for loop in self.loops],
-            "range": [float(self.position[0]), float(self.position[-1])],
-            "nominal_stiffness": self.stiffness,
-            "half_width_of_hysteresis": self.friction,
-            "energy_per_cycle_J": self.energy,
-            "offset": self.offset,
-            "median_rate": self.fastest,
-            "largest_fall": self.fallen,
-        }
 
 
 def field_of(axis: str) -> str:
@@ -109,7 +45,26 @@ def field_of(axis: str) -> str:
     return f"{'rotational_' if axis.startswith('about') else ''}stiffness_{axis[-1]}"
 
 
-def static_curve(axis: str, loops: Sequence[MeasuredLoop]) -> StaticCurve:
+def is_about(axis: str) -> bool:
+    """Return whether tests of an axis have moments over angles."""
+    return axis.startswith("about")
+
+
+def table_of_curve(curve: xr.Dataset, knots: int) -> dict[str, tuple[float, ...]]:
+    """Return the monotone table of the mean curve. [SI]
+
+    Args:
+        curve: As of `static_curve`.
+        knots: Points on each side of zero, where the range has that side.
+    """
+    position = curve.position.values
+    places = _places(float(position[0]), float(position[-1]), knots)
+    force = np.interp(places, position, _never_falling(position, curve["mean"].values))
+    names = ("angle", "torque") if is_about(curve.axis) else ("displacement", "force")
+    return dict(zip(names, (tuple(places.tolist()), tuple(force.tolist())), strict=True))
+
+
+def static_curve(axis: str, loops: Sequence[MeasuredLoop]) -> xr.Dataset:
     """Return force table and hysteresis of quasi-static tests of one axis.
 
     A test goes to one or both sides of the rest position and back, any number of times. It is split
@@ -120,6 +75,17 @@ def static_curve(axis: str, loops: Sequence[MeasuredLoop]) -> StaticCurve:
     Args:
         axis: One of `wm_drake.rigs.AXES`, or `SPONGE`.
         loops: Tests of this axis, at least one.
+
+    Returns:
+        Over `place`: `position` in the range, zero among them [m; rad]; mean force of the branches
+        that rise, `loading`, and fall, `unloading`, in displacement, where friction has developed,
+        without offset, NaN elsewhere; their `mean`, zero at zero; half of their difference,
+        `half_width` [N; N m]. Over no dimension: `offset`, taken off the force so that the mean
+        goes through zero, and `hysteresis`, the median half width [N; N m]; nominal `stiffness`,
+        the slope of a line through zero fitted to the first 20 % of the mean [N/m; N m/rad];
+        `energy_per_cycle`, work of a way through the whole range and back [J]; `median_rate`
+        [m/s; rad/s]; `largest_fall` of the mean, which a table cannot have [N; N m]; number of
+        `tests`. The attribute `axis` is the axis.
 
     Raises:
         InputError: The motion does not contain zero, or does not come back.
@@ -154,19 +120,28 @@ def static_curve(axis: str, loops: Sequence[MeasuredLoop]) -> StaticCurve:
     offset = float(np.interp(0.0, places, elastic))
     elastic = elastic - offset
     first = np.abs(places) <= NOMINAL * max(high, -low) * (1.0 + 1e-9)
-    return StaticCurve(
-        axis,
-        tuple(loops),
-        places,
-        loading - offset,
-        unloading - offset,
-        elastic,
-        half,
-        offset,
-        float(np.sum(places[first] * elastic[first]) / np.sum(np.square(places[first]))),
-        energy * 2.0 * (high - low) / way,
-        float(np.median(np.concatenate([np.abs(rate) for _, _, rate in signals]))),
-        float(np.max(np.abs(_never_falling(places, elastic) - elastic))),
+    fallen = np.max(np.abs(_never_falling(places, elastic) - elastic))
+    rates = np.concatenate([np.abs(rate) for _, _, rate in signals])
+    slope = np.sum(places[first] * elastic[first]) / np.sum(np.square(places[first]))
+    quantities = loop_quantities(is_about(axis))
+    load = replace(quantities["load"], decimals=None)
+    numbers: dict[str, tuple[Quantity, Any]] = {
+        "position": (quantities["displacement"], places),
+        "loading": (load.named("loading"), loading - offset),
+        "unloading": (load.named("unloading"), unloading - offset),
+        "mean": (load.named("mean"), elastic),
+        "half_width": (load.named("half width of hysteresis"), half),
+        "stiffness": (replace(quantities["stiffness"], decimals=None), slope),
+        "hysteresis": (load.named("half width of hysteresis"), np.nanmedian(half)),
+        "energy_per_cycle": (ENERGY, energy * 2.0 * (high - low) / way),
+        "offset": (load.named("offset"), offset),
+        "median_rate": (quantities["velocity"].named("median rate"), np.median(rates)),
+        "largest_fall": (load.named("largest fall"), fallen),
+        "tests": (TESTS, len(loops)),
+    }
+    return xr.Dataset(
+        {name: q.variable(("place",)[: np.ndim(v)], v) for name, (q, v) in numbers.items()},
+        attrs={"axis": axis},
     )
 
 

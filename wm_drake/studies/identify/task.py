@@ -6,24 +6,38 @@ from pathlib import Path
 from typing import Any
 
 from wm_drake.errors import input_error
-from wm_drake.parameters.units import Unit
 from wm_drake.rigs.measured import MeasuredMotion
+from wm_drake.studies.answer import Answer
 from wm_drake.studies.components import axes_of, existing_files, mass_of, target_of
 from wm_drake.studies.executor import Executor
-from wm_drake.studies.identify.comparison import SplitTests, check_blind, compare_laws, fit_law
-from wm_drake.studies.identify.comparison_page import IdentifyComparisonResult
+from wm_drake.studies.identify.comparison import (
+    FittedLaw,
+    SplitTests,
+    check_blind,
+    compare_laws,
+    fit_law,
+)
+from wm_drake.studies.identify.comparison_page import comparison_answer
 from wm_drake.studies.identify.fragment import FittedComponent
 from wm_drake.studies.identify.inputs import given_by_law, kept_fields, motions_of
-from wm_drake.studies.identify.models import ComponentModel, TestedAxis, bushing_model, damper_model
+from wm_drake.studies.identify.judgement import judge
+from wm_drake.studies.identify.models import (
+    LENGTH,
+    ComponentModel,
+    TestedAxis,
+    bushing_model,
+    damper_model,
+)
 from wm_drake.studies.identify.options import (
     IdentifyAxisOptions,
     IdentifyDamperOptions,
     IdentifyOptions,
 )
-from wm_drake.studies.identify.page import IdentifyFitResult
-from wm_drake.studies.identify.static_tests import IdentifyStaticTask
+from wm_drake.studies.identify.page import fit_answer
+from wm_drake.studies.identify.static_task import IdentifyStaticTask
 from wm_drake.studies.inputs import pairs_of, quantities_of
-from wm_drake.studies.study import Result, Task
+from wm_drake.studies.rig.study import DRIVEN_MASS, SPONGE_MASS
+from wm_drake.studies.study import Task
 
 
 class IdentifyTask(Task):
@@ -46,7 +60,7 @@ class IdentifyTask(Task):
                 driven_mass=driven_mass,
             )
 
-    def run(self, executor: Executor) -> Result:
+    def run(self, executor: Executor) -> Answer:
         """Fit one law, or compare several."""
         names, options = list(self.models), self.options
         component = replace(self.component, out=executor.out or Path())
@@ -60,7 +74,8 @@ class IdentifyTask(Task):
                     seed=options.seed,
                     progress=lambda fraction, least: bar(fraction),
                 )
-            return IdentifyFitResult(component, model, fit, self.motions)
+            law = FittedLaw(model, fit, judge(fit, self.motions))
+            return fit_answer(component, law, self.motions)
         with executor.fractions(names) as bars:
             comparison = compare_laws(
                 self.models,
@@ -69,7 +84,7 @@ class IdentifyTask(Task):
                 seed=options.seed,
                 progress=lambda law, fraction: bars(names.index(law), fraction),
             )
-        return IdentifyComparisonResult(component, comparison)
+        return comparison_answer(component, comparison)
 
 
 class IdentifyDamperTask(IdentifyTask):
@@ -90,8 +105,10 @@ class IdentifyDamperTask(IdentifyTask):
             for one, numbers in given.items()
         }
         parts = [f"damper {target.component.name}"]
-        parts += [f"sponge of {1e3 * sponge:g} g"] if sponge else []
-        parts += [f"less the inertia of {driven:g} kg at the driven end"] if driven else []
+        parts += [f"sponge of {SPONGE_MASS.text(sponge)}"] if sponge else []
+        parts += (
+            [f"less the inertia of {DRIVEN_MASS.text(driven)} at the driven end"] if driven else []
+        )
         changes = dict(pairs_of(options.sets, "--set"))
         self.component = FittedComponent(target, Path(), changes, ", ".join(parts))
         self._read_validation(driven)
@@ -107,7 +124,7 @@ class IdentifyAxisTask(IdentifyTask):
         if options.axis is None:
             raise input_error("is needed, for example --axis radial", where="--axis")
         axes = axes_of(options.axis)
-        arm = quantities_of(options.arm, Unit("m", "mm"), "--arm")[0] if options.arm else 0.0
+        arm = quantities_of(options.arm, LENGTH, "--arm")[0] if options.arm else 0.0
         given = given_by_law(options.law, axes[0], options)
         rotates = axes[0].startswith("about") and not arm
         self.motions = motions_of(options.files, options, rotates=rotates)

@@ -400,7 +400,7 @@ def _bodies(setup: Setup) -> dict[str, Body]:
         M_B = part.CalcSpatialInertiaInBodyFrame(context)
         central = M_B.Shift(M_B.get_com()).CalcRotationalInertia().ReExpress(X_TB.rotation())
         matrix = central.CopyToFullMatrix3()
-        inertia = {
+        inertia: dict[str, Any] = {
             key: float(matrix["xyz".index(key[0]), "xyz".index(key[1])])
             for key in InertiaMatrix.model_fields
         }

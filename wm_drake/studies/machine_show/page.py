@@ -19,7 +19,7 @@ from wm_drake.report.page import as_json, fragment
 from wm_drake.report.quantity import SPEED, Quantity
 from wm_drake.studies.answer import Answer, Part
 from wm_drake.studies.machine_show.description import Description, description_of
-from wm_drake.studies.machine_show.elements import Spring, Strut, TelescopicDamper
+from wm_drake.studies.machine_show.elements import Damper, Spring, Strut, TelescopicDamper
 from wm_drake.studies.modes.quantities import FREQUENCY
 
 MASS = Quantity("mass", Unit("kg", "kg"))
@@ -62,14 +62,17 @@ def machine_answer(machine: Machine, warnings: Sequence[str]) -> Answer:
     """
     parameters, shown = machine.parameters, description_of(machine)
     things = [*_things(Scene(parameters), shown)]
-    valid = f"Machine '{parameters.name}' is valid"
+    unusual = f"; {len(warnings)} unusual values are named above" if warnings else ""
+    slowest, *_, fastest = shown.natural_frequencies_hz
     return Answer(
         f"Machine {parameters.name}",
-        f"{valid}; {len(warnings)} unusual values are named above." if warnings else f"{valid}.",
+        f"Machine '{parameters.name}' is valid{unusual}. {MASS.text(shown.oscillating_mass_kg)} "
+        f"oscillate, at natural frequencies from {FREQUENCY.number(slowest)} to "
+        f"{FREQUENCY.text(fastest)}.",
         parameters,
         (
             Part("The machine at rest", body=lambda: _view(things)),
-            Part("Springs and dampers at rest", (_mounts(shown),)),
+            Part("Springs and dampers at rest", _mounts(shown)),
             Part("Bodies", (_bodies(shown),)),
         ),
         (("SDF model", Path(parameters.model).name),),
@@ -114,8 +117,8 @@ def _facts(shown: Description) -> list[tuple[str, str]]:
     ]
 
 
-def _mounts(shown: Description) -> LabelledTable:
-    """Return stiffness or law, tension and length of springs and dampers."""
+def _mounts(shown: Description) -> tuple[LabelledTable, ...]:
+    """Return stiffness or law, tension and length of springs and dampers; nothing without any."""
     springs, dampers = shown.springs, shown.dampers
     names = [*(f"spring {name}" for name in springs), *(f"damper {name}" for name in dampers)]
     struts: list[Strut] = [*springs.values(), *dampers.values()]
@@ -130,7 +133,7 @@ def _mounts(shown: Description) -> LabelledTable:
         {"part": names},
     )
     title = "Springs and dampers at rest"
-    return LabelledTable("mounts", data, title, f"{title}.")
+    return (LabelledTable("mounts", data, title, f"{title}."),) if names else ()
 
 
 def _stiffness(spring: Spring) -> str:
@@ -189,7 +192,8 @@ def _elements(shown: Description, tub: RigidTransform) -> Iterator[Thing]:
         tension = TENSION.text(spring.tension_at_rest)
         words = f"spring {name}: {_stiffness(spring)}, tension at rest {tension}"
         yield _thing("spring", name, words, [_between(spring, tub)])
-    for name, damper in (*shown.dampers.items(), *shown.telescopic_dampers.items()):
+    dampers: dict[str, Damper | TelescopicDamper] = {**shown.dampers, **shown.telescopic_dampers}
+    for name, damper in dampers.items():
         yield _thing("damper", name, f"damper {name}: {damper.law}", [_between(damper, tub)])
     for name, bushing in shown.bushings.items():
         lines = _mark(tub @ np.array(bushing.tub_point_T), 3.0 * MARK_ARM)

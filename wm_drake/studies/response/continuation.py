@@ -129,9 +129,10 @@ def follow(
     """
     metric = _Metric(balance, float(np.ptp(speeds)))
     way = 1.0 if speeds[-1] > speeds[0] else -1.0
-    place = metric.place(first, float(speeds[0]), balance, None, way)
+    place = metric.place(first, float(speeds[0]), way)
     points = [_point(balance, place, True, way)]
     step, low, high = np.inf, min(speeds), max(speeds)
+    keep_speed = np.zeros(first.shape), 1.0
     while len(points) < MOST_POINTS * len(speeds):
         target = _next_speed(speeds, place.speed, place.speed_along)
         if target is None:
@@ -141,7 +142,8 @@ def follow(
         length = reach if landing else step
         begin = place.coefficients + length * place.along
         ahead = target if landing else place.speed + length * place.speed_along
-        reached = _step(balance, metric, place, length, begin, ahead, landing)
+        across = keep_speed if landing else metric.row(place.along, place.speed_along)
+        reached = _step(metric, place, length, (begin, ahead), across)
         if (
             reached is not None
             and not landing
@@ -150,7 +152,8 @@ def follow(
             # the branch reached the speed of the grid before its tangent did: stop there first
             share = (target - place.speed) / (reached[0].speed - place.speed)
             begin = place.coefficients + share * (reached[0].coefficients - place.coefficients)
-            reached = _step(balance, metric, place, length, begin, target, landing := True)
+            landing = True
+            reached = _step(metric, place, length, (begin, target), keep_speed)
         if reached is None:
             step = 0.5 * min(step, reach, 4.0)
             if step < SHORTEST_STEP:
@@ -179,6 +182,7 @@ class _Metric:
     """Size of a step along a branch."""
 
     def __init__(self, balance: HarmonicBalance, span: float) -> None:
+        self.balance = balance
         self.weights = (balance.scale / LENGTH) ** 2
         self.speed_weight = 1.0 / (SPEEDS * span) ** 2
 
@@ -193,49 +197,39 @@ class _Metric:
         )
         return along / size, float(speed_along / size)
 
-    def place(
-        self,
-        coefficients: FloatArray,
-        speed: float,
-        balance: HarmonicBalance,
-        before: _Place | None,
-        way: float,
-    ) -> _Place:
-        """Return a motion with the tangent of its branch; it goes on from the place before."""
-        at = balance.linearised(coefficients, speed)
-        if before is None:
-            row, row_speed = np.zeros(coefficients.shape), way
-        else:
-            row, row_speed = self.row(before.along, before.speed_along)
-        along, speed_along = Corrections(balance, at, row, row_speed)(None, 1.0)
+    def place(self, coefficients: FloatArray, speed: float, way: float) -> _Place:
+        """Return a motion with the tangent of its branch, which begins with rising speed or not.
+
+        Args:
+            coefficients, speed: The motion.
+            way: 1 for rising speed, -1 for falling speed.
+        """
+        at, row = self.balance.linearised(coefficients, speed), np.zeros(coefficients.shape)
+        along, speed_along = Corrections(self.balance, at, row, way)(None, 1.0)
         return _Place(coefficients, speed, *self.unit(along, speed_along))
 
 
 def _step(
-    balance: HarmonicBalance,
     metric: _Metric,
     place: _Place,
     length: float,
-    begin: FloatArray,
-    speed: float,
-    landing: bool,
+    guess: tuple[FloatArray, float],
+    row: tuple[FloatArray, float],
 ) -> tuple[_Place, bool] | None:
     """Return the next place along a branch, and whether it was found at once; None if not found.
 
     Args:
         place: Where the step begins.
         length: Arc length of the step.
-        begin, speed: First guess of the motion and its speed.
-        landing: Whether the speed is kept; else the motion is on the plane across the tangent.
+        guess: First guess of the motion and its speed.
+        row: Last equation of the corrections: the speed is kept, or the motion is on the plane
+            across the tangent.
     """
-    row = metric.row(place.along, place.speed_along)
-    if landing:
-        row = np.zeros(begin.shape), 1.0
-    solved = _solved(balance, begin, speed, row)
+    solved = _solved(metric.balance, *guess, row)
     if solved is None:
         return None
     coefficients, speed, solve, corrections = solved
-    if balance.extent(coefficients - begin) / LENGTH > 0.5 * max(length, 0.05):
+    if metric.balance.extent(coefficients - guess[0]) / LENGTH > 0.5 * max(length, 0.05):
         return None
     ahead = _turned(metric, place, coefficients, speed, solve)
     if ahead is None:
@@ -269,7 +263,7 @@ def _solved(
         if not np.all(np.isfinite(change)):
             return None
         if count == 0 and FAST * last < size < NEAR:
-            share = _share(balance, coefficients, speed, residual, change, faster)
+            share = _share(balance, (coefficients, speed), residual, (change, faster))
             change, faster = share * change, share * faster
         coefficients = coefficients + change
         speed += faster
@@ -316,11 +310,9 @@ def _turned(
 
 def _share(
     balance: HarmonicBalance,
-    coefficients: FloatArray,
-    speed: float,
+    motion: tuple[FloatArray, float],
     residual: FloatArray,
-    change: FloatArray,
-    faster: float,
+    correction: tuple[FloatArray, float],
 ) -> float:
     """Return the part of a correction that makes the residual smaller.
 
@@ -328,13 +320,15 @@ def _share(
     that whole corrections go to and fro across the bend for ever.
 
     Args:
-        coefficients, speed, residual: The motion before the correction.
-        change, faster: Correction of the coefficients and of the speed.
+        motion: Coefficients and speed before the correction.
+        residual: Their residual.
+        correction: Correction of the coefficients and of the speed.
     """
+    (coefficients, speed), (change, faster) = motion, correction
     share, before = 1.0, float(np.linalg.norm(residual))
     while share > SMALLEST_SHARE:
-        motion, ahead = coefficients + share * change, speed + share * faster
-        if np.linalg.norm(balance.residual(motion, ahead)) < (1.0 - 0.1 * share) * before:
+        there = coefficients + share * change, speed + share * faster
+        if np.linalg.norm(balance.residual(*there)) < (1.0 - 0.1 * share) * before:
             break
         share *= 0.5
     return share
@@ -370,7 +364,7 @@ def _at_speed(balance: HarmonicBalance, guess: FloatArray, speed: float) -> Floa
         size = balance.extent(change)
         if not np.isfinite(size):
             return None
-        share = _share(balance, coefficients, speed, residual, change, 0.0)
+        share = _share(balance, (coefficients, speed), residual, (change, 0.0))
         if share <= SMALLEST_SHARE and size < STUCK:
             return coefficients
         coefficients = coefficients + share * change

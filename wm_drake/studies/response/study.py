@@ -64,12 +64,12 @@ class ResponseSettings:
 
     @property
     def threads(self) -> int:
-        """Number of threads."""
+        """Return the number of threads."""
         return self.workers or os.cpu_count() or 1
 
     @property
     def run_threads(self) -> int:
-        """Number of threads of the runs; the responses use the other ones meanwhile."""
+        """Return the number of threads of the runs; the responses use the others meanwhile."""
         return max(1, self.threads // 2)
 
 

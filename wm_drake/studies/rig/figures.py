@@ -11,8 +11,8 @@ from wm_drake.report import figure as fig
 from wm_drake.report.quantity import TIME
 from wm_drake.rigs import ForceLoop, RigRun
 from wm_drake.rigs.run import slider_friction_curves
+from wm_drake.studies.rig.quantities import LINEAR, loop_quantities
 from wm_drake.studies.rig.study import FREQUENCY
-from wm_drake.studies.rig.units import LINEAR, units_of
 
 COLUMNS = 4
 """Largest number of panels in a row."""
@@ -25,7 +25,7 @@ def frequency_text(loop: ForceLoop) -> str:
 
 def amplitude_text(loop: ForceLoop) -> str:
     """Return the amplitude of a loop with its unit."""
-    return units_of(loop.rotates).text(loop.motion.amplitude)
+    return loop_quantities(loop.rotates)["displacement"].text(loop.motion.amplitude)
 
 
 def overlaid_figure(
@@ -54,15 +54,16 @@ def overlaid_figure(
         sorted({text(loop) for loop in loops}, key=order.__getitem__) for text in (panel, line)
     )
     columns = min(COLUMNS, max(2, len(panels)))
-    units, shown = units_of(loops[0].rotates), []
+    quantities, shown = loop_quantities(loops[0].rotates), []
+    x, y = quantities[over], quantities["load"]
     for title in panels:
         marks: list[fig.Mark] = []
         for loop in (loop for loop in loops if panel(loop) == title):
-            values = units.over(over).values(getattr(loop, over))
+            values = x.values(getattr(loop, over))
             key = line(loop)
             color = _color(lines.index(key), len(lines))
             marks.append(fig.Line(_closed(values), _closed(loop.force), color=color, key=key))
-        shown.append(loop_panel(title, marks, units.label(over), units.force_label))
+        shown.append(loop_panel(title, marks, x.label, y.label))
     placed = fig.in_grid(shown, columns, share="y")
     return fig.Figure(panels=placed, height=190.0, widths=(1.0,) * columns, keys=tuple(lines))
 
@@ -73,11 +74,11 @@ def time_figure(loop: ForceLoop, points: Mapping[str, int]) -> fig.Figure:
     Args:
         points: Samples that get a letter on the force, from `stroke_points`.
     """
-    units = units_of(loop.rotates)
-    force = units.force_label
+    quantities = loop_quantities(loop.rotates)
+    force = quantities["load"].label
     time = np.append(loop.time, 1.0 / loop.motion.frequency)
     at = list(points.values())
-    displacement = units.displacement.values(_closed(loop.displacement))
+    displacement = quantities["displacement"].values(_closed(loop.displacement))
     motion = fig.Line(time, displacement, color=fig.QUIET, dash="dashed")
     of_time = fig.Line(time, _closed(loop.force), width=2.2, is_second=True)
     reach, largest = (1.13 * float(np.abs(one.y).max()) or 1.0 for one in (motion, of_time))
@@ -91,7 +92,7 @@ def time_figure(loop: ForceLoop, points: Mapping[str, int]) -> fig.Figure:
             ),
             x=fig.Axis(label=TIME.label),
             y=fig.Axis(
-                label=f"{units.label('displacement')} (dashed)",
+                label=f"{quantities['displacement'].label} (dashed)",
                 color=fig.QUIET,
                 range=(-reach, reach),
             ),
@@ -99,10 +100,11 @@ def time_figure(loop: ForceLoop, points: Mapping[str, int]) -> fig.Figure:
         )
     ]
     for over in ("displacement", "velocity"):
-        x = units.over(over).values(getattr(loop, over))
+        quantity = quantities[over]
+        x = quantity.values(getattr(loop, over))
         curve = fig.Line(_closed(x), _closed(loop.force), width=2.2)
         letters = _letters(points, x[at], loop.force[at])
-        panels.append(loop_panel("", [curve, *letters], units.label(over), force))
+        panels.append(loop_panel("", [curve, *letters], quantity.label, force))
     return fig.Figure(panels=fig.in_grid(panels, 3), height=220.0)
 
 
@@ -133,16 +135,16 @@ def friction_law_figure(run: RigRun) -> fig.Figure | None:
         return None
     marks = [
         fig.Line(
-            LINEAR.velocity.values(w),
+            LINEAR["velocity"].values(w),
             curve,
             color=_color(k, len(rates)),
             width=2.0,
-            key=f"deformation rate of the sponge {LINEAR.velocity.text(rate)}",
+            key=f"deformation rate of the sponge {LINEAR['velocity'].text(rate)}",
         )
         for k, (rate, curve) in enumerate(zip(rates, curves, strict=True))
     ]
-    x = LINEAR.velocity.named("sliding velocity of the sponge on the tube").label
-    y = LINEAR.load.named("friction force on the sponge").label
+    x = LINEAR["velocity"].named("sliding velocity of the sponge on the tube").label
+    y = LINEAR["load"].named("friction force on the sponge").label
     return fig.Figure(panels=(loop_panel("", marks, x, y),), height=240.0)
 
 

@@ -18,8 +18,8 @@ from wm_drake.studies.rig.figures import (
     overlaid_figure,
     time_figure,
 )
+from wm_drake.studies.rig.quantities import loop_quantities
 from wm_drake.studies.rig.study import loop_data
-from wm_drake.studies.rig.units import units_of
 
 METHOD = (
     "Steady-state force loops under harmonic motion, computed with the force laws. The driven end "
@@ -148,7 +148,7 @@ def _plots(run: RigRun) -> list[Plot]:
 
 
 def _summary(run: RigRun, measures: xr.Dataset) -> str:
-    name = units_of(run.bench.rotates).force
+    name = loop_quantities(run.bench.rotates)["load"].words
     peaks, energies = measures[f"peak_{name}"], measures.energy_per_cycle
     if len(run.loops) == 1:
         loop = run.loops[0]

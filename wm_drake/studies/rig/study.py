@@ -11,12 +11,14 @@ from wm_drake.parameters.components import COMPONENTS_FOLDER
 from wm_drake.parameters.units import Share, Unit
 from wm_drake.report.quantity import TIME, Quantity
 from wm_drake.rigs import Bench, BushingBench, ForceLoop, Harmonic, RigRun
-from wm_drake.studies.rig.units import LINEAR, units_of
+from wm_drake.studies.rig.quantities import LINEAR, loop_quantities
 
 SAMPLES_KEPT = 4
 """Step between the samples of a loop that are kept."""
 
 FREQUENCY = Quantity("frequency", Unit("Hz", "Hz"), form="{:.3g}".format)
+SPONGE_MASS = Quantity("mass of the sponge", Unit("kg", "g"), form="{:g}".format)
+DRIVEN_MASS = Quantity("mass at the driven end", Unit("kg", "kg"), form="{:g}".format)
 ENERGY = Quantity("energy per cycle", Unit("J", "mJ"))
 LOSS_ANGLE = Quantity("loss angle", Unit("rad", "deg"), 1)
 RMSE_OF_A = Quantity("RMSE in [A]", decimals=4)
@@ -62,7 +64,7 @@ def printed_errors(kind: str, bench: Bench, motions: Sequence[Harmonic]) -> list
     rows = table[(table.component == kind) & (table.axis == printed_axis(bench))]
     rmse = rows.set_index(["frequency_hz", "amplitude_mm"])["rmse"]
     return [
-        float(rmse[m.frequency, LINEAR.displacement.values(m.amplitude).round(6).item()])
+        float(rmse[m.frequency, LINEAR["displacement"].values(m.amplitude).round(6).item()])
         for m in motions
     ]
 
@@ -77,12 +79,12 @@ def printed_verdict(kind: str, bench: Bench) -> str:
 
 def loop_data(loop: ForceLoop) -> xr.Dataset:
     """Return a loop over its samples: time, displacement, velocity, force; or angle, moment."""
-    units = units_of(loop.rotates)
+    quantities = loop_quantities(loop.rotates)
     values = {
         TIME: loop.time,
-        units.displacement: loop.displacement,
-        units.velocity: loop.velocity,
-        units.load: loop.force,
+        quantities["displacement"]: loop.displacement,
+        quantities["velocity"]: loop.velocity,
+        quantities["load"]: loop.force,
     }
     return xr.Dataset(
         {q.words: q.variable("sample", signal[::SAMPLES_KEPT]) for q, signal in values.items()}
@@ -91,16 +93,17 @@ def loop_data(loop: ForceLoop) -> xr.Dataset:
 
 def measures_data(run: RigRun) -> xr.Dataset:
     """Return the quantities derived from each loop, as of `LoopMeasures`, over `loop`."""
-    units, measures = units_of(run.bench.rotates), run.measures
+    quantities, measures = loop_quantities(run.bench.rotates), run.measures
+    load = quantities["load"]
     numbers = {
         **_motions_of(run),
-        f"peak_{units.force}": (
-            units.load.named(f"peak {units.force}"),
+        f"peak_{load.words}": (
+            load.named(f"peak {load.words}"),
             [m.peak_force for m in measures],
         ),
         "energy_per_cycle": (ENERGY, [m.energy_per_cycle for m in measures]),
-        "equivalent_damping": (units.damping, [m.equivalent_damping for m in measures]),
-        "dynamic_stiffness": (units.stiffness, [m.dynamic_stiffness for m in measures]),
+        "equivalent_damping": (quantities["damping"], [m.equivalent_damping for m in measures]),
+        "dynamic_stiffness": (quantities["stiffness"], [m.dynamic_stiffness for m in measures]),
         "loss_angle": (LOSS_ANGLE, [m.loss_angle for m in measures]),
     }
     return xr.Dataset({name: q.variable("loop", values) for name, (q, values) in numbers.items()})
@@ -113,7 +116,9 @@ def effect_of_masses(run: RigRun, massless: RigRun) -> xr.Dataset:
         `frequency` [Hz], `amplitude` [m], `peak_force_without` masses, `peak_force`,
         `rms_difference` and `largest_difference` [N], the last one by the peak without masses.
     """
-    load = replace(units_of(run.bench.rotates).load, decimals=None)  # differences may be small
+    load = replace(
+        loop_quantities(run.bench.rotates)["load"], decimals=None
+    )  # differences may be small
     loops, bare = (np.array([loop.force for loop in one.loops]) for one in (run, massless))
     peaks, largest = (np.abs(forces).max(axis=1) for forces in (bare, loops - bare))
     by_peak = np.divide(largest, peaks, out=np.full(len(peaks), np.nan), where=peaks > 0.0)
@@ -131,7 +136,7 @@ def effect_of_masses(run: RigRun, massless: RigRun) -> xr.Dataset:
 
 def _motions_of(run: RigRun) -> dict[str, tuple[Quantity, list[float]]]:
     """Return frequency and amplitude of each loop."""
-    amplitude = units_of(run.bench.rotates).displacement.named("amplitude")
+    amplitude = loop_quantities(run.bench.rotates)["displacement"].named("amplitude")
     return {
         "frequency": (FREQUENCY, [loop.motion.frequency for loop in run.loops]),
         "amplitude": (amplitude, [loop.motion.amplitude for loop in run.loops]),

@@ -4,8 +4,6 @@ from typing import Any
 
 from wm_drake.errors import check_known, input_error
 from wm_drake.parameters import Component, quantities
-from wm_drake.parameters.units import Unit
-from wm_drake.report.quantity import Quantity
 from wm_drake.report.table import readable
 from wm_drake.rigs import (
     JIG_ARM,
@@ -24,19 +22,18 @@ from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import quantities_of
 from wm_drake.studies.rig.options import RigAxisOptions, RigDamperOptions, RigOptions
 from wm_drake.studies.rig.page import rig_answer
+from wm_drake.studies.rig.quantities import LINEAR, loop_quantities
 from wm_drake.studies.rig.study import (
+    DRIVEN_MASS,
     FREQUENCY,
     RMSE_OF_A,
+    SPONGE_MASS,
     effect_of_masses,
     measures_data,
     printed_errors,
     printed_verdict,
 )
-from wm_drake.studies.rig.units import LINEAR, units_of
 from wm_drake.studies.study import Task
-
-SPONGE_MASS = Quantity("mass of the sponge", Unit("kg", "g"), form="{:g}".format)
-DRIVEN_MASS = Quantity("mass at the driven end", Unit("kg", "kg"), form="{:g}".format)
 
 
 class RigTask(Task):
@@ -69,15 +66,14 @@ class RigTask(Task):
 
     def _set_axis(self, kind: str, options: RigAxisOptions) -> None:
         axis, name = axes_of(options.axis)[0], self.component.name
-        arm = (
-            quantities_of(options.arm, LINEAR.displacement.unit, "--arm")[0] if options.arm else 0.0
-        )
+        length = LINEAR["displacement"]
+        arm = quantities_of(options.arm, length.unit, "--arm")[0] if options.arm else 0.0
         if options.matrix is not None and axis.startswith("about") and not options.arm:
             arm = JIG_ARM
         bushing: Any = self.component.parameters
         self.bench = bushing_bench(bushing, axis, arm)
         what = kind if name == kind else f"{kind} {name}"
-        through = f", through an arm of {LINEAR.text(arm)}" if arm else ""
+        through = f", through an arm of {length.text(arm)}" if arm else ""
         self.title = f"{what}, axis {axis.replace('_', ' ')}{through}"
 
     def run(self, executor: Executor) -> Answer:
@@ -117,7 +113,7 @@ def _motions(kind: str, bench: Bench, options: RigOptions) -> list[Harmonic]:
         raise input_error(
             "needs -f and -a (for example -f '3 Hz' -a '5 mm'), or --matrix", where=f"rig {kind}"
         )
-    unit = units_of(bench.rotates).displacement.unit
+    unit = loop_quantities(bench.rotates)["displacement"].unit
     return [
         Harmonic(f, a)
         for f in quantities_of(frequency, FREQUENCY.unit, "--frequency")

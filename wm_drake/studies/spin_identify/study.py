@@ -28,7 +28,7 @@ from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.fitting.fit import Fit
-from wm_drake.studies.fitting.methods import least_squares
+from wm_drake.studies.fitting.methods import identify
 from wm_drake.studies.fitting.problem import FitProblem, Measurement, Progress, Unknown
 from wm_drake.studies.spin_cycle.measured import DIMS, RMS
 from wm_drake.studies.spin_cycle.study import average_errors, labels_of, region_errors, runs_of
@@ -257,7 +257,7 @@ def identify_from_spin(
         InputError: nothing was measured in the cases of the study.
     """
     problem = _problem(model, measured)
-    fit = least_squares(problem, seed=seed, starts=1, screened=8, progress=progress)
+    fit = identify(problem, seed=seed, starts=1, screened=8, progress=progress)
     start = np.array([s.guess for s in model.sought])
     computed = [
         measured.copy(data=values) for values in model.displacements(np.stack([start, fit.values]))
@@ -323,7 +323,8 @@ def identified_machine(model: SpinModel, fit: Fit, *, is_virtual: bool) -> Machi
 def _problem(model: SpinModel, measured: xr.DataArray) -> FitProblem:
     """Return the fit problem, whose residuals are those of [A] Eq. (9).
 
-    Each value is divided by the norm of the measured values in its case and region.
+    Each value is divided by the norm of the measured values in its case and region. Its error is a
+    part of the value, so each has a variance of its own.
     """
     is_measured = np.isfinite(measured.values)
     data = np.where(is_measured, measured.values, 0.0)
@@ -340,7 +341,7 @@ def _problem(model: SpinModel, measured: xr.DataArray) -> FitProblem:
         return [(values[..., k, :, :, :] * weights[k])[..., is_measured[k]] for k in with_data]
 
     tests = tuple(
-        Measurement(f"case {model.cases[k].name}", numbers)
+        Measurement(f"case {model.cases[k].name}", numbers, heteroscedastic=True)
         for k, numbers in zip(with_data, scaled(data), strict=True)
     )
     unknowns = tuple(s.unknown for s in model.sought)

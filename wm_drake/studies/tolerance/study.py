@@ -167,7 +167,7 @@ class ToleranceTrials:
         Args:
             scores: (n, size)
         """
-        labels = {"sample": np.arange(1, len(scores) + 1)}
+        labels = {"sample": range(1, len(scores) + 1)}
         return self.experiment.over(labels, self.uncertain.cases(scores), what)
 
     def samples(self) -> xr.Dataset:
@@ -251,7 +251,8 @@ class ToleranceTrials:
             return xr.Dataset()
         has_failed = samples.failed.values != ""
         crude = share_of((samples.smallest_gap.values <= 0.0) | has_failed)
-        ends, method, more = crude_ends(crude), CRUDE, {}
+        ends, method = crude_ends(crude), CRUDE
+        more: Mapping[str, xr.Variable] = {}
         if crude.estimate < RARE and self.settings.subset:
             settings, size = self.settings, self.uncertain.joint.size
             rare = subset_simulation(self._gaps, size, samples=settings.subset, seed=settings.seed)
@@ -380,6 +381,9 @@ def statistics_of(measures: xr.Dataset) -> xr.Dataset:
     return xr.Dataset(columns, {"statistic": names})
 
 
+LIMIT_COLUMNS = ("quantity", "limit", "verdict", "allowed", "breaks", "lower", "upper")
+
+
 def judged(measures: xr.Dataset, limits: Sequence[tuple[Limit, Response, float]]) -> xr.Dataset:
     """Return the verdict on each limit. A run that failed breaks every limit.
 
@@ -395,10 +399,8 @@ def judged(measures: xr.Dataset, limits: Sequence[tuple[Limit, Response, float]]
     """
     rows, numbers = [], dict[str, list[float]]()
     for limit, response, number in limits:
-        values, allowed = (
-            measures[name_of(response)].values,
-            fraction(limit.allowed_share, "allowed_share"),
-        )
+        values = measures[name_of(response)].values
+        allowed = fraction(limit.allowed_share, "allowed_share")
         side = "at least" if limit.at_least is not None else "at most"
         kept = values >= number if limit.at_least is not None else values <= number
         broken = share_of(~kept)
@@ -410,15 +412,13 @@ def judged(measures: xr.Dataset, limits: Sequence[tuple[Limit, Response, float]]
         numbers.setdefault(name_of(response), []).append(number)
     if not rows:
         return xr.Dataset()
-    quantity, limit, verdict, *shares = zip(*rows, strict=True)
-    words = ("allowed", "break it", "95 % from", "to")
-    named = zip(("allowed", "breaks", "lower", "upper"), words, shares, strict=True)
+    columns = dict(zip(LIMIT_COLUMNS, zip(*rows, strict=True), strict=True))
+    heads = {"allowed": "allowed", "breaks": "break it", "lower": "95 % from", "upper": "to"}
     return xr.Dataset(
         {
-            "quantity": ("row", list(quantity)),
-            "limit": ("row", list(limit)),
-            **{name: LIMIT_SHARE.named(word).variable("row", share) for name, word, share in named},
-            "verdict": ("row", list(verdict)),
+            **{name: ("row", list(columns[name])) for name in ("quantity", "limit")},
+            **{n: LIMIT_SHARE.named(w).variable("row", columns[n]) for n, w in heads.items()},
+            "verdict": ("row", list(columns["verdict"])),
         },
         attrs={"numbers": numbers},
     )

@@ -1,21 +1,25 @@
 """Show the verdict: a page whose first screen is the answer."""
 
+from dataclasses import replace
+
 import numpy as np
 import xarray as xr
 
 from wm_drake.report import figure as fig
-from wm_drake.report.formatting import listed, percent, shape_name
-from wm_drake.report.labelled import LabelledTable, TurnedTable
+from wm_drake.report.formatting import shape_name
+from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.quantity import SPEED, Quantity, shown, text_of
 from wm_drake.studies.answer import Answer, Part, Plot
+from wm_drake.studies.proposal_page import proposal_part
 from wm_drake.studies.tolerance.page import masses_text
 from wm_drake.studies.verdict.study import (
     FACTOR,
     SMALLEST_GAP,
+    STATES,
     VerdictQuestion,
+    proposal,
     smallest,
     words_of,
-    worst_of,
 )
 
 MOST_NAMED = 3
@@ -31,9 +35,6 @@ HOW_OTHERS_DIFFER = (
     "alone. Their smallest gaps differ for this reason."
 )
 """How the commands that also show a smallest gap differ."""
-
-LINE = "Line to copy"
-"""Words before the command that runs the machine with the best change."""
 
 LAUNDRY = "random laundry"
 
@@ -62,15 +63,10 @@ def verdict_answer(
             Part("Smallest gaps", (gaps_plot(question, states, laundry), *_laundry(laundry))),
             Part("What decides the gap", influences_shown(question, states, tried)),
             Part("Each load", (loads_table(question, states),)),
-            Part("What the changes cost", (cost_table(question, states),)),
             Part("Other commands with a smallest gap", text=HOW_OTHERS_DIFFER),
         ),
         (("Laundry", f"{question.laundry}; {samples}"),),
-        short=Part(
-            "In short",
-            (LabelledTable("numbers", numbers_of(question, states, word)), changes_table(states)),
-            facts=facts_of(question, states, tried, laundry, masses),
-        ),
+        short=_short(question, states, tried, laundry, masses),
         diverged=() if word == "clear" else (f"verdict: {word}",),
     )
 
@@ -119,40 +115,44 @@ def mm(value: float) -> str:
     return SMALLEST_GAP.text(value).replace(" ", "\u00a0")
 
 
-def facts_of(
+def _short(
     question: VerdictQuestion,
     states: xr.Dataset,
     tried: xr.Dataset,
     laundry: xr.Dataset,
     masses: tuple[float, float] | None,
-) -> list[tuple[str, str]]:
-    """Return the rest of the answer as pairs of word and text; arguments as `verdict_answer`."""
+) -> Part:
+    """Return the part in short: the proposal, the laundry, the margin; as `verdict_answer`."""
     loads, machine, clearance = states["load"].values.tolist(), question.machine, question.clearance
     margin = smallest(states)[0].item() - clearance
     rows = [("Random laundry", laundry_text(question, laundry.isel(state=0), question.laundry))]
+    if states.sizes["state"] > 1:
+        rows.append(("Random laundry then", laundry_text(question, laundry.isel(state=1))))
     if masses and masses[1] < max(machine.loads[name].mass for name in loads):
-        compared = masses_text(machine, loads, masses)
-        rows.append(("Its mass", f"{compared} --laundry names a file with other laundry"))
+        text = masses_text(machine, loads, masses)
+        rows.append(("Its mass", f"{text} --laundry names a file with other laundry"))
     if clearance:
         kept = "more" if margin > 0.0 else "less"
         rows.append(("Margin", f"{mm(abs(margin))} {kept} than the clearance, {mm(clearance)}"))
     else:
         rows.append(("Margin", f"{mm(margin)} to contact; --clearance '10 mm' sets another limit"))
     if tried.sizes["key"]:
-        rows.append(("What decides it", _strongest(tried)))
-    if states.sizes["state"] == 1:
-        change = FACTOR.text(question.change)
-        none = f"no change of one part by {change} makes the smallest gap larger"
-        return [*rows, ("What to change", none)]
-    rows.append(("Best single change", change_text(question, states, tried, 1)))
-    best = "none is better than the best single change"
-    if states.sizes["state"] > 2:
-        best = change_text(question, states, tried, 2)
-    rows += [
-        ("Best combination", best),
-        ("Random laundry then", laundry_text(question, laundry.isel(state=1))),
-    ]
-    return [*rows, (LINE, line_to_copy(question, states))]
+        rows.append(("What decides it", _influences_text(tried.isel(key=slice(MOST_NAMED)))))
+    words = {response.name: response.title for response in question.responses}
+    made, why = proposal(question, states, tried), why_text(question, states, tried)
+    part = proposal_part(made, why, words, rows)
+    word = word_of(question, states, laundry)
+    numbers = LabelledTable("numbers", numbers_of(question, states, word))
+    return replace(part, shown=(*part.shown, numbers))
+
+
+def why_text(question: VerdictQuestion, states: xr.Dataset, tried: xr.Dataset) -> str:
+    """Return why a change is proposed, in a sentence."""
+    keys = list(states.attrs["changes"])
+    if keys:
+        return f"Smallest gap with each changed alone: {_influences_text(tried.sel(key=keys))}."
+    change = FACTOR.text(question.change)
+    return f"No change of parts by {change} makes the smallest gap clearly larger within the limit."
 
 
 def laundry_text(question: VerdictQuestion, laundry: xr.Dataset, about: str = "") -> str:
@@ -169,44 +169,13 @@ def laundry_text(question: VerdictQuestion, laundry: xr.Dataset, about: str = ""
     )
 
 
-def _strongest(tried: xr.Dataset) -> str:
-    """Return what more and less of the strongest numbers do to the gap."""
-    of = tried.isel(key=slice(MOST_NAMED))
-    each = zip(of["key"].values.tolist(), smallest(of).values.tolist(), strict=True)
+def _influences_text(tried: xr.Dataset) -> str:
+    """Return what more and less of numbers do to the gap."""
+    each = zip(tried["key"].values.tolist(), smallest(tried).values.tolist(), strict=True)
     return "; ".join(
         f"{words_of(key)} ({mm(less)} with less, {mm(more)} with more)"
         for key, (less, more) in each
     )
-
-
-def change_text(
-    question: VerdictQuestion, states: xr.Dataset, tried: xr.Dataset, state: int
-) -> str:
-    """Return a change with what it does to the smallest gap of all loads.
-
-    Args:
-        state: Number of the state with the change.
-    """
-    parts = []
-    for key, text in states.attrs["changes"][state].items():
-        is_less = tried.text.sel(key=key, side="less").item() == text
-        change = percent(FACTOR.values(-question.change if is_less else question.change).item())
-        new = "" if text.endswith("%") else f" to {text.replace('*', ' ')}"
-        parts.append(f"{words_of(key)} {change}{new}")
-    before, *after = smallest(states).values.tolist()
-    gap = f"{mm(before)} becomes {mm(after[state - 1])}"
-    return f"{listed(parts)}: {gap}, verified by runs of all loads"
-
-
-def line_to_copy(question: VerdictQuestion, states: xr.Dataset) -> str:
-    """Return the command that runs the machine with the best change; "" without one."""
-    best = states.attrs["changes"][-1]
-    return " ".join([question.command, *_sets(best)]) if best else ""
-
-
-def _sets(changes: dict[str, str]) -> list[str]:
-    """Return the options of changes."""
-    return [f'--set "{key}={text}"' for key, text in changes.items()]
 
 
 def numbers_of(question: VerdictQuestion, states: xr.Dataset, word: str) -> xr.Dataset:
@@ -221,22 +190,12 @@ def numbers_of(question: VerdictQuestion, states: xr.Dataset, word: str) -> xr.D
         {
             "verdict": ((), word),
             **{n: SMALLEST_GAP.named(w).variable((), v) for n, (w, v) in lengths.items()},
-            "line_to_copy": ((), line_to_copy(question, states)),
         }
     )
 
 
-def changes_table(states: xr.Dataset) -> LabelledTable:
-    """Return the best changes with the smallest gap of all loads; a file and JSON have it."""
-    changed = states.isel(state=slice(1, None))
-    sets = [" ".join(_sets(changes)) for changes in states.attrs["changes"][1:]]
-    gap = SMALLEST_GAP.variable("state", smallest(changed))
-    data = xr.Dataset({"sets": ("state", sets), "smallest_gap": gap})
-    return LabelledTable("changes", data.assign_coords(state=changed["state"].values))
-
-
 def loads_table(question: VerdictQuestion, states: xr.Dataset) -> LabelledTable:
-    """Return gap, place and speed of each load, before and after the best change."""
+    """Return gap, place and speed of each load, before and after the proposed change."""
     base, best = states.isel(state=0, drop=True), states.isel(state=-1)
     runs = [base.isel(load=at) for at in range(base.sizes["load"])]
     gaps = base.smallest_gap.fillna(-np.inf)
@@ -249,7 +208,7 @@ def loads_table(question: VerdictQuestion, states: xr.Dataset) -> LabelledTable:
         {"load": base["load"].values},
     )
     if states.sizes["state"] > 1:
-        changed = SMALLEST_GAP.named("after the best change")
+        changed = SMALLEST_GAP.named(STATES[1])
         data["changed_gap"] = changed.variable("load", best.smallest_gap.fillna(-np.inf))
     return LabelledTable(
         "loads",
@@ -259,17 +218,6 @@ def loads_table(question: VerdictQuestion, states: xr.Dataset) -> LabelledTable:
         "contact; the model has no contact forces.",
         marked=("is_too_small", "alarm"),
         is_in_terminal=True,
-    )
-
-
-def cost_table(question: VerdictQuestion, states: xr.Dataset) -> TurnedTable:
-    """Return the smallest gap and the largest other responses of all loads in each state."""
-    return TurnedTable(
-        "cost",
-        worst_of(question, states),
-        "Smallest gap and largest loads",
-        "Smallest gap and largest displacements, forces of the gasket and forces of the mounts of "
-        "all loads. A change that keeps the tub away from the housing may load it more.",
     )
 
 
@@ -283,8 +231,8 @@ def _laundry(laundry: xr.Dataset) -> tuple[LabelledTable, LabelledTable]:
 
 
 def gaps_plot(question: VerdictQuestion, states: xr.Dataset, laundry: xr.Dataset) -> Plot:
-    """Return the gaps of the loads and of the laundry, before and after the best change."""
-    styles = ((0, fig.OURS, "as it is", 0.13), (-1, fig.QUIET, "after the best change", -0.13))
+    """Return the gaps of the loads and of the laundry, before and after the proposed change."""
+    styles = ((0, fig.OURS, STATES[0], 0.13), (-1, fig.QUIET, STATES[1], -0.13))
     names = [*states["load"].values.tolist(), LAUNDRY]
     clearance = SMALLEST_GAP.values(question.clearance).item()
     marks: list[fig.Mark] = [fig.Rule(0.0, "y", color=fig.MARK)]
@@ -342,9 +290,10 @@ def influences_shown(
         x=fig.Axis(label=SMALLEST_GAP.named("smallest gap of all loads").label),
         y=fig.Axis(ticks=fig.named(words[:MOST_DRAWN], at), has_grid=False),
     )
+    strongest = _influences_text(tried.isel(key=slice(MOST_NAMED)))
     plot = Plot(
         fig.Figure(panels=(panel,), height=28.0 * len(at) + 30.0),
-        f"Influence of the parts. Strongest: {_strongest(tried)}.",
+        f"Influence of the parts. Strongest: {strongest}.",
         f"Smallest gap of all loads if one number of a part is {change} smaller or larger; line: "
         "the machine as it is. Springs, dampers, bushings, gasket and counterweights are tried; a "
         "curve of forces is scaled. influences.csv has all of them.",

@@ -1,11 +1,12 @@
 """Judge a machine by all its loads and random laundry, and try changes of its parts in real runs.
 
 Nothing is interpolated: each gap that the result names is that of a run. Changes are tried one at a
-time, more and less; the best ones are then combined one after the other, as long as that helps.
+time, more and less; the best ones are then combined one after the other, as long as that helps. The
+rule of `wm_drake.studies.proposal` chooses among them.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
@@ -13,12 +14,23 @@ import xarray as xr
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.elements import CurveTable
 from wm_drake.parameters.keys import quantities
+from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Share, Unit
 from wm_drake.parameters.variation import value_at
-from wm_drake.report.formatting import shape_name
+from wm_drake.report.formatting import shape_name, three_digits
 from wm_drake.report.quantity import Quantity
-from wm_drake.simulation.measures.responses import GAP, Response
-from wm_drake.studies.experiment import Experiment, responses
+from wm_drake.simulation.measures.kind import Better
+from wm_drake.simulation.measures.responses import Response
+from wm_drake.studies.experiment import Experiment, quantity_of, responses
+from wm_drake.studies.proposal import (
+    AFTER,
+    BEFORE,
+    CHANGE,
+    Aim,
+    compared,
+    proposal_of,
+    worst_of,
+)
 from wm_drake.studies.tolerance.shares import share_of
 from wm_drake.studies.tolerance.study import COUNT, SHARE, crude_ends
 
@@ -38,11 +50,8 @@ MOST_COMBINED = 3
 MOST_TRIED = 10
 """Number of single changes, the best ones, that a combination may contain."""
 
-LEAST_GAIN = 1e-4
-"""Gain of the gap below which a change is not added. [m] Assumption: less cannot be measured."""
-
 SIDES = ("less", "more")
-STATES = ("as it is", "best single change", "best combination")
+STATES = ("as it is", "with the proposal")
 
 
 @dataclass(frozen=True)
@@ -104,57 +113,131 @@ def influences(experiment: Experiment, keys: Iterable[str], change: float) -> xr
     return runs.assign(text=(("key", "side"), shown)).isel(key=np.argsort(-span, kind="stable"))
 
 
-def combined(experiment: Experiment, base: xr.Dataset, tried: xr.Dataset) -> list[xr.Dataset]:
-    """Return the best single change, the best addition to it, and so on.
+def proposed(
+    experiment: Experiment, base: xr.Dataset, tried: xr.Dataset, chosen: Sequence[Response]
+) -> xr.Dataset | None:
+    """Return the runs of the proposed change, as of `wm_drake.studies.proposal`.
 
-    The list ends where an addition gains less than `LEAST_GAIN`.
+    The candidates are the single changes, and the best one with the best additions to it.
+
+    Args:
+        experiment: Runs of the machine with all loads.
+        base: Runs of the machine as it is, over `load`.
+        tried: As of `influences`.
+        chosen: Responses that a change may not make worse, and the gap.
+
+    Returns:
+        Runs over `load`; attribute `changes`, values as text by key path. None if no change is
+        clearly better.
+    """
+    goals, parts = goals_of(chosen), [values_of(runs, chosen) for runs in (base, tried)]
+    ranges = np.concatenate([part.reshape(-1, len(goals)) for part in parts])
+    aim = Aim(goals, ranges, worst_of(parts[0], goals))
+    if not aim.can_choose or not tried.sizes["key"]:
+        return None
+    worst = worst_of(parts[1], goals)
+    value = aim.value(worst.reshape(-1, len(goals))).reshape(worst.shape[:2])
+    ranked = np.argsort(-value.max(axis=1), kind="stable")[:MOST_TRIED]
+    singles = [tried.isel(key=k, side=value[k].argmax()) for k in ranked.tolist()]
+    runs = [one.assign_attrs(changes={one["key"].item(): one.text.item()}) for one in singles]
+    candidates = [*runs, *_combined(experiment, aim, runs, chosen)]
+    values = np.array([worst_of(values_of(one, chosen), goals) for one in candidates])
+    number = aim.proposed(values, [len(one.attrs["changes"]) for one in candidates])
+    return None if number is None else candidates[number]
+
+
+def _combined(
+    experiment: Experiment, aim: Aim, singles: Sequence[xr.Dataset], chosen: Sequence[Response]
+) -> list[xr.Dataset]:
+    """Return the runs of the best single change with each addition, then of the best pair, ...
+
+    They end where no addition is better.
+
+    Args:
+        experiment: Runs of the machine with all loads.
+        aim: What a change shall reach.
+        singles: Runs of single changes, the best one first, as of `proposed`.
+        chosen: Responses.
+    """
+    best, runs = singles[0], list[xr.Dataset]()
+    useful = {key: text for one in singles for key, text in one.attrs["changes"].items()}
+    for _ in range(MOST_COMBINED - 1):
+        made = best.attrs["changes"]
+        more = [{**made, key: text} for key, text in useful.items() if key not in made]
+        named = {"; ".join(f"{k}={t}" for k, t in each.items()): each for each in more}
+        machines = experiment.allowed(named)
+        if not machines:
+            break
+        data = experiment.at(list(machines), machines.values(), "combinations")
+        added = [data.sel(point=name).assign_attrs(changes=named[name]) for name in machines]
+        values = [worst_of(values_of(one, chosen), aim.goals) for one in (best, *added)]
+        first, *others = aim.value(np.array(values)).tolist()
+        runs += added
+        if max(others) <= first:
+            break
+        best = added[int(np.argmax(others))]
+    return runs
+
+
+def goals_of(chosen: Sequence[Response]) -> dict[str, Better]:
+    """Return which change of each response is an improvement."""
+    return {response.name: response.better for response in chosen}
+
+
+def values_of(runs: xr.Dataset, chosen: Sequence[Response]) -> FloatArray:
+    """Return the responses of runs, NaN of a run that failed. (..., loads, responses) [SI]"""
+    values = responses(runs, chosen)
+    return np.stack([values[response.name].values for response in chosen], axis=-1)
+
+
+def proposal(question: VerdictQuestion, states: xr.Dataset, tried: xr.Dataset) -> xr.Dataset:
+    """Return the proposal with its runs, as of `wm_drake.studies.proposal.proposal_of`.
+
+    Args:
+        question: What is judged.
+        states: As of `states_of`.
+        tried: As of `influences`.
+    """
+    chosen, changes = question.responses, states.attrs["changes"]
+    each = {r.name: replace(quantity_of(r), form=three_digits) for r in chosen}
+    dims = ("setting", "load", "response")
+    labels = {
+        "setting": [BEFORE, AFTER][: states.sizes["state"]],
+        "load": states["load"].values,
+        "response": list(each),
+    }
+    values = Quantity("").of_each("response", each, dims, values_of(states, chosen))
+    runs = compared(xr.DataArray(values, labels), goals_of(chosen))
+    texts = []
+    for key, text in changes.items():
+        is_less = tried.text.sel(key=key, side=SIDES[0]).item() == text
+        change = CHANGE.text(-question.change if is_less else question.change)
+        value = "of its table" if text.endswith("%") else f"({change})"
+        texts.append((words_of(key), f"{text.replace('*', ' ')} {value}", key))
+    sets = [f'--set "{key}={text}"' for key, text in changes.items()]
+    command = " ".join([question.command, *sets])
+    return proposal_of(runs, texts, is_confirmed=bool(changes), command=command)
+
+
+def states_of(base: xr.Dataset, changed: xr.Dataset | None) -> xr.Dataset:
+    """Return the runs of the machine as it is, and with the proposed change, over `state`.
 
     Args:
         base: Runs of the machine as it is, over `load`.
-        tried: As of `influences`.
+        changed: As of `proposed`.
 
     Returns:
-        Runs over `load`; attribute `changes`, values as text by key path.
+        The states that exist, of `STATES`. Attribute `changes`: values as text by key path, empty
+        without a proposal.
     """
-    sides = tried.isel(side=smallest(tried).argmax("side"))
-    sides = sides.isel(key=np.argsort(-smallest(sides).values, kind="stable")[:MOST_TRIED])
-    useful = dict(zip(sides["key"].values.tolist(), sides.text.values.tolist(), strict=True))
-    candidates, changes = sides.rename(key="point"), [{key: text} for key, text in useful.items()]
-    chosen, last = list[xr.Dataset](), float(smallest(base))
-    while changes and len(chosen) < MOST_COMBINED:
-        gaps = smallest(candidates).values
-        best = int(gaps.argmax())
-        if gaps[best] < last + LEAST_GAIN or not np.isfinite(gaps[best]):
-            break
-        made, last = changes[best], float(gaps[best])
-        chosen.append(candidates.isel(point=best).assign_attrs(changes=made))
-        if len(chosen) < MOST_COMBINED:
-            more = [{**made, key: text} for key, text in useful.items() if key not in made]
-            named = {"; ".join(f"{k}={t}" for k, t in each.items()): each for each in more}
-            machines = experiment.allowed(named)
-            changes = [named[name] for name in machines]
-            candidates = experiment.at(list(machines), machines.values(), "combinations")
-    return chosen
-
-
-def states_of(base: xr.Dataset, steps: Sequence[xr.Dataset]) -> xr.Dataset:
-    """Return the runs of the machine as it is, and with the best changes, over `state`.
-
-    Args:
-        base, steps: As of `combined`.
-
-    Returns:
-        The states that exist, of `STATES`. Attribute `changes`: values as text by key path, for
-        each of them.
-    """
-    runs = [base, *steps[:1], *steps[1:][-1:]]
+    runs = [base] if changed is None else [base, changed]
     alike = [run[[*base.data_vars]].reset_coords(drop=True) for run in runs]
     states = xr.concat(alike, xr.Variable("state", list(STATES[: len(runs)])))
-    return states.assign_attrs(changes=[run.attrs.get("changes", {}) for run in runs])
+    return states.assign_attrs(changes={} if changed is None else changed.attrs["changes"])
 
 
 def laundry_of(samples: Sequence[xr.Dataset], clearance: float) -> xr.Dataset:
-    """Return the gaps of random laundry in the machine as it is, and with the best change.
+    """Return the gaps of random laundry in the machine as it is, and with the proposal.
 
     Args:
         samples: As of `ToleranceTrials.samples`, the first ones of the machine as it is.
@@ -176,22 +259,9 @@ def laundry_of(samples: Sequence[xr.Dataset], clearance: float) -> xr.Dataset:
         "upper": (SHARE.named("to"), upper),
     }
     data = xr.Dataset({name: q.variable("state", values) for name, (q, values) in numbers.items()})
-    states = ["as it is", "after the best change"][: len(samples)]
+    states = list(STATES[: len(samples)])
     gap = SMALLEST_GAP.variable(("state", "sample"), gaps)
     return data.assign(gap=gap).assign_coords(state=states)
-
-
-def worst_of(question: VerdictQuestion, states: xr.Dataset) -> xr.Dataset:
-    """Return the smallest gap and the largest other responses of all loads, over `state`. [SI]"""
-    numbers = responses(states, question.responses)
-    return xr.Dataset(
-        {
-            r.name: (numbers[r.name].min if r.name == GAP else numbers[r.name].max)(
-                "load", keep_attrs=True
-            )
-            for r in question.responses
-        }
-    )
 
 
 def _text(parameters: MachineParameters, key: str, factor: float) -> str:

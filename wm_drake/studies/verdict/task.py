@@ -27,9 +27,9 @@ from wm_drake.studies.verdict.study import (
     STATES,
     VerdictQuestion,
     changeable,
-    combined,
     influences,
     laundry_of,
+    proposed,
     states_of,
 )
 
@@ -82,15 +82,15 @@ class VerdictTask(Task):
         return {**self.laundry.identity, "change": f"{self.options.change:g} %"}
 
     def run(self, executor: Executor) -> Answer:
-        """Run the loads, the changes, and the laundry before and after the best change."""
+        """Run the loads, the changes, and the laundry before and after the proposed change."""
         parameters, change = self.machine.parameters, FACTOR.to_si(self.options.change).item()
         experiment = Experiment(self.machine, self.measures, executor.simulate, tuple(self.cases))
         base = experiment.at(STATES[:1], [parameters], "loads").isel(point=0, drop=True)
         samples = [self.laundry.trials(executor).samples()]
         tried = influences(experiment, changeable(parameters), change)
-        steps = combined(experiment, base, tried)
-        if steps:
-            better = build_machine(with_values(parameters, steps[-1].attrs["changes"]))
+        changed = proposed(experiment, base, tried, self.responses)
+        if changed is not None:
+            better = build_machine(with_values(parameters, changed.attrs["changes"]))
             samples.append(self._laundry(better).trials(executor).samples())
         question = VerdictQuestion(
             parameters,
@@ -102,7 +102,7 @@ class VerdictTask(Task):
         )
         return verdict_answer(
             question,
-            states_of(base, steps),
+            states_of(base, changed),
             tried,
             laundry_of(samples, self.clearance),
             laundry_masses(samples[0]),

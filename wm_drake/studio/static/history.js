@@ -1,6 +1,6 @@
 // States of this page: undo and redo, kept in the tab; the permanent link is the address itself.
 
-const KEY = 'wm-drake studio history';
+const KEY = `wm-drake studio history ${location.pathname}`;
 const LONGEST = 200;
 
 export const copyOf = (value) => JSON.parse(JSON.stringify(value));

@@ -6,7 +6,7 @@ import {History, copyOf, fromLink, intoLink} from './history.js';
 import {showMeasures} from './measures.js';
 import {NumberList} from './numbers.js';
 import {SceneView} from './scene.js';
-import {Problems, get, post} from './server.js';
+import {Problems, get, post, take} from './server.js';
 import {Studies} from './studies.js';
 import {showVerdict, smallestGap, worstFirst} from './verdict.js';
 
@@ -91,7 +91,7 @@ async function openMachine(next) {
   byId('about').textContent = `${machine.name}: ${machine.about}`;
   byId('load').replaceChildren(...[...machine.loads, DESCRIBED].map((name) => make('option', {value: name}, name)));
   byId('gasket').disabled = !machine.gasket;
-  document.title = `${machine.name} – wm-drake studio`;
+  document.title = `${machine.name} – wm-drake`;
   makePanels();
   search();
 }
@@ -527,6 +527,25 @@ async function save(overwrite) {
   }
 }
 
+/* ---- a page without a server ---- */
+
+async function copyCommand() {
+  const {command} = take(state);
+  byId('command').textContent = command;
+  try {
+    await navigator.clipboard.writeText(command);
+    byId('taken').textContent = 'the command is copied';
+  } catch { byId('taken').textContent = 'copy the command below'; }
+}
+
+function download() {
+  const {file, name} = take(state);
+  const url = URL.createObjectURL(new Blob([file], {type: 'text/yaml'}));
+  make('a', {href: url, download: name}).click();
+  URL.revokeObjectURL(url);
+  byId('taken').textContent = `saved as ${name}`;
+}
+
 async function listMachines() {
   const found = await get('machines');
   byId('machine').replaceChildren(...found.machines.map(({id, kind}) =>
@@ -584,6 +603,8 @@ function listen() {
   byId('keep').addEventListener('click', keepVariant);
   byId('save').addEventListener('click', () => save(false));
   byId('replace').addEventListener('click', () => save(true));
+  byId('copy-command').addEventListener('click', copyCommand);
+  byId('download').addEventListener('click', download);
   byId('play').addEventListener('click', play);
   byId('frame').addEventListener('input', (event) => { frame = Number(event.target.value); showMotion(); });
   byId('at-gap').addEventListener('click', () => { if (player) play(); frame = -1; showMotion(); });
@@ -614,7 +635,7 @@ async function begin() {
   showHistory();
   showLoad();
   await runVariants();
-  new Studies(found.studies, () => state);
+  if (found.studies) new Studies(found.studies, () => state);
 }
 
 begin().catch(fail);

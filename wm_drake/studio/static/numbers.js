@@ -35,7 +35,7 @@ export class NumberList {
     const slider = make('input', {type: 'range', min: '0', max: String(STEPS), 'aria-label': `slider of ${number.group} ${number.label}`});
     const back = make('button', {class: 'back', title: 'as it was', 'aria-label': `${number.label} as it was`}, '↺');
     const ranges = [
-      number.needs ? `cannot be moved alone: ${number.needs}` : `slider ${digits(number.low, 3)} to ${digits(number.high, 3)}`,
+      number.needs ? `${number.fixed ? 'fixed on this page' : 'cannot be moved alone'}: ${number.needs}` : `slider ${digits(number.low, 3)} to ${digits(number.high, 3)}`,
       number.allowed && `allowed ${number.allowed}`,
       number.usual && `usual ${number.usual}`,
     ].filter(Boolean).join(' · ');

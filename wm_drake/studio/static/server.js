@@ -27,3 +27,6 @@ export const get = (path) => answered(fetch(`api/${path}`));
 export const post = (path, body) => answered(fetch(`api/${path}`, {
   method: 'POST', headers: {'Content-Type': 'application/json'}, body: JSON.stringify(body),
 }));
+
+/** Pages without a server return here how to go on at the command line. */
+export const take = null;

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from wm_drake.studies.fitting.kinks import least_squares_search, start_number
 from wm_drake.studies.fitting.problem import PriorProblem, Residuals, Unknown
-from wm_drake.studies.fitting.search import Search
+from wm_drake.studies.fitting.search import Search, descended
+from wm_drake.studies.fitting.starts import start_number
 
 TRUTH = np.array([0.8, -0.5, 0.3])
 
@@ -28,13 +28,13 @@ def searched(residuals=curved, bound=3.0, size=3, smooth=None, report=lambda *_:
 
 
 def test_known_point_is_end_from_a_distant_start():
-    end = least_squares_search(searched(), np.array([-2.0, 2.0, -2.0]), 50)
+    end = descended(searched(), np.array([-2.0, 2.0, -2.0]), 50)
     assert end.point == pytest.approx(TRUTH, abs=1e-3)
     assert end.cost == pytest.approx(0.5 * np.sum(TRUTH**2), rel=1e-2)
 
 
 def test_prior_determines_a_quantity_without_data():
-    end = least_squares_search(
+    end = descended(
         searched(lambda points: 50.0 * (points[:, :1] - 1.0)), np.array([0.0, 1.5, -1.0]), 30
     )
     assert end.point == pytest.approx([1.0, 0.0, 0.0], abs=1e-3)
@@ -42,7 +42,7 @@ def test_prior_determines_a_quantity_without_data():
 
 def test_weight_between_data_and_prior_is_that_of_their_deviations():
     # one datum 1 +- 1 and a prior 0 +- 1: the product of the two normal distributions is at 1/2
-    end = least_squares_search(searched(lambda points: points - 1.0, size=1), np.array([-1.0]), 30)
+    end = descended(searched(lambda points: points - 1.0, size=1), np.array([-1.0]), 30)
     assert end.point == pytest.approx([0.5], abs=1e-5)
 
 
@@ -53,7 +53,7 @@ def test_bounds_are_kept():
         tried.append(points)
         return curved(points)
 
-    end = least_squares_search(searched(watched, bound=0.6), np.array([-0.5, 0.5, 0.0]), 40)
+    end = descended(searched(watched, bound=0.6), np.array([-0.5, 0.5, 0.0]), 40)
     assert np.all(np.abs(np.concatenate(tried)) <= 0.6 + 1e-12)
     assert end.point[0] == pytest.approx(0.6, abs=1e-3)
 
@@ -64,7 +64,7 @@ def test_search_avoids_points_without_a_machine():
         values[np.linalg.norm(points - [-0.6, 0.8, -0.8], axis=1) < 0.4] = np.nan
         return values
 
-    end = least_squares_search(searched(with_a_hole), np.array([-2.0, 2.0, -2.0]), 60)
+    end = descended(searched(with_a_hole), np.array([-2.0, 2.0, -2.0]), 60)
     assert end.point == pytest.approx(TRUTH, abs=1e-2)
 
 
@@ -79,7 +79,7 @@ def test_starts_are_the_expected_point_and_points_that_the_seed_determines():
 def test_progress_reports_evaluations_and_a_falling_cost():
     reports = []
     search = searched(report=lambda count, best: reports.append((count, best)))
-    end = least_squares_search(search, np.zeros(3), 30)
+    end = descended(search, np.zeros(3), 30)
     counts, costs = zip(*reports, strict=True)
     assert list(counts) == sorted(counts)
     assert counts[-1] == end.evaluations
@@ -100,7 +100,7 @@ def kinked(points):
 def test_slopes_of_smooth_residuals_pass_a_kink():
     hard, smooth = (lambda points, k=k: kinked(points)[k] for k in (0, 1))
     begin = np.array([-1.5, 1.0])
-    end = least_squares_search(searched(hard, 6.0, 2, smooth), begin, 60)
-    stuck = least_squares_search(searched(hard, 6.0, 2), begin, 60)
+    end = descended(searched(hard, 6.0, 2, smooth), begin, 60)
+    stuck = descended(searched(hard, 6.0, 2), begin, 60)
     assert end.point == pytest.approx([0.3, -4.0], abs=0.1)
     assert end.cost <= stuck.cost + 0.1

@@ -1,0 +1,100 @@
+"""How large are the three causes that [A] names for the errors of its model?
+
+[A] section 4.2 explains why the errors of its Table 9 are larger for two masses at 90 and 180
+degrees: whirl of the drum in its bearing, residual imbalance of the drum, and an error of the phase
+of the masses (at 0 degrees their phase "is straightforward"). Each is put into the machine
+`free_stroke` in three sizes. The machine with the cause stands for the experiment, the one without
+for the model, and the error is that of Table 9. Spin cycles are kept in a ledger; a second call
+goes on. The script renews docs/error-causes.md between its marks:
+
+    python analyses/compare_error_causes.py --page docs/error-causes.md
+"""
+
+import argparse
+import sys
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from analysis_tools import validation_page as page
+from analysis_tools.error_causes import CAUSES, with_cause
+from analysis_tools.spin_profiles import begin_of
+from write_paper_a import CASES, GROUPS
+
+from wm_drake import build_machine, load_machine, load_profile
+from wm_drake.batch import simulate_many, sources_version
+from wm_drake.batch.ledger import Ledger, LedgerEntry, key_of, open_ledger
+from wm_drake.parameters import MachineParameters, SpinProfile
+from wm_drake.parameters.unbalance_cases import UnbalanceCase, load_unbalance_cases
+from wm_drake.studies.spin_cycle.study import DIMS, average_errors, labels_of, runs_of
+
+AT_AN_ANGLE = ("two, 90 deg", "two, 180 deg")
+"""Groups of cases that have an error of the phase."""
+
+
+def main() -> None:
+    """Run the spin cycles and write the table."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--quick", action="store_true", help="five cases, before 10 s")
+    parser.add_argument("--ledger", type=Path, default=Path("compare_error_causes.sqlite"))
+    parser.add_argument("--page", type=Path, help="page to renew between its marks")
+    parser.add_argument("--out", type=Path, help="also write the text to this file")
+    arguments = parser.parse_args()
+    machine, profile = load_machine("free_stroke"), load_profile("spin_cycle")
+    cases = [c for c in load_unbalance_cases() if c.name in CASES or not arguments.quick]
+    profile = begin_of(profile) if arguments.quick else profile
+    identity = {"study": "causes of error", "sources": sources_version()}
+    with open_ledger(arguments.ledger, identity, resume=True) as ledger:
+        found = partial(_displacement, ledger, cases=cases, profile=profile)
+        perfect = found(machine)
+        errors = {
+            name: 100.0 * average_errors(perfect, found(with_cause(machine, imperfections)))
+            for name, imperfections in CAUSES.items()
+        }
+    text = page.origin("python analyses/compare_error_causes.py --page docs/error-causes.md", [])
+    text += page.table_text(
+        "Error of a model without the cause",
+        ["cause, size", *GROUPS],
+        [_published(cases), *(_line(name, error, cases) for name, error in errors.items())],
+    )
+    print(text)
+    page.write(text, arguments.out, arguments.page)
+
+
+def _displacement(
+    ledger: Ledger, machine: MachineParameters, cases: list[UnbalanceCase], profile: SpinProfile
+) -> xr.DataArray:
+    """Return the RMS displacements of a spin cycle, from the ledger if it has them."""
+    imperfections = machine.imperfections
+    key = key_of(imperfections=imperfections, cases=[c.name for c in cases], profile=profile)
+    if key not in ledger:
+        table = simulate_many(
+            build_machine(machine), runs_of(machine, cases, profile), measures=("regions",)
+        )
+        ledger.put_all({key: LedgerEntry({"rms": table.region_displacement.values})})
+        print(f"{len(ledger)} of {1 + len(CAUSES)} spin cycles", file=sys.stderr, flush=True)
+    return xr.DataArray(ledger.get(key).values["rms"], labels_of(machine, cases, profile), DIMS)
+
+
+def _published(cases: list[UnbalanceCase]) -> list[str]:
+    means = [
+        np.mean([case.published_error_percent for case in cases if belongs(case)])
+        for belongs in GROUPS.values()
+    ]
+    return ["**[A] Table 9: error of its model**", *(f"{mean:.1f} %" for mean in means)]
+
+
+def _line(name: str, error: xr.DataArray, cases: list[UnbalanceCase]) -> list[str]:
+    cells = [name]
+    for group, belongs in GROUPS.items():
+        names = [case.name for case in cases if belongs(case)]
+        applies = group in AT_AN_ANGLE or not name.startswith("phase")
+        cells.append(f"{float(error.sel(case=names).mean()):.1f} %" if applies else "none")
+    return cells
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,255 @@
+"""A machine that runs in a page: its numbers are those of `wm-drake spin`, whatever is moved."""
+
+import base64
+import json
+import re
+import shlex
+
+import numpy as np
+import pytest
+from accessibility import serious_faults
+
+import wm_drake as wm
+from wm_drake.parameters import shipped_machines
+from wm_drake.simulation.displacements import amplitudes, filtered_displacement
+from wm_drake.studies.inputs import load_parameters
+from wm_drake.studio import exported as exported_page
+from wm_drake.studio.exported import export_page
+from wm_drake.studio.machines import OpenMachine
+
+pytestmark = [pytest.mark.browser]
+
+DISPLACEMENT, AMPLITUDE, GAP = 1e-6, 1e-3, 1e-4
+"""Accuracies: of displacements before the filter, relative to the largest; of amplitudes, relative;
+of the gap [m]."""
+ANSWER = """
+const [job, done] = arguments;
+const data = JSON.parse(document.getElementById('machine-data').textContent);
+const begin = async () => {
+  const url = URL.createObjectURL(new Blob([data.worker], {type: 'text/javascript'}));
+  const bytes = Uint8Array.from(atob(data.wasm), (letter) => letter.charCodeAt(0));
+  const worker = new Worker(url);
+  worker.postMessage({module: await WebAssembly.compile(bytes), model: data.model});
+  return worker;
+};
+const asked = async (kind) => {
+  globalThis.tried ??= await begin();
+  const found = new Promise((resolve, reject) => {
+    globalThis.tried.onmessage = (event) => resolve(event.data);
+    globalThis.tried.onerror = (event) => reject(event.message);
+  });
+  globalThis.tried.postMessage({...job, profile: data.profile, kind});
+  return found;
+};
+const text = (numbers) => {
+  const bytes = new Uint8Array(numbers.buffer);
+  let letters = '';
+  for (let k = 0; k < bytes.length; k += 32768) letters += String.fromCharCode(...bytes.subarray(k, k + 32768));
+  return btoa(letters);
+};
+(async () => {
+  const {sizes, gap} = await asked('numbers');
+  const {moved} = await asked('samples');
+  done({sizes: Array.from(sizes), gap, moved: text(moved)});
+})().catch((error) => done({failed: String(error)}));
+"""
+
+
+def data_of(path):
+    """Return what a page knows of its machine."""
+    text = path.read_text(encoding="utf-8")
+    return json.loads(re.search(r'id="machine-data">(.*?)</script>', text, re.DOTALL)[1])
+
+
+def changes_of_load(data, name):
+    """Return the changes of the array of an instance for a load."""
+    at, load = data["model"]["at"], data["loads"][name]
+    fields = ("mass", "phase", "y", "radius")
+    return [
+        *(
+            [at["unbalances"] + 4 * k + i, mass[field]]
+            for k, mass in enumerate(load["unbalances"])
+            for i, field in enumerate(fields)
+        ),
+        *([at["of_load"] + k, value] for k, value in enumerate(load["harmonics"])),
+    ]
+
+
+def of_page(browser, data, load, changes):
+    """Return displacements before the filter (n, sensors), amplitudes and gap of the page. [m]"""
+    job = {"changes": [*changes, *changes_of_load(data, load)]}
+    found = browser.driver.execute_async_script(ANSWER, job)
+    assert "failed" not in found, found
+    moved = np.frombuffer(base64.b64decode(found["moved"])).reshape(
+        data["model"]["count"]["points"], -1
+    )
+    sensors = data["model"]["count"]["sensors"]
+    gap = found["gap"] and found["gap"]["distance"]
+    return moved[:sensors].T, np.array(found["sizes"], dtype=float), gap
+
+
+def check_equal(browser, data, machine, scene, load, changes=(), parameters=None):
+    """Check a run of the page against one of the engine with its own choice of steps."""
+    moved, sizes, gap = of_page(browser, data, load, changes)
+    case = wm.case_of(parameters or machine.parameters, load)
+    record = wm.simulate(machine, case)
+    expected = record.displacement.values
+    assert moved.shape == expected.shape
+    largest = np.abs(expected).max(axis=0)
+    assert (np.abs(moved - expected).max(axis=0) <= DISPLACEMENT * largest).all()
+    np.testing.assert_allclose(
+        sizes, amplitudes(filtered_displacement(record).values)[0], AMPLITUDE
+    )
+    smallest = wm.measure(record, scene).smallest_gap
+    assert (gap is None) == (smallest is None)
+    if gap is not None:
+        assert abs(gap - smallest.distance) <= GAP
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(shipped_machines()))
+def test_numbers_are_those_of_spin_after_each_slider_was_moved(browser, tmp_path, name):
+    parameters = wm.load_machine(name)
+    path = tmp_path / "machine.html"
+    export_page(parameters, path)
+    data = data_of(path)
+    browser.open(path)
+    machine, scene = wm.build_machine(parameters), wm.Scene(parameters)
+    opened = OpenMachine(parameters, machine, scene)
+    load = next(iter(parameters.loads))
+    for one in parameters.loads:
+        check_equal(browser, data, machine, scene, one)
+    for number in data["machine"]["numbers"]:
+        key = number["key"]
+        if key in data["model"]["places"]:
+            value = number["value"] + 0.3 * (number["high"] - number["value"])
+            value *= number["units"][number["unit"]]
+            step = value - float(opened.sliders[key].number.nominal or 0.0)
+            moved = opened.moved_by(parameters, key, step)
+            change = [[data["model"]["places"][key], value]]
+            check_equal(browser, data, machine, scene, load, change, moved)
+
+
+XR = "return document.querySelector('#measures [data-row^=Xr] td.now')?.textContent"
+TYPED = """
+const [key, text] = arguments;
+const field = document.querySelector(`[data-key="${key}"] input.text`);
+field.value = text;
+field.dispatchEvent(new Event('input', {bubbles: true}));
+field.dispatchEvent(new Event('change', {bubbles: true}));
+"""
+SETTLED = (
+    "return document.body.getAttribute('aria-busy') === 'false' && !document.querySelector('.old')"
+)
+MOVED = {
+    "damper_types.friction.friction_force": "30 N",
+    "frames.spring_left_tub.position.2": "120 mm",
+    "gasket.stiffness_y": "2 N/mm",
+    "bodies.motor.mass": "8 kg",
+    "loads.middle.unbalances.0.mass": "0.8 kg",
+    "profile.speed.1": "380 rpm",
+}
+"""A number, an entry of a vector, a table, a body, a load and a profile."""
+
+
+@pytest.fixture(scope="module")
+def exported(tmp_path_factory):
+    path = tmp_path_factory.mktemp("page") / "machine.html"
+    export_page(wm.load_machine("reference"), path)
+    return path
+
+
+@pytest.fixture
+def page(browser, exported):
+    browser.open(exported)
+    browser.wait(XR, timeout=120.0)
+    browser.wait(SETTLED, timeout=60.0)
+    return browser
+
+
+@pytest.mark.slow
+def test_command_and_file_give_the_machine_of_the_page(page, tmp_path):
+    for key, text in MOVED.items():
+        page.run(TYPED, key, text)
+    page.wait(SETTLED, timeout=60.0)
+    shown = page.run("return document.getElementById('problems').textContent")
+    assert shown == ""
+    page.run("document.getElementById('load').value = 'middle'")
+    page.run("document.getElementById('load').dispatchEvent(new Event('change'))")
+    page.wait(SETTLED, timeout=60.0)
+    page.run("document.getElementById('copy-command').click()")
+    command = page.wait("return document.getElementById('command').textContent")
+    program, study, *options = shlex.split(command)
+    assert [program, study, *options[:4]] == [
+        "wm-drake", "spin", "--machine", "reference", "--load", "middle"
+    ]  # fmt: skip
+    parameters = load_parameters("reference", options[5::2])
+    record = wm.simulate(wm.build_machine(parameters), "middle")
+    largest = 1e3 * amplitudes(filtered_displacement(record).values)[0]
+    rows = page.run(
+        "return [...document.querySelectorAll('#measures td.now')].map((cell) => cell.textContent)"
+    )
+    np.testing.assert_allclose([float(text) for text in rows[: len(largest)]], largest, atol=6e-3)
+    page.run(
+        "URL.createObjectURL = (blob) => { blob.text().then((text) => { window.saved = text; });"
+        " return 'data:,'; }"
+    )
+    page.run("document.getElementById('download').click()")
+    path = tmp_path / "changed.yaml"
+    path.write_text(page.wait("return window.saved"), encoding="utf-8")
+    read, expected = (
+        machine.model_dump(exclude={"name", "about", "sources", "measured", "published"})
+        for machine in (wm.load_machine(path), parameters)
+    )
+    for section, values in expected.items():
+        assert flat(read[section]) == pytest.approx(flat(values), rel=1e-9), section
+
+
+def flat(node, key=""):
+    """Return the numbers and texts of a tree by key path."""
+    if isinstance(node, dict):
+        items = node.items()
+    elif isinstance(node, list | tuple):
+        items = enumerate(node)
+    else:
+        return {key: node}
+    return {k: v for name, value in items for k, v in flat(value, f"{key}.{name}").items()}
+
+
+@pytest.mark.slow
+def test_what_is_wrong_is_said_and_the_last_run_stays(page):
+    before = page.run(XR)
+    page.run(TYPED, "damper_types.friction.friction_force", "30 kg")
+    wrong = page.wait(
+        "const row = document.querySelector('[data-key=\"damper_types.friction.friction_force\"]');"
+        "return row.classList.contains('wrong') && row.querySelector('.problem').textContent"
+    )
+    assert "N" in wrong
+    page.run(TYPED, "damper_types.friction.friction_force", "-1 N")
+    page.wait(
+        "return document.querySelector('.problem:not([hidden])')?.textContent.includes('allowed')"
+    )
+    assert page.run(XR) == before
+
+
+@pytest.mark.slow
+def test_texts_of_a_machine_are_never_markup(browser, tmp_path, monkeypatch):
+    bad = "</script><b class='bad'>x</b>"
+    text = json.dumps(exported_page.page_data(wm.load_machine("reference")))
+    text = text.replace('"middle"', json.dumps(bad)).replace("detergent box", bad.replace('"', ""))
+    data = json.loads(text)
+    data["machine"]["about"] = bad + "a" * 10_000
+    monkeypatch.setattr(exported_page, "page_data", lambda parameters: data)
+    export_page(wm.load_machine("reference"), tmp_path / "machine.html")
+    browser.open(tmp_path / "machine.html")
+    browser.wait(XR, timeout=120.0)
+    assert browser.run("return document.querySelectorAll('.bad').length") == 0
+    assert bad in browser.run("return document.getElementById('load').textContent")
+    assert not browser.errors()
+
+
+@pytest.mark.slow
+def test_a_phone_shows_all_without_scrolling_sideways(page):
+    page.size(390)
+    assert page.run("return document.documentElement.scrollWidth <= window.innerWidth")
+    assert serious_faults(page) == []

@@ -1,0 +1,104 @@
+"""`record calibrate`: planted numbers are recovered, wrong structures are called wrong."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lab_writers import write_mdf
+
+from wm_drake.model.build import build_machine
+from wm_drake.parameters import load_machine, load_profile, with_values
+from wm_drake.parameters.recorded_sensors import RecordedSensor
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.recorded_signal import recorded_signal
+from wm_drake.simulation.runs import simulate
+
+SENSORS = ("S1_x", "S1_z", "S3_x", "S3_z")
+FRICTION = "damper_types.friction.friction_force"
+PROFILE = "time: (0, 20, 24) s\nspeed: (0, 320, 320) rpm\n"
+NOISE, GAIN, OFFSET, TILT = 0.02, 0.01, 0.1, np.deg2rad(2.0)
+"""Noise [m/s^2], deviations of gains and offsets [1, m/s^2], and tilt [rad] of the sensors."""
+
+
+def plant(changes, seed=1, repeats=3):
+    """Write records of the reference machine with other numbers, by sensors that are not ideal."""
+    parameters = load_machine("reference")
+    Path("p.yaml").write_text(PROFILE)
+    machine = build_machine(with_values(parameters, changes))
+    case = Case("middle", machine.parameters.loads["middle"], load_profile("p.yaml"))
+    record, points = simulate(machine, case), machine.set_up().accelerometer_points
+    generator = np.random.default_rng(seed)
+    frames = parameters.accelerometer_frames()
+    lines = ["load: middle\nsensors:\n"]
+    signals = {}
+    for number, name in enumerate(SENSORS, 1):
+        tilt = TILT * generator.choice([-1.0, 1.0], 3) / np.sqrt(3.0)
+        fields = {"frame": "any", "axis": name[-1], "tilt": tilt.tolist()}
+        sensor = RecordedSensor.model_validate(fields)
+        signals[f"Acc {number}"] = recorded_signal(record, sensor, points[name[:2]])
+        place = f"frame: {frames[name[:2]]}, axis: {name[-1]}"
+        lines.append(f"  {name}: {{channel: Acc {number}, {place}}}\n")
+    Path("test.yaml").write_text("".join(lines))
+    for repeat in range(repeats):
+        late = int(generator.integers(100, 400))
+        channels = {}
+        for name, signal in signals.items():
+            seen = signal[late:] * generator.normal(1.0, GAIN) + generator.normal(0.0, OFFSET)
+            channels[name] = (seen + generator.normal(0.0, NOISE, len(seen)), "m/s^2")
+        time = record.time.values[late:]
+        write_mdf(Path(f"run_{repeat}.mf4"), time - time[0], channels)
+    return [f"run_{repeat}.mf4" for repeat in range(repeats)]
+
+
+@pytest.fixture
+def calibrate(wm_drake):
+    """Return a function that calibrates the reference machine to records."""
+
+    def command(files, *words, code=0):
+        ended = wm_drake(
+            "record", "calibrate", *files, "--test", "test.yaml", "--profile", "p.yaml", *words,
+            "--out", "out", "--overwrite", "--json",
+        )  # fmt: skip
+        assert ended.code == code, ended.err
+        return json.loads(ended.out) if code == 0 else ended.err
+
+    return command
+
+
+@pytest.mark.parametrize("by", ["envelope", "order", "rms"])
+def test_a_planted_friction_is_found(calibrate, by):
+    truth = 1.2 * load_machine("reference").damper_types["friction"].friction_force
+    result = calibrate(plant({FRICTION: truth}), "--unknown", FRICTION, "--by", by)
+    found = result["estimates"][0]
+    assert found["value"] == pytest.approx(truth, rel=0.03)
+    assert found["lower_95"] < found["upper_95"]
+    assert result["answer"].startswith("Good fit to 3 records")
+    text = Path("out/calibrated.yaml").read_text()
+    assert "calibrated to run_0.mf4" in text
+
+
+def test_a_wrong_structure_is_called_wrong(calibrate):
+    """The springs are half as stiff again, and only the friction of the dampers may change."""
+    springs = load_machine("reference").spring_types
+    changes = {f"spring_types.{n}.stiffness": 1.5 * s.stiffness for n, s in springs.items()}
+    result = calibrate(plant(changes), "--unknown", FRICTION)
+    assert result["answer"].startswith("Poor fit")
+    assert "do not use the values" in result["answer"]
+
+
+@pytest.mark.parametrize(
+    ("unknown", "message"),
+    [
+        ("gasket.stifness_x", "did you mean 'stiffness_x'"),
+        ("gravity=(1, 2) mm", "gravity"),
+        ("damper_types.friction.friction_force=(-1, 2) N", "out of range"),
+    ],
+)
+def test_wrong_unknowns_are_refused(calibrate, unknown, message):
+    Path("run.csv").write_text("time [s],Xr [mm]\n0,1\n1,2\n")
+    Path("p.yaml").write_text(PROFILE)
+    Path("test.yaml").write_text("load: middle\nsensors: {Xr: {axis: x, frame: sensor_Xr}}\n")
+    error = calibrate(["run.csv"], "--unknown", unknown, code=2)
+    assert message in error
+    assert len(error.strip().splitlines()) == 1

@@ -1,0 +1,284 @@
+"""`record compare`: exact signals through all formats, planted faults, repeats, and refusals."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lab_machine import recorded_channels
+from lab_writers import WRITERS
+
+from wm_drake.model.build import build_machine
+from wm_drake.parameters import load_machine, load_profile, with_values
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.runs import simulate
+
+PROFILE = """time: (0, 20, 24) s
+speed: (0, 320, 320) rpm
+regions: [{name: R1, begin: 4 s, end: 10 s}, {name: R2, begin: 10 s, end: 16 s}, {name: R3, begin: 16 s, end: 24 s}]
+"""
+SENSORS = ("S1_x", "S1_z", "S2_y")
+
+
+@pytest.fixture(scope="module")
+def laboratory(tmp_path_factory):
+    """Return time, channels with names of a recorder, and the times of the run of the samples."""
+    folder = tmp_path_factory.mktemp("profile")
+    (folder / "p.yaml").write_text(PROFILE)
+    fine = with_values(load_machine("reference"), {"step": 1.25e-3, "output_period": 1.25e-3})
+    machine = build_machine(fine)
+    case = Case("middle", fine.loads["middle"], load_profile(folder / "p.yaml"))
+    record = simulate(machine, case)
+    points = machine.set_up().accelerometer_points
+    where = {name: points[name[:2]] for name in SENSORS}
+    time, channels, at = recorded_channels(record, where, begin=1.5, ppm=200.0)
+    rpm = np.interp(at, record.time.values, record.drum_speed.values) * 30.0 / np.pi
+    renamed = {f"Acc {k}": channels[name] for k, name in enumerate(SENSORS, 1)}
+    return time, renamed, rpm
+
+
+@pytest.fixture
+def compare(wm_drake):
+    """Return a function that compares files with the reference machine."""
+    write_test()
+
+    def command(*words, code=0):
+        profile = () if "--profile" in words else ("--profile", "p.yaml")
+        options = ("--out", "out", "--overwrite", "--json")
+        ended = wm_drake("record", "compare", *words, *profile, *options)
+        assert ended.code == code, ended.err
+        return json.loads(ended.out) if code == 0 else ended.err
+
+    return command
+
+
+def write_test(speed="speed: {channel: Drum}\n", load="load: middle\n", **changes):
+    """Write profile and test; `changes` replaces words of the test."""
+    frames = load_machine("reference").accelerometer_frames()
+    lines = [
+        f"  {name}: {{channel: Acc {k}, frame: {frames[name[:2]]}, axis: {name[-1]}}}\n"
+        for k, name in enumerate(SENSORS, 1)
+    ]
+    text = f"{load}sensors:\n{''.join(lines)}{speed}"
+    for old, new in changes.values():
+        text = text.replace(old, new)
+    Path("test.yaml").write_text(text)
+    Path("p.yaml").write_text(PROFILE)
+
+
+def write_csv(path, time, channels):
+    names = ",".join(f"{name} [{unit}]" for name, (_, unit) in channels.items())
+    table = np.column_stack([time, *(values for values, _ in channels.values())])
+    np.savetxt(path, table, delimiter=",", header=f"time [s],{names}", comments="", fmt="%.17g")
+
+
+def rows(result, name, key):
+    return {tuple(row[k] for k in key): row for row in result[name]}
+
+
+def test_exact_signals_agree_in_every_region_through_every_format(compare, laboratory):
+    time, channels, rpm = laboratory
+    with_speed = {**channels, "Drum": (rpm, "rpm")}
+    found = {}
+    for suffix, write in {**WRITERS, ".csv": write_csv}.items():
+        write(f"run{suffix}", time, with_speed)
+        found[suffix] = compare(f"run{suffix}", "--test", "test.yaml")
+    for result in found.values():
+        assert [row["region"] for row in result["errors_acceleration"]] == ["R1", "R2", "R3"]
+        assert max(row["error_percent"] for row in result["errors_acceleration"]) < 0.1
+        assert min(row["correlation"] for row in result["sensors_acceleration"]) > 0.9999
+        assert result["answer"].startswith("Within 5 % of the one record from ")
+        clock = result["clocks"][0]
+        assert clock["offset_ms"] == pytest.approx(1500.0, abs=1.0)
+        assert clock["rate_ppm"] == pytest.approx(200.0, abs=40.0)
+    first = found.pop(".csv")
+    for result in found.values():
+        for name in ("sensors_acceleration", "errors_acceleration", "rms_acceleration"):
+            for row, other in zip(result[name], first[name], strict=True):
+                assert {k: v for k, v in row.items() if isinstance(v, str)} == {
+                    k: v for k, v in other.items() if isinstance(v, str)
+                }
+                numbers = [k for k, v in row.items() if isinstance(v, float)]
+                np.testing.assert_allclose(
+                    [row[k] for k in numbers], [other[k] for k in numbers], rtol=1e-5, atol=2e-4
+                )
+
+
+def test_without_gravity_in_the_model_the_slow_regions_are_wrong(compare, laboratory):
+    """The planted gravity is seen: without it in the model, errors are of some percent."""
+    time, channels, rpm = laboratory
+    write_csv("run.csv", time, {**channels, "Drum": (rpm, "rpm")})
+    write_test(gravity=("axis: x}", "axis: x, gravity: removed}"))
+    result = compare("run.csv", "--test", "test.yaml")
+    by_sensor = rows(result, "rms_acceleration", ("region", "sensor"))
+    slow = by_sensor["R1", "S1_x"]
+    assert abs(slow["computed_m_per_s2"] / slow["measured_m_per_s2"] - 1.0) > 0.03
+
+
+def test_without_a_speed_the_signals_align_the_clock(compare, laboratory):
+    time, channels, _ = laboratory
+    write_test(speed="")
+    write_csv("run.csv", time, channels)
+    result = compare("run.csv", "--test", "test.yaml")
+    clock = result["clocks"][0]
+    assert clock["by"] == "spectra and order 1"
+    assert clock["offset_ms"] == pytest.approx(1500.0, abs=2.0)
+    assert max(row["error_percent"] for row in result["errors_acceleration"]) < 0.1
+
+
+def test_pulses_of_a_tacho_on_the_motor(compare, laboratory):
+    time, channels, rpm = laboratory
+    angle = np.cumsum(rpm * np.pi / 30.0 * np.gradient(time))
+    fine = np.linspace(time[0], time[-1], 12 * len(time))
+    pulses = (np.sin(4.0 * np.interp(fine, time, angle)) > 0.0) * 5.0
+    WRITERS[".mf4"]("run.mf4", time, {**channels, "Tacho": (pulses, "V")})
+    write_test(speed="speed: {channel: Tacho, kind: pulses, pulses_per_turn: 2, ratio: 2}\n")
+    result = compare("run.mf4", "--test", "test.yaml")
+    clock = result["clocks"][0]
+    assert clock["by"] == "pulses of the tacho"
+    assert clock["offset_ms"] == pytest.approx(1500.0, abs=2.0)
+
+
+def test_repeats_have_a_scatter_and_the_difference_is_named(compare, laboratory):
+    """Gains of 1 % scatter; one sensor is 30 % too large in all of them."""
+    time, channels, rpm = laboratory
+    generator = np.random.default_rng(5)
+    files = []
+    for number in range(4):
+        gains = 1.0 + 0.01 * generator.standard_normal(3)
+        late = int(generator.integers(0, 300))
+        scaled = {
+            name: (values[late:] * gain * (1.3 if name == "Acc 2" else 1.0), unit)
+            for (name, (values, unit)), gain in zip(channels.items(), gains, strict=True)
+        }
+        files.append(f"run_{number}.csv")
+        write_csv(files[-1], time[late:] - time[late], {**scaled, "Drum": (rpm[late:], "rpm")})
+    result = compare(*files, "--test", "test.yaml")
+    assert "the scatter of four repeats" in result["answer"]
+    assert "S1_z 23 % low" in result["answer"]  # 1 / 1.3
+    sensors = rows(result, "sensors_acceleration", ("sensor",))
+    assert sensors[("S1_x",)]["within_percent"] > 95.0
+    assert sensors[("S1_z",)]["within_percent"] < 60.0
+
+
+def test_the_recorded_speed_drives_the_model(compare, laboratory):
+    """The machine did not follow the named profile: refused, and right with its own speed."""
+    time, channels, rpm = laboratory
+    write_csv("run.csv", time, {**channels, "Drum": (rpm, "rpm")})
+    Path("other.yaml").write_text("{time: '(0, 60) s', speed: '(0, 200) rpm'}")
+    words = ("run.csv", "--test", "test.yaml", "--profile", "other.yaml")
+    error = compare(*words, code=2)
+    assert "run.csv: the recorded drum speed contradicts the profile" in error
+    assert "--speed measured" in error
+    result = compare(*words, "--speed", "measured")
+    assert max(row["error_percent"] for row in result["errors_acceleration"]) < 5.0
+
+
+def test_a_reversed_sensor_is_named(compare, laboratory):
+    time, channels, rpm = laboratory
+    reversed_ = {**channels, "Acc 1": (-channels["Acc 1"][0], "g"), "Drum": (rpm, "rpm")}
+    write_csv("run.csv", time, reversed_)
+    error = compare("run.csv", "--test", "test.yaml", code=2)
+    assert "run.csv: S1_x: has the other sign than its sensor is declared with" in error
+    assert "correlation -1.00" in error
+    assert len(error.strip().splitlines()) == 1
+    write_test(polarity=("axis: x}", "axis: x, polarity: negative}"))
+    result = compare("run.csv", "--test", "test.yaml")
+    assert max(row["error_percent"] for row in result["errors_acceleration"]) < 0.1
+
+
+def test_a_reversed_sensor_is_told_by_gravity_alone(compare, laboratory):
+    time, channels, rpm = laboratory
+    write_csv("run.csv", time, {"Acc 2": (-channels["Acc 2"][0], "g"), "Drum": (rpm, "rpm")})
+    error = compare("run.csv", "--test", "test.yaml", code=2)
+    assert "S1_z: has the other sign" in error
+    assert "gravity" in error
+
+
+def test_an_ac_coupled_sensor_that_is_not_declared_so_is_warned_of(wm_drake, laboratory):
+    write_test()
+    time, channels, rpm = laboratory
+    coupled = {**channels, "Acc 2": (channels["Acc 2"][0] - 1.0, "g"), "Drum": (rpm, "rpm")}
+    write_csv("run.csv", time, coupled)
+    ended = wm_drake("record", "compare", "run.csv", "--test", "test.yaml", "--profile", "p.yaml")
+    assert ended.code == 0
+    assert "S1_z: its mean is " in ended.err
+    assert "ac_coupling" in ended.err
+
+
+def test_gaps_and_rounded_stamps(compare, laboratory):
+    time, channels, rpm = laboratory
+    holed = {name: (values.copy(), unit) for name, (values, unit) in channels.items()}
+    holed["Acc 1"][0][3000:3400] = np.nan
+    write_csv("run.csv", np.round(time, 3) + 0.0, {**holed, "Drum": (rpm, "rpm")})
+    result = compare("run.csv", "--test", "test.yaml")
+    assert max(row["error_percent"] for row in result["errors_acceleration"]) < 0.1
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("sensors: {a: {axis: z}}", "sensors.a: needs either frame"),
+        ("sensors: {a: {axis: w, frame: sensor_Xr}}", "sensors.a.axis"),
+        ("sensors: {a: {axis: z, frame: nosuch}}", "no frame 'nosuch' in the SDF"),
+        ("sensors: {a: {axis: z, frame: sensor_Xr, noise: 3}}", "sensors.a.noise"),
+        ("sensors: {a: {axis: z, frame: sensor_Xr, low_pass: 3 mm}}", "sensors.a.low_pass"),
+        ("sensors: {a: {axis: z, frame: sensor_Xr, chanel: x}}", "did you mean 'channel'"),
+        ("sensors: {}", "sensors"),
+        (
+            "sensors: {a: {axis: z, frame: sensor_Xr, quantity: velocity, gravity: removed}}",
+            "a velocity has none",
+        ),
+    ],
+)
+def test_a_wrong_test_is_refused(compare, laboratory, text, message):
+    time, channels, rpm = laboratory
+    write_csv(
+        "run.csv", time[:300], {"a": (channels["Acc 1"][0][:300], "g"), "Drum": (rpm[:300], "rpm")}
+    )
+    Path("test.yaml").write_text(f"load: middle\n{text}\n")
+    error = compare("run.csv", "--test", "test.yaml", code=2)
+    assert message in error
+    assert error.startswith("test.yaml")
+
+
+@pytest.mark.parametrize(
+    ("channels", "words", "message"),
+    [
+        (("Torque", "Drum"), (), "has no channel of a sensor of the test, such as Acc 1"),
+        (("Acc 1",), ("run.csv",), "'run.csv' is given twice"),
+        (("Acc 1",), ("--load", "nosuch"), "'nosuch' is neither a load of machine"),
+        (("Acc 1",), ("--channels", "S1_q=Acc 1"), "no word 'S1_q'"),
+        (("Acc 1",), ("--machine", "light_cabinet"), "cabinet"),
+    ],
+)
+def test_wrong_records_and_options_are_refused(compare, laboratory, channels, words, message):
+    time, known, rpm = laboratory
+    values = {name: (known.get(name, (rpm, "rpm"))[0][:400], "g") for name in channels}
+    if "Drum" in values:
+        values["Drum"] = (rpm[:400], "rpm")
+    if "Torque" in values:
+        values["Torque"] = (rpm[:400], "N*m")
+    write_csv("run.csv", time[:400], values)
+    error = compare("run.csv", *words, "--test", "test.yaml", code=2)
+    assert message in error
+    assert len(error.strip().splitlines()) == 1
+
+
+def test_a_channel_without_a_sample_is_refused(compare, laboratory):
+    from lab_writers import write_mdf_clocks
+
+    time, channels, _ = laboratory
+    empty = {name: (time, np.full(len(time), np.nan), "g") for name in channels}
+    write_mdf_clocks("run.mf4", empty)
+    write_test(speed="")
+    error = compare("run.mf4", "--test", "test.yaml", code=2)
+    assert "run.mf4: Acc 1: has no valid sample" in error
+
+
+def test_a_machine_with_several_loads_needs_the_name_of_one(compare, laboratory):
+    time, channels, _ = laboratory
+    write_csv("run.csv", time, channels)
+    write_test(speed="", load="")
+    error = compare("run.csv", "--test", "test.yaml", code=2)
+    assert "--load: the machine has the loads middle, counter" in error

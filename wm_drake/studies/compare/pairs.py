@@ -1,0 +1,303 @@
+"""Recordings on the times of runs: clocks, speeds, signs; order 1 of measured and predicted."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import xarray as xr
+
+from wm_drake.errors import input_error
+from wm_drake.parameters import SpinProfile
+from wm_drake.parameters.recorded_sensors import RecordedSensor, RecordedTest
+from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import Unit
+from wm_drake.report.quantity import SPEED, TIME, Quantity
+from wm_drake.simulation.alignment import (
+    Alignment,
+    align_pulses,
+    align_signals,
+    align_speed,
+    at_run,
+    vectors_of_order_one,
+)
+from wm_drake.simulation.recorded_signal import recorded_signal
+from wm_drake.simulation.records import Record, profile_of
+from wm_drake.studies.compare.recordings import TestRecording, pulse_angle, speed_of_pulses
+
+REVERSED = -0.5
+"""Correlation of order 1 below which a sensor is taken to have the other sign."""
+
+CONTRADICTION = 0.05
+"""Largest misfit of a recorded drum speed, by the highest speed of the profile."""
+
+LEAST_CORRELATION = 0.2
+"""Largest correlation of signals that have nothing in common: an assumption."""
+
+SPEED_STEP = 0.25
+"""Time between the points of a measured profile. [s]"""
+
+QUANTITIES = {
+    "displacement": Quantity("displacement", Unit("m", "mm"), 3),
+    "velocity": Quantity("velocity", Unit("m/s", "mm/s"), 2),
+    "acceleration": Quantity("acceleration", Unit("m/s^2", "m/s^2"), 3),
+}
+"""What sensors measure."""
+
+CORRELATION = Quantity("correlation", decimals=3)
+PHASE = Quantity("phase difference", Unit("rad", "deg"), 1)
+OFFSET = Quantity("offset of the clock", Unit("s", "ms"), 2)
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """A recording on the times of its run, and what the model predicts of it.
+
+    Attributes:
+        recording: The recording.
+        run: Record of the run.
+        alignment: Clock of the recording.
+        measured, predicted: Signals at the times of the run (n, sensors); measured ones are NaN in
+            gaps. SI.
+        speed: Recorded drum speed at the samples of the recording; None without one. [rad/s]
+    """
+
+    recording: TestRecording
+    run: Record
+    alignment: Alignment
+    measured: FloatArray
+    predicted: FloatArray
+    speed: FloatArray | None = None
+
+    @property
+    def both(self) -> FloatArray:
+        """Measured, then predicted signals, both with the gaps of the measured ones (2, n, k)."""
+        gaps = np.where(np.isfinite(self.measured), 0.0, np.nan)
+        return np.stack([self.measured, self.predicted + gaps])
+
+
+def predicted_signals(
+    run: Record, sensors: Mapping[str, RecordedSensor], points: Mapping[str, FloatArray]
+) -> FloatArray:
+    """Return the signals of sensors that a run predicts. (n, sensors) [SI]
+
+    Args:
+        points: Positions of the sensors in T, (3,) each. [m]
+    """
+    columns = [recorded_signal(run, sensor, points[name]) for name, sensor in sensors.items()]
+    return np.stack(columns, axis=1)
+
+
+def paired(
+    recording: TestRecording, run: Record, predicted: FloatArray, test: RecordedTest
+) -> Pair:
+    """Return a recording on the times of a run.
+
+    Raises:
+        InputError: its speed, or its signals without one, contradict the run.
+    """
+    speed = recorded_speed(recording, test)
+    alignment = _alignment(recording, run, predicted, test)
+    return replace(pair_at(recording, run, predicted, alignment), speed=speed)
+
+
+def pair_at(
+    recording: TestRecording, run: Record, predicted: FloatArray, alignment: Alignment
+) -> Pair:
+    """Return a recording on the times of a run, by a known alignment."""
+    values = np.stack([*recording.channels.values.values()], axis=1)
+    measured = at_run(recording.channels.time, values, run.time.values, alignment)
+    return Pair(recording, run, alignment, measured, predicted)
+
+
+def recorded_speed(recording: TestRecording, test: RecordedTest) -> FloatArray | None:
+    """Return the recorded drum speed at the samples of a recording. (n,) [rad/s]"""
+    if recording.pulses is not None and test.speed is not None:
+        return speed_of_pulses(recording, test.speed)
+    return recording.speed
+
+
+def _alignment(
+    recording: TestRecording, run: Record, predicted: FloatArray, test: RecordedTest
+) -> Alignment:
+    time, speed = recording.channels.time, recorded_speed(recording, test)
+    if speed is None:
+        values = np.stack([*recording.channels.values.values()], axis=1)
+        return align_signals(time, values, predicted, run)
+    if recording.pulses is not None and test.speed is not None:
+        result = align_pulses(recording.pulses, pulse_angle(test.speed), run)
+    else:
+        result = align_speed(time, speed, run)
+    _check_speed(recording, speed, run, result)
+    return result
+
+
+def _check_speed(
+    recording: TestRecording, speed: FloatArray, run: Record, alignment: Alignment
+) -> None:
+    """Check that a recorded speed is that of the run.
+
+    Raises:
+        InputError: it is not.
+    """
+    at = alignment.of_run(recording.channels.time)
+    inside = np.isfinite(speed) & (at >= 0.0) & (at <= float(run.time[-1]))
+    profile = profile_of(run)
+    if not inside.any():
+        misfit = profile.highest_speed
+    else:
+        of_run = np.interp(at[inside], run.time.values, np.abs(run.drum_speed.values))
+        misfit = float(np.sqrt(np.mean((np.abs(speed[inside]) - of_run) ** 2)))
+    if misfit > CONTRADICTION * profile.highest_speed:
+        raise input_error(
+            f"the recorded drum speed contradicts the profile: at the best offset of the clock, "
+            f"{OFFSET.text(alignment.offset)}, they differ by {SPEED.text(misfit)} (RMS); drive "
+            "the model with the recorded speed (--speed measured), or name its profile (--profile)",
+            where=str(recording.path),
+        )
+
+
+def measured_profile(recording: TestRecording, speed: FloatArray) -> tuple[SpinProfile, Alignment]:
+    """Return the recorded drum speed as a profile, and the alignment of a run that follows it.
+
+    Args:
+        speed: At the samples of the recording, NaN where there is none. (n,) [rad/s]
+
+    Raises:
+        InputError: it is known for less than ten points.
+    """
+    from scipy.signal import savgol_filter  # slow to import: measured speeds
+
+    time = recording.channels.time
+    known = np.flatnonzero(np.isfinite(speed))
+    begin, end = (float(time[known[0]]), float(time[known[-1]])) if len(known) else (0.0, 0.0)
+    edges = np.arange(begin, end, SPEED_STEP)
+    if len(edges) < 10:
+        raise input_error("has a drum speed for less than 2.5 s", where=str(recording.path))
+    window = np.minimum(((time[known] - begin) / SPEED_STEP).astype(int), len(edges) - 1)
+    counts = np.bincount(window, minlength=len(edges))
+    means = np.bincount(window, np.abs(speed[known]), len(edges)) / np.maximum(counts, 1)
+    middles = edges + 0.5 * SPEED_STEP
+    filled = np.interp(middles, middles[counts > 0], means[counts > 0])
+    smooth = np.maximum(savgol_filter(filled, 9, 2), 0.0)
+    profile = SpinProfile(time=tuple((middles - middles[0]).tolist()), speed=tuple(smooth.tolist()))
+    return profile, Alignment(-float(middles[0]))
+
+
+def speed_of_order_one(pair: Pair) -> FloatArray:
+    """Return the drum speed that order 1 of all sensors tells, at the samples of the recording.
+
+    It is the speed of the run, corrected by how the phases between measured and predicted signals
+    turn. NaN where no sensor shows order 1. (n,) [rad/s]
+    """
+    measured, predicted = vectors_of_order_one(pair.measured, pair.predicted, pair.run)
+    products = np.nan_to_num(measured.values * np.conj(predicted.values))
+    scale = np.max(np.abs(products), axis=0)
+    products = products / np.where(scale > 0.0, scale, 1.0)
+    turned = np.sum(products[1:] * np.conj(products[:-1]), axis=1)
+    time = measured.time.values
+    known = np.abs(turned) > 0.0
+    middles = 0.5 * (time[1:] + time[:-1])[known]
+    at = pair.alignment.of_run(pair.recording.channels.time)
+    if len(middles) < 2:
+        return np.full(len(at), np.nan)
+    slip = np.interp(at, middles, np.angle(turned[known]) / np.diff(time)[known])
+    run = pair.run
+    speed = np.interp(at, run.time.values, np.abs(run.drum_speed.values), np.nan, np.nan)
+    inside = (at >= middles[0]) & (at <= middles[-1])
+    return np.where(inside, speed * (1.0 + pair.alignment.rate) + slip, np.nan)
+
+
+def order_one(pair: Pair) -> xr.Dataset:
+    """Return order 1 of measured and predicted signals of a recording.
+
+    Returns:
+        Over time and sensor: complex `measured` and `predicted`, whose phases count from the drum
+        angle of the run; over sensor, the `correlation` of both after the turn by the angle `start`
+        [rad], by which the drum stood otherwise at the start; `speed` [rad/s] over time.
+    """
+    measured, predicted = vectors_of_order_one(pair.measured, pair.predicted, pair.run)
+    m, c = measured.values, predicted.values
+    sizes = np.sqrt(np.nansum(np.abs(m) ** 2, axis=0) * np.nansum(np.abs(c) ** 2, axis=0))
+    alike = np.nansum(m * np.conj(c), axis=0) / np.where(sizes > 0.0, sizes, np.inf)
+    start = 0.5 * float(np.angle(np.sum(alike**2)))  # a wrong sign of a sensor does not matter
+    turned = np.real(alike * np.exp(-1j * start))
+    if np.sum(np.sign(turned) * turned**2) < 0.0:
+        start, turned = start + np.pi, -turned
+    sensors = list(pair.recording.channels.values)
+    return xr.Dataset(
+        {
+            "measured": (("time", "sensor"), m),
+            "predicted": (("time", "sensor"), c),
+            "correlation": CORRELATION.variable("sensor", turned),
+            "start": PHASE.variable((), start),
+            "speed": SPEED.variable("time", np.abs(measured.speed.values)),
+        },
+        {"time": TIME.variable("time", measured.time.values), "sensor": sensors},
+    )
+
+
+def check_signs(pair: Pair, sensors: Mapping[str, RecordedSensor]) -> None:
+    """Check that no sensor has the other sign, and that the signals have something in common.
+
+    Signs are told by the correlations of order 1, or by gravity. The angle of the drum at the start
+    is unknown, so a single sensor without gravity can have either sign.
+
+    Raises:
+        InputError: a sensor has the other sign, or no signal is like its prediction.
+    """
+    path = str(pair.recording.path)
+    correlations = order_one(pair).correlation
+    for name, sensor in sensors.items():
+        k = list(sensors).index(name)
+        if _has_opposite_gravity(pair, sensor, k):
+            raise _reversed(path, name, "its mean has the other sign than gravity")
+        value = float(correlations.sel(sensor=name))
+        if value < REVERSED:
+            text = f"its order 1 has the correlation {value:.2f} with the prediction"
+            raise _reversed(path, name, text)
+    if len(sensors) and float(np.abs(correlations).max()) < LEAST_CORRELATION:
+        raise input_error(
+            f"no signal is like its prediction: the largest correlation of order 1 is "
+            f"{float(np.abs(correlations).max()):.2f}; is it the load, the profile and the machine "
+            "of the test? A channel of the drum speed would align it",
+            where=path,
+        )
+
+
+LEAST_GRAVITY = 3.0
+"""Smallest mean of an accelerometer that tells its sign. [m/s^2]"""
+
+
+def _has_opposite_gravity(pair: Pair, sensor: RecordedSensor, k: int) -> bool:
+    if not sensor.shows_gravity:
+        return False
+    measured, predicted = (float(np.nanmean(signal[:, k])) for signal in pair.both)
+    return measured * predicted < 0.0 and min(abs(measured), abs(predicted)) > LEAST_GRAVITY
+
+
+def _reversed(path: str, name: str, why: str) -> Exception:
+    return input_error(
+        f"has the other sign than its sensor is declared with: {why}; turn its axis, or set "
+        "polarity (negative for a signal of the other sign)",
+        where=path,
+        key=name,
+    )
+
+
+def gravity_warnings(pairs: Sequence[Pair], sensors: Mapping[str, RecordedSensor]) -> list[str]:
+    """Return a warning of each accelerometer that does not show the gravity that it should."""
+    warnings = []
+    for k, (name, sensor) in enumerate(sensors.items()):
+        if not sensor.shows_gravity:
+            continue
+        measured, predicted = (
+            float(np.mean([np.nanmean(pair.both[side][:, k]) for pair in pairs])) for side in (0, 1)
+        )
+        unit = QUANTITIES["acceleration"]
+        if abs(measured - predicted) > 1.0:
+            warnings.append(
+                f"{name}: its mean is {unit.text(measured)}, with gravity it would be "
+                f"{unit.text(predicted)}. If it is AC-coupled or without gravity, say so: "
+                "ac_coupling, or gravity: removed."
+            )
+    return warnings

@@ -1,0 +1,150 @@
+"""Check the options of the comparison of recordings with a machine, and run it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from wm_drake.errors import InputError, input_error
+from wm_drake.model.frame_poses import FramePoses
+from wm_drake.model.machine import Machine
+from wm_drake.model.scene import Scene
+from wm_drake.model.sdf_names import frame_problem
+from wm_drake.parameters import SpinProfile
+from wm_drake.parameters.recorded_sensors import (
+    RecordedSensor,
+    RecordedTest,
+    load_recorded_test,
+    recorded_test_of,
+)
+from wm_drake.parameters.types import FloatArray
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.records import Record
+from wm_drake.studies.answer import Answer
+from wm_drake.studies.compare.gaps import gaps_of
+from wm_drake.studies.compare.options import CompareOptions
+from wm_drake.studies.compare.page import compare_answer
+from wm_drake.studies.compare.pairs import (
+    Pair,
+    check_signs,
+    measured_profile,
+    pair_at,
+    paired,
+    predicted_signals,
+    recorded_speed,
+    speed_of_order_one,
+)
+from wm_drake.studies.compare.recordings import TestRecording, read_test, used_sensors
+from wm_drake.studies.executor import Executor
+from wm_drake.studies.inputs import channel_names, existing_file, problems_of_file, selected_cases
+from wm_drake.studies.study import Task
+
+
+class CompareTask(Task):
+    """The comparison with checked options."""
+
+    def __init__(self, options: CompareOptions, machine: Machine) -> None:
+        """Read test, recordings, load and profile."""
+        self.options, self.machine = options, machine
+        parameters = machine.parameters
+        if parameters.cabinet_moves:
+            raise input_error(
+                "the sensors of a recording need a cabinet that does not move; leave it out",
+                key="cabinet.moves",
+            )
+        self.test = recorded_test_of(parameters)
+        if options.test is not None:
+            self.test = load_recorded_test(existing_file(options.test, "--test"))
+        with problems_of_file(options.test or Path("--machine")):
+            self.points = sensor_points(machine, self.test)
+        self.case = self._case()
+        names, _ = channel_names(options, ("time", "speed", *self.test.sensors))
+        paths = [existing_file(path, "RECORD") for path in options.records]
+        for path in paths:
+            if paths.count(path) > 1:
+                raise input_error(f"'{path}' is given twice", where="RECORD")
+        recordings = [read_test(path, self.test, names) for path in paths]
+        self.sensors = used_sensors(recordings, self.test)
+        self.recordings = [_of_sensors(recording, self.sensors) for recording in recordings]
+
+    def _case(self) -> Case:
+        load = self.options.load or self.test.load
+        if load is None:
+            loads = self.machine.parameters.loads
+            if len(loads) > 1:
+                raise input_error(
+                    f"the machine has the loads {', '.join(loads)}; name that of the test: --load, "
+                    "or load in the file of --test",
+                    where="--load",
+                )
+            load = next(iter(loads))
+        return selected_cases(self.machine.parameters, [load], True, self.options.profile)[0]
+
+    def run(self, executor: Executor) -> Answer:
+        """Run the machine, align the recordings, and compare."""
+        pairs = self.pairs(executor)
+        for pair in pairs:
+            check_signs(pair, self.sensors)
+        gaps = gaps_of(pairs, self.sensors, self.points, Scene(self.machine.parameters))
+        driven = "that of the profile" if self.options.speed == "profile" else "recorded"
+        details = (("Load", self.case.name), ("Drum speed of the model", driven))
+        return compare_answer(self.machine.parameters, pairs, self.sensors, gaps, details)
+
+    def pairs(self, executor: Executor) -> list[Pair]:
+        """Run the machine, and return the recordings on the times of the runs."""
+        speeds = [recorded_speed(recording, self.test) for recording in self.recordings]
+        pairs: list[Pair] = []
+        if self.options.speed == "profile" or any(speed is None for speed in speeds):
+            run = self._runs(executor, [self.case.profile])[0]
+            predicted = predicted_signals(run, self.sensors, self.points)
+            pairs = [paired(one, run, predicted, self.test) for one in self.recordings]
+        if self.options.speed == "profile":
+            return pairs
+        followed = [
+            measured_profile(one, speed_of_order_one(pairs[k]) if speed is None else speed)
+            for k, (one, speed) in enumerate(zip(self.recordings, speeds, strict=True))
+        ]
+        runs = self._runs(executor, [profile for profile, _ in followed])
+        return [
+            pair_at(one, run, predicted_signals(run, self.sensors, self.points), alignment)
+            for one, run, (_, alignment) in zip(self.recordings, runs, followed, strict=True)
+        ]
+
+    def _runs(self, executor: Executor, profiles: Sequence[SpinProfile]) -> list[Record]:
+        cases = [
+            replace(self.case, name=f"{self.case.name} {number}", profile=profile)
+            for number, profile in enumerate(profiles, 1)
+        ]
+        records: dict[int, Record] = {}
+        executor.records(self.machine, cases, records.__setitem__, "runs")
+        for record in records.values():
+            if record.attrs["diverged"]:
+                raise input_error(f"the run diverged: {record.attrs['diverged']}", key="machine")
+        return [records[number] for number in range(len(cases))]
+
+
+def sensor_points(machine: Machine, test: RecordedTest) -> dict[str, FloatArray]:
+    """Return the positions of the sensors of a test in the frame of the tub, by name. [m]
+
+    Raises:
+        InputError: a frame is not one of the tub of this machine.
+    """
+    frames = {n: sensor.frame for n, sensor in test.sensors.items() if sensor.frame is not None}
+    problems = [
+        problem
+        for name, frame in frames.items()
+        for problem in frame_problem(machine.plant, f"sensors.{name}.frame", "tub", frame)
+    ]
+    if problems:
+        raise InputError(problems)
+    poses = FramePoses(machine.plant, machine.parameters)
+    at_frames = {name: poses("tub", frame)[0] for name, frame in frames.items()}
+    points = {n: np.array(s.point) for n, s in test.sensors.items() if s.point is not None}
+    return at_frames | points
+
+
+def _of_sensors(recording: TestRecording, sensors: Mapping[str, RecordedSensor]) -> TestRecording:
+    """Return a recording with the channels of some sensors only, in their order."""
+    values = {name: recording.channels.values[name] for name in sensors}
+    return replace(recording, channels=replace(recording.channels, values=values))

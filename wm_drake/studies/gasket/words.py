@@ -1,0 +1,75 @@
+"""Names and values of factors, terms and responses for reading."""
+
+from collections.abc import Mapping, Sequence
+
+import xarray as xr
+
+from wm_drake.parameters import FactorLevels
+from wm_drake.report.formatting import significant
+from wm_drake.report.quantity import Quantity
+from wm_drake.studies.doe.coding import LEVELS
+
+
+class Words:
+    """Names, physical values and units for reading."""
+
+    def __init__(self, factors: Sequence[FactorLevels], screening: xr.Dataset) -> None:
+        """Store the words.
+
+        Args:
+            factors: Levels of the factors.
+            screening: As of `screening.run_screening`.
+        """
+        self._factors = {factor.name: factor for factor in factors}
+        self._responses: Mapping[str, Quantity] = screening.value.attrs["each"]
+        self._terms = screening.term.values.tolist()
+
+    def factor(self, name: str) -> str:
+        """Return a factor for reading, such as `linear damping C_L`."""
+        about = self._factors[name].about if name in self._factors else ""
+        return f"{about.split(',')[0]} {name}" if about else name
+
+    def term(self, name: str) -> str:
+        """Return a term for reading: its factors, joined by a multiplication sign."""
+        return " × ".join(map(self.factor, name.split(":")))
+
+    def unit(self, factor: str) -> str:
+        """Return the unit of a factor's levels; "" if it has none."""
+        return next(iter(self._factors[factor].units.values()), "")
+
+    def number(self, factor: str, level: int) -> str:
+        """Return the physical value of a level, without unit."""
+        numbers = next(iter(self._factors[factor].numbers.values()))
+        return significant(numbers[level + 1])
+
+    def value(self, factor: str, level: int) -> str:
+        """Return the physical value of a level with its unit."""
+        return f"{self.number(factor, level)} {self.unit(factor)}".strip()
+
+    def values(self, factor: str) -> str:
+        """Return the physical values of all levels with the unit."""
+        numbers = ", ".join(self.number(factor, level) for level in LEVELS)
+        return f"{numbers} {self.unit(factor)}".strip()
+
+    def span(self, factor: str) -> str:
+        """Return the lowest and the highest value of a factor with the unit."""
+        return f"{self.number(factor, LEVELS[0])} to {self.value(factor, LEVELS[-1])}"
+
+    def axis(self, factor: str) -> str:
+        """Return the label of an axis of a factor: name, symbol, unit."""
+        return ", ".join(filter(None, (self.factor(factor), self.unit(factor))))
+
+    def response(self, name: str) -> str:
+        """Return a response for reading, such as `displacement x (Dx)`."""
+        title = self._responses[name].words
+        is_in_name = title.replace(" ", "_") == name or name in title.split()
+        return title if is_in_name else f"{title} ({name})"
+
+    def response_axis(self, name: str) -> str:
+        """Return the label of an axis of a response: name, symbol, unit."""
+        return self._responses[name].named(self.response(name)).label
+
+    def labels(self) -> dict[str, str]:
+        """Return the words of all responses and terms, for the labels of tables."""
+        responses = {name: self.response(name) for name in self._responses}
+        return responses | {term: self.term(term) for term in self._terms}
