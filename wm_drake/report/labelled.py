@@ -147,9 +147,10 @@ def _rows(data: xr.Dataset) -> pd.DataFrame:
     sizes = {dim: data.sizes[dim] for dim in _dims_of(data)}
     labels = [name for name in dict.fromkeys([*sizes, *data.coords]) if name in data.coords]
     # many times as fast as `Dataset.to_dataframe`
+    variables = {name: _in_reading_unit(data[name]).variable for name in (*labels, *data)}
     columns = {
-        name: _in_reading_unit(data[name]).variable.set_dims(sizes).transpose(*sizes).values
-        for name in (*labels, *data)
+        name: variable.set_dims(sizes).transpose(*sizes).values  # type: ignore[no-untyped-call]
+        for name, variable in variables.items()
     }
     frame = pd.DataFrame({name: values.ravel() for name, values in columns.items()})
     return frame.dropna(how="all", subset=list(data)).reset_index(drop=True)

@@ -180,7 +180,7 @@ def _of_measure(name: str) -> Quantity | None:
 
     variables = (variable for measure in MEASURES.values() for variable in measure.variables)
     known = next((variable for variable in variables if variable.name == name), None)
-    return known and Quantity(known.kind, known.unit, known.studio)
+    return None if known is None else Quantity(known.kind, known.unit, known.studio)
 
 
 def named(array: "xr.DataArray", words: str) -> "xr.DataArray":
