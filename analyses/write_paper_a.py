@@ -34,7 +34,10 @@ from wm_drake.rigs import (
     measures_of,
 )
 from wm_drake.studies.rig.study import printed_table
-from wm_drake.studies.spin_cycle.study import compiled_runs, run_spin_cycle
+from wm_drake.studies.spin_cycle.study import (
+    compiled_runs,
+    run_spin_cycle,
+)
 
 MM = 1e-3
 FIG_16 = 5.0, 0.8

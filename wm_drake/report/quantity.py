@@ -176,6 +176,7 @@ def of_measure(name: str) -> Quantity:
 
 
 def _of_measure(name: str) -> Quantity | None:
+    """Return the quantity of a variable of a measure by its name; None for another one."""
     from wm_drake.simulation.measures import MEASURES  # registered ones too, so at each call
 
     variables = (variable for measure in MEASURES.values() for variable in measure.variables)

@@ -406,9 +406,8 @@ def _envelopes(record: Record, title: str, amplitudes: xr.DataArray) -> Plot:
         amplitudes: Amplitudes of the case over source and sensor. [m]
     """
     low, high = band_of(record)
-    measured = amplitudes.sel(source=EXPERIMENT)
     return Plot(
-        envelopes_figure(record, measured),
+        envelopes_figure(record, amplitudes.sel(source=EXPERIMENT)),
         f"Envelopes, load {title}.",
         f"Load {title}: displacement in the band {low:g}–{high:.3g} Hz. The shaded area extends "
         "from the lower to the upper envelope. Dashed lines: measured amplitude.",
