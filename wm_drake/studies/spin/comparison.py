@@ -168,7 +168,7 @@ def _numbers(runs: SpinRuns) -> dict[tuple[str, str, str, str], float]:
             labels = itertools.product(*(map(str, array[dim].values) for dim in array.dims))
             for of, value in zip(labels, quantity.values(array).ravel().tolist(), strict=True):
                 if case.has_gasket or of != ("gasket",):
-                    numbers[case.case.name, words, " ".join(of), quantity.unit_text] = value
+                    numbers[case.case.name, words, " ".join(of), quantity.reading.label] = value
     return numbers
 
 
