@@ -1,5 +1,6 @@
 """Comparison of spin runs: machines, or one with and without gasket; one table and one picture."""
 
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, TypeAlias
 
@@ -12,11 +13,9 @@ from wm_drake.parameters.measured import EXPERIMENT
 from wm_drake.report import figure as fig
 from wm_drake.report.formatting import MISSING, listed
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import Quantity, of_measure
+from wm_drake.report.quantity import Quantity, of_measure, quantity_of
 from wm_drake.report.table import readable
 from wm_drake.simulation.displacements import envelopes, smooth_envelope
-from wm_drake.simulation.measures import MEASURES
-from wm_drake.simulation.measures.record import labelled_values
 from wm_drake.simulation.measures.registry import tabulated
 from wm_drake.simulation.records import Record
 from wm_drake.studies.answer import Answer, Part, Plot
@@ -156,21 +155,20 @@ def differences_of(variants: Variants, references: Mapping[str, str]) -> xr.Data
 
 def _numbers(runs: SpinRuns) -> dict[tuple[str, str, str, str], float]:
     """Return numbers in their units for reading, by load, measure, what they are of, and unit."""
-    known = {v.name: v for measure in MEASURES.values() for v in measure.variables}
-    variables = [known[name] for name in COMPARED] + tabulated()
-    steady, numbers = of_measure("amplitude"), dict[tuple[str, str, str, str], float]()
+    names = [*COMPARED, *(variable.name for variable in tabulated())]
+    numbers = dict[tuple[str, str, str, str], float]()
     for row, case in enumerate(runs.results):
-        table, load = runs.measures.isel(load=row), case.case.name
-        for variable in (variable for variable in variables if variable.name in table):
-            words = variable.name.replace("_", " ")
-            for labels, value in labelled_values(table, variable):
-                if case.has_gasket or labels != ("gasket",):
-                    key = load, words, " ".join(labels), variable.unit_text
-                    numbers[key] = np.nan if value is None else value
+        table = runs.measures.isel(load=row)
+        shown = {name.replace("_", " "): table[name] for name in names if name in table}
         if window := steady_window(case.case.profile):
-            for size in steady_amplitudes(case.record, window):
-                key = load, STEADY, str(size.sensor.item()), steady.unit.label
-                numbers[key] = float(steady.values(size))
+            steady = steady_amplitudes(case.record, window)
+            shown[STEADY] = steady.assign_attrs(of_measure("amplitude").attributes())
+        for words, array in shown.items():
+            quantity = quantity_of(array)
+            labels = itertools.product(*(map(str, array[dim].values) for dim in array.dims))
+            for of, value in zip(labels, quantity.values(array).ravel().tolist(), strict=True):
+                if case.has_gasket or of != ("gasket",):
+                    numbers[case.case.name, words, " ".join(of), quantity.reading.label] = value
     return numbers
 
 

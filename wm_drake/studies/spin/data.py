@@ -54,7 +54,8 @@ def amplitudes_of(runs: SpinRuns) -> xr.Dataset:
         for row in of_case.to_dict("records") if runs.is_compared(case) else ():
             labels.append((name, gasket, row["source"]))
             bands.append("")
-            sizes.append(quantity.to_si([row[sensor] for sensor in sensors]))
+            of_row = np.array([row[sensor] for sensor in sensors], dtype=float)
+            sizes.append(of_row / quantity.unit.from_si(1.0))  # a file is in mm
         labels.append((name, gasket, OURS))
         bands.append(band_text(case).replace("–", " to "))
         sizes.append(case.measures.amplitude.sel(sensor=sensors).values)

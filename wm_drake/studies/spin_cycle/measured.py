@@ -23,7 +23,7 @@ DIMS = ("case", "region", "accelerometer", "axis")
 
 RMS = Quantity("RMS displacement", Unit("m", "mm"), 3)
 
-RMS_COLUMNS = ["case", "region", "sensor", "axis", f"rms{RMS.suffix}"]
+RMS_COLUMNS = ["case", "region", "sensor", "axis", f"rms_{RMS.unit.shown}"]
 """Columns of a file of RMS displacements, as read by `read_rms` and written by the study."""
 
 LEAST_ROWS = 32
@@ -61,7 +61,7 @@ def read_rms(path: Path, labels: Mapping[str, Sequence[str]]) -> xr.DataArray:
         [labels[dim].index(name) for name in names[column]]
         for column, dim in zip(RMS_COLUMNS, DIMS, strict=False)
     ]
-    measured[tuple(places)] = RMS.to_si(values)
+    measured[tuple(places)] = values / RMS.unit.from_si(1.0)
     return xr.DataArray(measured, labels, DIMS)
 
 
