@@ -16,11 +16,14 @@ EMPTY_WORDS = {"told", "found", "own", "wanted", "beside", "alone", "nothing"}
 """Words that do not say what a name holds."""
 
 MOST_ARGUMENTS = 5
-FORMULAS = ("laws/", "elements/", "engines/compiled/", "solid/", "rigs/heavy_sponge.py")
+FORMULAS = (
+    "laws/", "elements/", "engines/compiled/", "export/page_kernel.py", "solid/",
+    "rigs/heavy_sponge.py",
+)  # fmt: skip
 """Files whose functions may have many arguments.
 
 laws/, rigs/heavy_sponge.py: physical formulas, each quantity an argument with its unit.
-elements/, engines/compiled/, solid/: compiled functions on flat arrays. An object would be packed and
+elements/, engines/compiled/, export/, solid/: compiled functions on flat arrays. An object would be packed and
 unpacked at each call from Python, and each of its types compiles another form.
 """
 

@@ -111,7 +111,7 @@ def generic(compiled: Any) -> Callable[..., Any]:
 
 
 @numba.njit
-def _nothing():
+def _keep_alignment():
     """Do nothing, where a loop for lanes aligns its stack."""
 
 
@@ -136,7 +136,7 @@ def for_one_run(loop: Any) -> Any:
     """
     source = loop.py_func
     single = {
-        "lane_array": number_array, "align_stack": _nothing, "WIDTH": 1, "np": _ON_STACK
+        "lane_array": number_array, "align_stack": _keep_alignment, "WIDTH": 1, "np": _ON_STACK
     }  # fmt: skip
     function = types.FunctionType(
         source.__code__, source.__globals__ | single, source.__name__, source.__defaults__

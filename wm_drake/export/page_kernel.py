@@ -483,6 +483,7 @@ def _feet(plan: Any) -> Any:
     at, numbers, cabinet = plan.at, plan.count.packed - FEET.fixed_size, plan.elements.cabinet
     first = 0 if cabinet is None else cabinet + FEET_BEGIN
     growth, sag = PADS.offsets["damping_growth"], PADS.fixed_size + FOOT.offsets["at_rest"]
+    foot = FOOT.fixed_size
 
     @njit(**OPTIONS)
     def load_feet(v, motion):
@@ -493,7 +494,7 @@ def _feet(plan: Any) -> Any:
         mean = 0.25 * (normal[0] + normal[1] + normal[2] + normal[3])
         p[first + growth] = pads.vertical_stiffness / (FULL_DAMPING * mean)
         for i in range(FEET_COUNT):
-            p[first + sag + FOOT.fixed_size * i] = normal[i] / pads.vertical_stiffness
+            p[first + sag + foot * i] = normal[i] / pads.vertical_stiffness
 
     return load_feet
 

@@ -204,13 +204,13 @@ def _page_data(parameters: MachineParameters) -> dict[str, Any]:
 
 def _candidates(opened: OpenMachine) -> Candidates:
     """Return value and ends of each number that may enter the compiled functions. [SI]"""
-    found = {}
+    candidates = {}
     for key, slider in opened.sliders.items():
         if slider.needs or key.startswith(NOT_HERE):
             continue
         si = 1.0 / slider.unit.from_si(1.0)
-        found[key] = float(slider.number.nominal or 0.0), slider.low * si, slider.high * si
-    return found
+        candidates[key] = float(slider.number.nominal or 0.0), slider.low * si, slider.high * si
+    return candidates
 
 
 def _machine(
