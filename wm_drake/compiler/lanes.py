@@ -245,7 +245,8 @@ def stack_array(typing_context, shape):
         sizes = cgutils.unpack_tuple(builder, args[0]) if is_tuple else [args[0]]
         word = context.get_value_type(types.intp)
         sizes = [builder.sext(n, word) if n.type.width < word.width else n for n in sizes]
-        strides, stride = [], word(8)
+        strides: list[Any] = []
+        stride = word(8)
         for n in reversed(sizes):
             strides.insert(0, stride)
             stride = builder.mul(stride, n)

@@ -539,7 +539,7 @@ def _advance(plan: Any) -> Any:
     size, inputs, run = elements.begins.size, at.stage - at.inputs, for_one_run(integrate_lanes)
 
     @njit(**OPTIONS)
-    def advance(steps, n, v, c, history):  # noqa: ARG001
+    def advance(steps, n, v, c, history):
         work = Work(
             part(v, at.rate, size),
             part(v, at.inputs, inputs),

@@ -154,9 +154,10 @@ class Contents:
             for y in self.depths
             for axis in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
         ]
-        feet = packed_feet(parameters.cabinet, parameters.gravity) if setup.cabinet else []
-        points = setup.measured_points.ravel(), *orbits
-        return np.concatenate([pack(setup)[0], lengths, *points, feet])
+        rows = [pack(setup)[0], lengths, setup.measured_points.ravel(), *orbits]
+        if setup.cabinet:
+            rows.append(packed_feet(setup.cabinet.cabinet, parameters.gravity))
+        return np.concatenate(rows)
 
     def _derived(self) -> np.ndarray:
         """Return the rows that the functions compute from others."""
