@@ -20,6 +20,7 @@ from wm_drake.parameters import SpinProfile, load_component, load_machine, quant
 from wm_drake.parameters.designs import load_design
 from wm_drake.parameters.free import FreeFile, load_free
 from wm_drake.parameters.gasket_drawing import load_gasket_drawing
+from wm_drake.parameters.recorded_sensors import load_recorded_test
 from wm_drake.parameters.tolerances import load_limits, load_tolerances
 from wm_drake.parameters.variation import number_at
 from wm_drake.simulation.measures import measure
@@ -169,7 +170,9 @@ MACHINES = [  # page, index of the block, a number in it by key path
     (page("own-machine"), 0, "bodies.upper_counterweight.mass", 9.5),
     (page("own-machine"), 1, "spring_types.suspension.stiffness", None),
     (page("own-machine"), 2, "imperfections.residual_imbalance.mass", 0.02),
+    (page("own-machine"), 3, "elements.left_buffer.loss", 0.4),
     (page("compliant-bearing"), 0, "imperfections.bearing.y", None),
+    (page("compliant-bearing"), 1, "imperfections.bearing.clearance", 1e-4),
     (page("drive"), 0, "drive.belt_ratio", 12.0),
     (page("extend"), 0, "elements.slow.coefficient", 400.0),
     (page("floor"), 0, "cabinet.friction", 0.5),
@@ -177,6 +180,7 @@ MACHINES = [  # page, index of the block, a number in it by key path
     (page("rubber"), 0, "gasket.dahl_force_y", 4.0),
 ]
 OTHERS = [
+    (page("accelerometers"), 0, load_recorded_test),
     (page("bench-to-machine"), 0, load_component),
     (page("calibrate"), 0, load_free),
     (page("designs"), 0, load_design),
