@@ -10,19 +10,19 @@ interval contains the planted value. Fits are kept in a ledger; a second call go
 
 import argparse
 import sys
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 from analysis_tools import validation_page as page
 from analysis_tools.spin_profiles import faster_profile
 
-from wm_drake.batch import simulate_many, sources_version
+from wm_drake.batch import sources_version
 from wm_drake.batch.ledger import LedgerEntry, key_of, open_ledger
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import load_machine, load_profile
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.unbalance_cases import load_unbalance_cases
+from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.spin_identify.options import SpinIdentifyOptions
 from wm_drake.studies.spin_identify.study import (
     SpinModel,
@@ -69,10 +69,9 @@ def _model(faster: float, *, quick: bool) -> SpinModel:
     names = DEFAULT_CASES[:1] if quick else DEFAULT_CASES
     cases = tuple(case for case in load_unbalance_cases() if case.name in names)
     sought = unknowns_of(parameters, QUICK if quick else ())
-    regions = partial(simulate_many, machine, measures=("regions",), workers=1)
-    return SpinModel(
-        parameters, faster_profile(load_profile("spin_cycle"), faster), cases, sought, regions
-    )
+    experiment = Experiment(machine, ("regions",))
+    profile = faster_profile(load_profile("spin_cycle"), faster)
+    return SpinModel(experiment, parameters, profile, cases, sought)
 
 
 def _identified(model: SpinModel, seed: int) -> FloatArray:

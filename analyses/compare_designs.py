@@ -101,7 +101,8 @@ def main() -> None:
             | errors
         )
     text = pd.DataFrame(rows).round(2).to_string(index=False)
-    print(f"contributions above {SMALLEST_SHARE:.0%}, largest error in percentage points\n{text}")
+    smallest = 100.0 * SMALLEST_SHARE
+    print(f"contributions above {smallest:g} %, largest error in percentage points\n{text}")
     if arguments.out:
         arguments.out.write_text(text + "\n")
 

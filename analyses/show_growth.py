@@ -23,6 +23,7 @@ from typing import Any
 from compare_speed import gasket_machines, linear_machine
 
 import wm_drake as wm
+from wm_drake.batch.cluster import cluster_client
 from wm_drake.batch.ledger import open_ledger
 from wm_drake.report.drawing import matplotlib_of
 from wm_drake.report.figure import OURS, QUIET, Axis, Figure, Line, Panel, in_grid
@@ -43,17 +44,18 @@ def cluster() -> Iterator[Any]:
     """Yield a client of a cluster of two processes of this computer."""
     from dask.distributed import Client
 
+    dask = [sys.executable, "-m", "dask"]
     with tempfile.TemporaryDirectory() as folder, ExitStack() as stack:
         file = Path(folder) / "scheduler.json"
         for words in (("scheduler", "--port", "0"), *[("worker", "--nthreads", "1")] * 2):
-            command = [sys.executable, "-m", "dask", words[0], "--scheduler-file", str(file)]
-            process = subprocess.Popen(
-                [*command, "--no-dashboard", *words[1:]], stderr=subprocess.DEVNULL
-            )
+            command = [*dask, *words, "--scheduler-file", str(file), "--no-dashboard"]
+            process = subprocess.Popen(command, stderr=subprocess.DEVNULL)
+            stack.callback(process.wait)
             stack.callback(process.terminate)
-        client = stack.enter_context(Client(scheduler_file=str(file), timeout=60.0))
-        client.wait_for_workers(2)
-        yield client
+        with Client(scheduler_file=str(file), timeout=60.0) as client:
+            client.wait_for_workers(2)
+            address = client.scheduler.address
+        yield stack.enter_context(cluster_client(address))
 
 
 @contextmanager

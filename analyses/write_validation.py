@@ -34,9 +34,8 @@ from wm_drake.parameters import MachineParameters, published_results
 from wm_drake.parameters.files import read_yaml
 from wm_drake.parameters.unbalance_cases import load_unbalance_cases
 from wm_drake.rigs import Harmonic
-from wm_drake.studies.spin.comparison import effect_table
+from wm_drake.studies.spin.comparison import differences_of
 from wm_drake.studies.spin.study import run_spin
-from wm_drake.studies.spin.tables import amplitude_table
 from wm_drake.studies.spin_cycle.study import compiled_runs, run_spin_cycle
 
 HERE = Path(__file__).parent
@@ -60,13 +59,14 @@ def coulomb(quick: bool) -> pd.DataFrame:
 def compared(reference: MachineParameters, quick: bool, means_kind: str) -> list[rows.Row]:
     """Return a row for each published number; with --quick, without the spin cycle."""
     cases = [Case(name, load, reference.profile) for name, load in reference.loads.items()]
-    both = [
-        run_spin(reference, [replace(case, gasket=gasket) for case in cases])
-        for gasket in (False, True)
-    ]
-    table = rows.amplitude_rows(pd.concat([amplitude_table(result) for result in both]))
+    both = {
+        name: run_spin(reference, [replace(case, gasket=gasket) for case in cases])
+        for name, gasket in (("without", False), ("with", True))
+    }
+    amplitudes = pd.concat([rows.amplitude_table(runs) for runs in both.values()])
+    table = rows.amplitude_rows(amplitudes)
     table += rows.held_out_table_rows(pd.read_csv(HELD_OUT), pd.read_csv(HELD_OUT_STUDY))
-    table += rows.effect_rows(effect_table(*both))
+    table += rows.effect_rows(differences_of(both, dict.fromkeys(both, "without")))
     published = published_results(reference.published)
     screening = screening_of(reference, QUICK if quick else ORTHOGONAL)
     table += rows.mean_rows(screening, published, means_kind)
@@ -74,9 +74,8 @@ def compared(reference: MachineParameters, quick: bool, means_kind: str) -> list
         chosen = [case for case in load_unbalance_cases() if case.name in SHOWN_BY_A]
         free = load_machine("free_stroke")
         runs = compiled_runs(build_machine(free))
-        table += rows.spin_cycle_rows(
-            run_spin_cycle(free, chosen, load_profile("spin_cycle"), runs)
-        )
+        cycle = run_spin_cycle(free, chosen, load_profile("spin_cycle"), runs)
+        table += rows.spin_cycle_rows(cycle.rms)
     return table + rows.coulomb_rows(coulomb(quick))
 
 

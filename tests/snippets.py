@@ -17,7 +17,7 @@ from wm_drake.rigs import Harmonic, bushing_bench, damper_bench, force_loops
 from wm_drake.simulation.recorded_signal import recorded_signal
 from wm_drake.simulation.runs import simulate
 from wm_drake.studies.compare.task import sensor_points
-from wm_drake.studies.spin_cycle.measured import rms_table
+from wm_drake.studies.spin_cycle.page import rms_table
 from wm_drake.studies.spin_cycle.study import compiled_runs, run_spin_cycle
 
 PAGES = [README, *(path for path in MANUAL if path.parent.name != "decisions")]
@@ -179,7 +179,7 @@ def write_spin_cycle(path):
     cases = [case for case in load_unbalance_cases() if case.name == "2"]
     runs = compiled_runs(build_machine(machine))
     result = run_spin_cycle(machine, cases, load_profile("spin_cycle"), runs)
-    rms_table(result.displacement).to_csv(path, index=False)
+    rms_table("rms", result.rms).frame().to_csv(path, index=False)
 
 
 def write_design(path):

@@ -33,7 +33,6 @@ from wm_drake.parameters.units import Unit
 from wm_drake.report.quantity import Quantity
 from wm_drake.studies.doe.design import make_design
 from wm_drake.studies.gasket.screening import run_screening, runs_of
-from wm_drake.studies.spin_cycle.study import SpinCycleRuns
 
 
 @pytest.fixture
@@ -60,15 +59,22 @@ def test_amplitudes_are_judged_by_their_difference(amplitude_table):
 
 
 def test_effects_are_judged_by_their_sign():
-    table = pd.DataFrame(
+    nan = np.nan
+    change = [0.2, 0.05, -0.04, 0.15, 0.09, 0.01, -0.11, 0.9, nan, 0.02]
+    published = [0.5, -0.2, 0.03, 0.03, nan, *[nan] * 5]
+    reference = [*[1.0] * 5, 5.0, 1.0, 0.4, nan, 3.0]  # the third steady one is too small to count
+    dims, first = ("row", "variant"), np.full(10, nan)
+    table = xr.Dataset(
         {
-            "load": ["middle"] * 5,
-            "sensor": list("abcde"),
-            "experiment_percent": [50.0, -20.0, 3.0, 3.0, np.nan],
-            "percent": [20.0, 5.0, -4.0, 15.0, 9.0],
-            "steady_percent": [1.0, -11.0, 90.0, np.nan, 2.0],
-            "steady_without_mm": [5.0, 1.0, 0.4, np.nan, 3.0],  # the third is too small to count
-        }
+            "value": (dims, np.column_stack([reference, first])),
+            "change": (dims, np.column_stack([first, change])),
+            "measured_change": (dims, np.column_stack([first, published])),
+        },
+        {
+            "load": ("row", ["middle"] * 10),
+            "measure": ("row", ["amplitude"] * 5 + ["steady amplitude"] * 5),
+            "of": ("row", list("abcde") * 2),
+        },
     )
     *effects, steady = effect_rows(table)
     assert [row.verdict for row in effects] == [MET, MISSED, MET, MISSED]
@@ -111,8 +117,7 @@ def test_spin_cycle_is_judged_by_what_the_paper_says():
     size.loc["5", "R3", "b", "y"] = 1.0
     size.loc["5", "R2", "b", "y"] = 0.8
     size.loc["29", "R1", "c", "z"] = 0.4
-    result = SpinCycleRuns(None, None, (), size, size, size, size, (), xr.Dataset())
-    y, z, rear, opposite, errors = spin_cycle_rows(result)
+    y, z, rear, opposite, errors = spin_cycle_rows(size)
     assert [row.verdict for row in (y, z, rear, opposite, errors)] == [MET, MET, MISSED, MET, OPEN]
     assert (rear.published, rear.ours) == ("R2", "R3")
     assert rear.reason == "R2 has 80 % of the vibration in R3"

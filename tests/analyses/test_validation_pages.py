@@ -7,13 +7,12 @@ from dataclasses import replace
 import pandas as pd
 import pytest
 from analysis_tools.validation_page import UNEXPLAINED
-from analysis_tools.validation_rows import MISSED, amplitude_rows
+from analysis_tools.validation_rows import MISSED, amplitude_rows, amplitude_table
 from documents import CHECKOUT, text_of
 from ruamel.yaml import YAML
 
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.spin.study import run_spin
-from wm_drake.studies.spin.tables import amplitude_table
 
 PAGE = CHECKOUT / "docs" / "validation.md"
 SECTIONS = re.split(r"^##+ ", text_of(PAGE), flags=re.MULTILINE)[1:]

@@ -21,7 +21,7 @@ from wm_drake.studies.gasket.screening import at, run_screening, runs_of
 from wm_drake.studies.gasket.study import GasketTrials
 from wm_drake.studies.gasket.surface import models_of, predicted
 from wm_drake.studies.machine_show.page import machine_answer
-from wm_drake.studies.spin.page import spin_page as page_of_spin
+from wm_drake.studies.spin.page import spin_answer
 from wm_drake.studies.study import Facts
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
@@ -64,7 +64,8 @@ def screening(machine):
 
 
 def spin_page(machine, _):
-    return page_of_spin(spin_result(machine, [case_result(machine, "middle", samples=4000)]))
+    runs = spin_result(machine, [case_result(machine, "middle", samples=4000)])
+    return spin_answer(runs).page(Facts())
 
 
 def gasket_page(_, screening):

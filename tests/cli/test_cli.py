@@ -98,9 +98,18 @@ class PlainRun:
     folder: Path
 
     @property
-    def case(self):
-        (case,) = strict_json(self.ended.stdout)["cases"]
-        return case
+    def shown(self):
+        return strict_json(self.ended.stdout)
+
+    def table(self, name):
+        """Return a table of the result by its labels, as printed."""
+        return table_of(self.shown, name)
+
+
+def table_of(shown, name):
+    """Return a table of a result in JSON, by its columns of text."""
+    frame = pd.DataFrame(shown[name])
+    return frame.set_index([column for column in frame if isinstance(frame[column][0], str)])
 
 
 @pytest.fixture(scope="module")
@@ -118,48 +127,29 @@ def in_own_process(*arguments, cwd):
 
 def test_spin_prints_one_json_object(plain):
     assert plain.ended.returncode == 0
-    printed = strict_json(plain.ended.stdout)
-    assert set(printed) == {"machine", "engine", "cases", "wall_s"}
-    assert (printed["machine"], printed["engine"]) == ("reference", "compiled")
-    case = plain.case
-    assert set(case) == {
-        *("load", "gasket", "amplitudes_mm", "detergent_box_mm", "gasket_force_N"),
-        *(
-            "gasket_moment_Nm",
-            "mount_force_N",
-            "cabinet_wrench",
-            "feet",
-            "walk",
-            "motor",
-            "balance",
-        ),
-        *("smallest_gap_mm", "smallest_spring_tension_N", "critical_rpm", "diverged", "wall_s"),
-        "displacement_band_hz",
-    }
-    assert (case["load"], case["gasket"], case["diverged"]) == ("middle", True, None)
-    assert list(case["amplitudes_mm"]) == list(case["critical_rpm"]) == SENSORS
-    assert list(case["detergent_box_mm"]) == ["Dx", "Dy", "Dz"]
-    assert list(case["gasket_force_N"]) == ["Fx", "Fy", "Fz"]
-    assert list(case["gasket_moment_Nm"]) == ["Mx", "My", "Mz"]
-    assert next(iter(case["mount_force_N"])) == "springs.left"
-    assert list(case["mount_force_N"])[-1] == "gasket"
-    for force in case["mount_force_N"].values():
-        assert force["peak"] > force["rms"] >= force["dynamic_rms"] > 0.0
-    feet = case["feet"]
-    assert set(feet) == {
-        *("smallest_normal_force_N", "slide_margin_N", "turn_margin_Nm", "tilt_margin_Nm"),
-        "regions",
-    }
-    assert list(feet["regions"]) == ["0 to 100 rpm"]  # the profile has no regions
-    assert feet["regions"]["0 to 100 rpm"]["slide_margin_N"] == feet["slide_margin_N"]
-    assert case["walk"] is None
-    assert 0.0 < feet["smallest_normal_force_N"] < 250.0
-    assert 0.0 < feet["slide_margin_N"] < 0.4 * 80.0 * 9.81
-    assert set(case["cabinet_wrench"]) == {"about", "force_N", "moment_Nm"}
-    assert list(case["cabinet_wrench"]["moment_Nm"]) == ["x", "y", "z"]
-    assert 0.0 < case["smallest_gap_mm"] < 100.0
-    assert all(0.0 <= rpm <= 100.0 + 1e-9 for rpm in case["critical_rpm"].values())
-    assert all(size > 0.0 for size in case["amplitudes_mm"].values())
+    printed = plain.shown
+    assert (printed["machine"], printed["title"]) == ("reference", "Spin run of machine reference")
+    assert printed["wall_s"] > 0.0
+    (run,) = printed["runs"]
+    assert (run["load"], run["gasket"], run["engine"]) == ("middle", "yes", "compiled")
+    assert run["diverged"] == ""
+    sensors = plain.table("sensors").loc["middle"]
+    assert list(sensors.index) == SENSORS
+    assert (sensors.amplitude_mm > 0.0).all()
+    assert sensors.critical_speed_rpm.between(0.0, 100.0 + 1e-9).all()
+    mounts = plain.table("mounts").loc["middle"]
+    assert (mounts.index[0], mounts.index[-1]) == ("springs.left", "gasket")
+    assert (mounts.peak_N > mounts["0 to 100 rpm_N"]).all()  # the profile has no regions
+    margins = plain.table("margins").loc["middle"]
+    assert list(margins.index) == ["whole run", "0 to 100 rpm"]
+    assert margins.slide_margin_N.nunique() == 1
+    assert 0.0 < margins.smallest_foot_load_N.iloc[0] < 250.0
+    assert 0.0 < margins.slide_margin_N.iloc[0] < 0.4 * 80.0 * 9.81
+    cabinet = plain.table("cabinet").loc["middle"]
+    assert list(cabinet.index) == ["x", "y", "z"]
+    assert (cabinet.cabinet_force_peak_N > cabinet.cabinet_force_dynamic_rms_N).all()
+    assert 0.0 < printed["gaps"][0]["smallest_gap_mm"] < 100.0
+    assert "walk" not in printed
 
 
 def test_nothing_else_is_printed(plain):
@@ -169,12 +159,11 @@ def test_nothing_else_is_printed(plain):
 
 
 def test_result_files_are_there_and_nothing_beside_them(plain):
-    assert sorted(str(path.relative_to(plain.folder)) for path in plain.folder.rglob("*")) == [
-        *(
-            "out", "out/amplitudes.csv", "out/record_middle.nc", "out/replay_middle.html",
-            "out/report.html", "out/run.json", "profile.yaml",
-        )
-    ]  # fmt: skip
+    tables = [name for name, value in plain.shown.items() if isinstance(value, list)]
+    assert {str(path.relative_to(plain.folder)) for path in plain.folder.rglob("*")} == {
+        *("out", "out/record_middle.nc", "out/replay_middle.html", "out/report.html"),
+        *("out/run.json", "profile.yaml", *(f"out/{name}.csv" for name in tables)),
+    }
 
 
 def test_record_can_be_loaded_and_agrees(plain):
@@ -186,21 +175,22 @@ def test_record_can_be_loaded_and_agrees(plain):
         "yes",
     )
     largest = {
-        "detergent_box_mm": 1e3 * record.detergent_displacement,
+        "detergent_displacement_mm": 1e3 * record.detergent_displacement,
         "gasket_force_N": record.bushing_force.squeeze("bushing"),
     }
+    printed = plain.table("largest")
     for name, values in largest.items():
-        assert abs(values).max("time").values == pytest.approx(list(plain.case[name].values()))
+        assert abs(values).max("time").values == pytest.approx(printed[name].tolist())
 
 
 def test_table_of_amplitudes_agrees(plain):
     table = pd.read_csv(plain.folder / "out" / "amplitudes.csv")
-    assert list(table.columns) == ["load", "gasket", "source", *SENSORS, "band"]
+    columns = [f"{name}_mm" for name in SENSORS]
+    assert list(table.columns) == ["load", "gasket", "source", "band", *columns]
     (computed,) = table[table["source"] == "wm_drake"].to_dict("records")
     assert computed["band"] == "0.5 to 20 Hz"
-    assert [computed[name] for name in SENSORS] == pytest.approx(
-        list(plain.case["amplitudes_mm"].values()), abs=1e-4
-    )
+    sizes = plain.table("sensors").amplitude_mm.tolist()
+    assert [computed[name] for name in columns] == pytest.approx(sizes, rel=1e-8)
 
 
 def test_replay_is_one_self_contained_page(plain):
@@ -220,16 +210,18 @@ def is_self_contained(page):
 
 def test_without_gasket_there_is_no_gasket_force(wm_drake):
     _, printed = spin(wm_drake, "--no-gasket")
-    (case,) = printed["cases"]
-    assert case["gasket"] is False
-    assert [*case["gasket_force_N"].values(), *case["gasket_moment_Nm"].values()] == [0.0] * 6
+    assert printed["runs"][0]["gasket"] == "no"
+    largest = pd.DataFrame(printed["largest"])
+    assert largest[["gasket_force_N", "gasket_moment_Nm"]].isna().all(axis=None)
+    assert "gasket" not in pd.DataFrame(printed["mounts"]).mount.tolist()
     assert load_record(Path("out/record_middle.nc")).attrs["gasket"] == "no"
 
 
 def test_set_changes_the_result_and_is_recorded(wm_drake, plain):
     load = "loads.middle.unbalances.0.mass = 500 g"
     _, printed = spin(wm_drake, "--set", load, "--set", "gasket.damping_x=0.03 N s/mm")
-    assert printed["cases"][0]["amplitudes_mm"]["Xr"] < 0.8 * plain.case["amplitudes_mm"]["Xr"]
+    sizes = [shown["sensors"][0]["amplitude_mm"] for shown in (printed, plain.shown)]
+    assert sizes[0] < 0.8 * sizes[1]
     attrs = load_record(Path("out/record_middle.nc")).attrs
     assert json.loads(attrs["load_parameters"])["unbalances"][0]["mass"] == 0.5
     assert json.loads(attrs["parameters"])["gasket"]["damping_x"] == pytest.approx(30.0)
@@ -262,7 +254,7 @@ def test_only_what_was_measured_is_judged_against_the_experiment(wm_drake, monke
     )
     machine = () if "--machine" in arguments else ("--machine", "own.yaml")
     load = () if "--load" in arguments else ("--load", "middle")
-    monkeypatch.setattr("wm_drake.studies.spin.page._envelopes_picture", lambda *_: None)
+    monkeypatch.setattr("wm_drake.studies.spin.page._envelopes_plot", lambda *_: None)
     assert wm_drake("spin", *machine, *load, *arguments, "--out", "out").code == 0
     sources = pd.read_csv("out/amplitudes.csv")["source"].tolist()
     assert sources == (["experiment", "wm_drake"] if compared else ["wm_drake"])
@@ -273,9 +265,9 @@ def test_load_file_equals_the_same_load_of_the_machine(wm_drake, plain):
     place = f"radius: {1e3 * one.radius:g} mm, y: {1e3 * one.y:g} mm"
     Path("towels.yaml").write_text(f"unbalances: [{{mass: 1 kg, {place}, phase: 0 deg}}]\n")
     _, printed = spin(wm_drake, load="towels.yaml")
-    (case,) = printed["cases"]
-    assert case["load"] == "towels"
-    assert {**case, "load": "middle", "wall_s": plain.case["wall_s"]} == plain.case
+    assert [run["load"] for run in printed["runs"]] == ["towels"]
+    for name in ("sensors", "largest", "mounts", "margins"):
+        assert [{**row, "load": "middle"} for row in printed[name]] == plain.shown[name]
     assert Path("out/record_towels.nc").is_file()
 
 
@@ -284,9 +276,9 @@ def test_diverging_run_exits_1_says_when_and_what_and_keeps_its_record(wm_drake,
     Path("violent.yaml").write_text(VIOLENT)
     ended, printed = spin(wm_drake, *replay, load="violent.yaml")
     assert ended.code == 1
-    (message,) = filter(None, ended.messages)
+    (message,) = (text for text in ended.messages if text.startswith("violent: "))
     assert re.match(r"violent: the run diverged at \d+\.\d+ s: (roll|pitch|yaw|x|y|z) = ", message)
-    assert message == f"violent: {printed['cases'][0]['diverged']}"
+    assert message == f"violent: {printed['runs'][0]['diverged']}"
     record = load_record(Path("out/record_violent.nc"))
     assert f"violent: {record.attrs['diverged']}" == message
     assert record.time.size >= 1

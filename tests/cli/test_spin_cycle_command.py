@@ -10,6 +10,7 @@ import pytest
 from machine_with_bearing import BEARING, UNITS
 
 from wm_drake.simulation.records import versions
+from wm_drake.studies.spin_cycle.measured import RMS_COLUMNS
 
 PROFILE = """
 time: (0, 4, 6) s
@@ -40,36 +41,42 @@ def whirling_file(tmp_path):
     return path
 
 
+def rms_of(shown, name="rms"):
+    """Return the RMS displacements of a result as JSON, (case, region, sensor, axis). [mm]"""
+    frame = pd.DataFrame(shown[name]).set_index(["case", "region", "sensor", "axis"])
+    return frame.rms_mm.to_xarray().reindex(case=[row["case"] for row in shown["cases"]])
+
+
 def test_prints_one_json_object_and_writes_what_it_says(study):
     ended = study("--json")
     assert (ended.code, len(ended.out.splitlines())) == (0, 1)
     shown = json.loads(ended.out)
     assert [case["case"] for case in shown["cases"]] == ["front", "both"]
-    tensions = [case["smallest_spring_tension_N"] for case in shown["cases"]]
-    assert all(min(found.values()) >= 0.0 for found in tensions)
-    assert list(tensions[0]) == ["left", "right", "rear"]
-    slack = any(0.0 in found.values() for found in tensions)
-    assert slack == ("Springs go slack" in Path("out/report.html").read_text(encoding="utf-8"))
-    rms = np.array([case["rms_mm"] for case in shown["cases"]])
+    tensions = pd.DataFrame(shown["springs"]).smallest_spring_tension_N
+    assert [row["spring"] for row in shown["springs"]] == ["left", "right", "rear"] * 2
+    page = Path("out/report.html").read_text(encoding="utf-8")
+    assert (tensions >= 0.0).all()
+    assert (tensions == 0.0).any() == ("Springs go slack" in page)
+    rms = rms_of(shown)
     assert rms.shape == (2, 2, 3, 3)
     assert rms.min() > 0.0
     assert sorted(path.name for path in Path("out").iterdir()) == [
-        "cases.csv", "feet.csv", "ledger.sqlite", "report.html", "rms.csv", "run.json",
+        "cases.csv", "displacements.csv", "feet.csv", "feet_regions.csv", "ledger.sqlite",
+        "mounts.csv", "regions.csv", "report.html", "rms.csv", "rms_from_acceleration.csv",
+        "run.json", "springs.csv",
     ]  # fmt: skip
     table = pd.read_csv("out/rms.csv")
-    np.testing.assert_allclose(table["rms_mm"].to_numpy().reshape(rms.shape), rms, rtol=1e-5)
-    page = Path("out/report.html").read_text(encoding="utf-8")
-    feet = pd.read_csv("out/feet.csv").set_index(["case", "part"])
-    for case in shown["cases"]:
-        parts = {"run": case["feet"], **case["feet"]["regions"]}
-        assert list(parts) == ["run", "R1", "R2"]
-        for part, values in parts.items():
-            for key in ("smallest_normal_force_N", "slide_margin_N", "turn_margin_Nm"):
-                assert feet.loc[(case["case"], part), key] == pytest.approx(values[key], rel=1e-5)
-                assert parts["run"][key] <= values[key]
-        assert case["feet"]["slide_margin_N"] > 0.0
-        assert case["mount_force_N"]["gasket"]["peak"] > case["mount_force_N"]["gasket"]["rms"] > 0
-    assert "Forces on the floor" in page
+    assert list(table) == RMS_COLUMNS
+    np.testing.assert_allclose(table.rms_mm.to_numpy().reshape(rms.shape), rms, rtol=1e-5)
+    feet = pd.read_csv("out/feet.csv").set_index("case")
+    regions = pd.read_csv("out/feet_regions.csv").set_index(["case", "region"])
+    margins = ["smallest_foot_load_N", "slide_margin_N", "turn_margin_Nm"]
+    for case, of_case in regions.groupby("case"):
+        lowest = of_case[[f"region_{name}" for name in margins]].min().to_numpy()
+        assert (feet.loc[case, margins] <= lowest + 1e-6 * abs(lowest)).all()
+    assert (feet.slide_margin_N > 0.0).all()
+    gasket = pd.DataFrame(shown["mounts"]).set_index("mount").loc["gasket"]
+    assert (gasket.mount_force_peak_N > gasket.mount_force_rms_N).all()
     assert "Case both: 400 g at the front and 400 g at the rear, 180° apart" in page
     own = page.replace("http://www.w3.org", "").replace("https://doi.org/", "")
     assert not re.search(r"https?://", re.sub(r"<script.*?</script>", "", own, flags=re.DOTALL))
@@ -82,11 +89,8 @@ def test_second_time_nothing_is_run_and_its_own_table_is_a_perfect_measurement(s
     again = study("--json", "--measured", "out/rms.csv", "--overwrite")
     assert again.code == 0
     shown = json.loads(again.out)
-    assert [case["rms_mm"] for case in shown["cases"]] == [
-        case["rms_mm"] for case in first["cases"]
-    ]
-    assert max(shown["relative_error"]["by_region_mean"]) < 1e-5
-    assert "average error" in Path("out/report.html").read_text(encoding="utf-8")
+    assert shown["rms"] == first["rms"]
+    assert max(region["mean_error_percent"] for region in shown["regions"]) < 1e-3
 
 
 def test_drakes_engine_runs_a_case_too(study):
@@ -94,31 +98,28 @@ def test_drakes_engine_runs_a_case_too(study):
     for engine in ("drake", "compiled"):
         ended = study("--json", "--case", "front", "--engine", engine, "--overwrite")
         assert ended.code == 0
-        shown[engine] = json.loads(ended.out)["cases"][0]
-    for name in ("rms_mm", "rms_from_acceleration_mm"):
-        np.testing.assert_allclose(shown["drake"][name], shown["compiled"][name], rtol=5e-4)
-    for key in ("smallest_normal_force_N", "slide_margin_N", "turn_margin_Nm"):
-        assert shown["drake"]["feet"][key] == pytest.approx(
-            shown["compiled"]["feet"][key], rel=5e-3
-        )
-    for mount, force in shown["compiled"]["mount_force_N"].items():
-        assert shown["drake"]["mount_force_N"][mount] == pytest.approx(force, rel=5e-3)
+        shown[engine] = json.loads(ended.out)
+    drake, compiled = shown["drake"], shown["compiled"]
+    for name in ("rms", "rms_from_acceleration"):
+        np.testing.assert_allclose(rms_of(drake, name), rms_of(compiled, name), rtol=5e-4)
+    for name in ("smallest_foot_load_N", "slide_margin_N", "turn_margin_Nm"):
+        assert drake["feet"][0][name] == pytest.approx(compiled["feet"][0][name], rel=5e-3)
+    ours, theirs = (pd.DataFrame(one["mounts"]).filter(like="_N") for one in (compiled, drake))
+    np.testing.assert_allclose(theirs, ours, rtol=5e-3)
     # Drake's distance of two shapes is good to some micrometres
-    np.testing.assert_allclose(
-        shown["drake"]["smallest_gap_mm"], shown["compiled"]["smallest_gap_mm"], atol=1e-2
-    )
+    gap, ours = (found["cases"][0]["smallest_gap_mm"] for found in (drake, compiled))
+    assert gap == pytest.approx(ours, abs=1e-2)
 
 
 def test_a_machine_with_a_motor_has_its_measures_in_json_table_and_page(study):
     ended = study("--json", "--case", "front", "--machine", "motor")
     assert ended.code == 0
-    case = json.loads(ended.out)["cases"][0]
+    (motor,) = json.loads(ended.out)["drive"]
     table = pd.read_csv("out/drive.csv").set_index("case").loc["front"]
-    for key in ("peak_torque_Nm", "mean_torque_Nm", "speed_ripple_percent"):
-        assert table[key] == pytest.approx(case["motor"][key], rel=1e-5)
-        assert case["motor"][key] > 0.0
-    assert case["motor"]["caught_rpm"] is None
-    assert "speed ripple" in Path("out/report.html").read_text(encoding="utf-8")
+    for name in ("peak_torque_Nm", "mean_torque_Nm", "speed_ripple_percent"):
+        assert table[f"drive_{name}"] == pytest.approx(motor[f"drive_{name}"], rel=1e-5)
+        assert motor[f"drive_{name}"] > 0.0
+    assert motor["drive_caught_speed_rpm"] is None
 
 
 def test_measured_accelerations_are_integrated(study):
@@ -132,8 +133,8 @@ def test_measured_accelerations_are_integrated(study):
     Path("records").mkdir()
     pd.DataFrame({"time_s": time, **channels}).to_csv("records/front.csv", index=False)
     shown = json.loads(study("--json", "--accelerations", "records").out)
-    error = shown["relative_error"]["by_region_mean"][1]
-    (front,) = (np.array(case["rms_mm"][1]) for case in shown["cases"] if case["case"] == "front")
+    error = 0.01 * shown["regions"][1]["mean_error_percent"]
+    front = rms_of(shown).sel(case="front", region="R2")
     expected = np.linalg.norm(front - 2.0 / np.sqrt(2.0)) / np.linalg.norm(
         np.full(9, 2.0 / np.sqrt(2.0))
     )
@@ -143,8 +144,7 @@ def test_measured_accelerations_are_integrated(study):
 def test_a_drum_that_can_whirl_is_run_and_said(study, whirling_file):
     shown = json.loads(study("--machine", whirling_file, "--json").out)
     plain = json.loads(study("--out", "perfect", "--json").out)
-    rms, perfect = (np.array([case["rms_mm"] for case in told["cases"]]) for told in (shown, plain))
-    assert 1e-5 < np.abs(rms / perfect - 1.0).max() < 0.05
+    assert 1e-5 < np.abs(rms_of(shown) / rms_of(plain) - 1.0).max() < 0.05
     page = Path("out/report.html").read_text(encoding="utf-8")
     assert "The drum bearing is compliant, so the drum can whirl" in page
     assert "radial stiffness is 4000 N/mm and the tilting stiffness 50000 N m/rad" in page

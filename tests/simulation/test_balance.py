@@ -1,15 +1,12 @@
 """Unbalance of load and balls in planes: closed forms, and runs of the machine with two rings."""
 
-import json
-
 import numpy as np
 import pytest
 
 import wm_drake as wm
 from wm_drake.parameters import Load, MachineParameters, SpinProfile, load_machine
 from wm_drake.simulation.balance import balance_of, in_planes, moments_of_load
-from wm_drake.studies.spin.balance import balance_as_json, balance_line
-from wm_drake.studies.spin.page import SpinResult, spin_page
+from wm_drake.studies.spin.page import spin_answer
 from wm_drake.studies.spin.study import run_spin
 
 FULL = 1200.0 * np.pi / 30.0
@@ -64,34 +61,22 @@ def test_balls_take_the_place_of_closed_form_in_both_planes(result):
         assert (balance.at_end < 0.01 * capacity).all()
 
 
-def test_json_csv_page_and_terminal_have_the_balance(result, tmp_path):
-    shown_runs = SpinResult(result)
-    shown = json.loads(json.dumps(shown_runs.as_json()["cases"][0]["balance"], allow_nan=False))
-    plane = shown["planes"]["front_ring"]
-    assert plane["load_gm"] == pytest.approx(58.75)
-    assert plane["end_gm"] < 1.2 < plane["largest_gm"]
-    tables = shown_runs.tables()
-    assert list(tables["balance"].plane) == ["front_ring", "rear_ring"] * 4
+def test_tables_have_the_balance(result):
+    tables = spin_answer(result).tables()
+    balance = tables["balance"]
+    assert list(balance.plane) == ["front_ring", "rear_ring"] * 4
+    assert balance.load_alone_gm[0] == pytest.approx(58.75)
+    assert balance.end_gm[0] < 1.2 < balance.largest_gm[0]
     balls = tables["balls"]
     assert {"time_s", "front_ring_ball_8_deg", "rear_ring_unbalance_gm"} <= set(balls)
     assert np.diff(balls.time_s[balls.load == "back"]) == pytest.approx(0.1)
-    shown_runs.write(tmp_path)
-    assert (tmp_path / "balls.csv").is_file()
-    page = spin_page(result)
-    assert "Remaining unbalance" in page
-    assert "elements.front ring" not in page
-    balance = balance_of(result.results[0].case, result.parameters, result.results[0].record)
-    assert "unbalance 117.5 g m, with the balls 0." in balance_line(balance)
 
 
 def test_a_machine_without_rings_has_no_balance():
     parameters = load_machine("reference")
     profile = SpinProfile(time=(0.0, 1.0), speed=(0.0, 10.0))
     result = run_spin(parameters, [wm.Case("m", parameters.loads["middle"], profile)])
-    assert SpinResult(result).as_json()["cases"][0]["balance"] is None
-    assert balance_as_json(None) is None
-    assert set(SpinResult(result).tables()) == {"amplitudes"}
-    assert "Remaining unbalance" not in spin_page(result)
+    assert not {"balance", "balls"} & set(spin_answer(result).tables())
 
 
 def test_one_ring_has_one_plane_and_leaves_the_couple():

@@ -93,16 +93,6 @@ def test_responses_have_names_of_their_own(reference):
     }
 
 
-def test_keys_in_json_are_unambiguous():
-    keys = [
-        tuple(variable.json_keys([f"<{dim}>" for dim in variable.dims]))
-        for one in MEASURES.values()
-        for variable in one.variables
-        if variable.json is not None
-    ]
-    assert len(keys) == len(set(keys))
-
-
 def test_measures_that_a_record_lacks_are_nan(machine):
     """Measure a record as a campaign of version 0.1 wrote it: without forces of the mounts."""
     records = []

@@ -45,6 +45,9 @@ POLL = 0.05
 ANSWER_TIME = 10.0
 """Time in which a scheduler must answer. [s]"""
 
+KEPT_MESSAGES = 8
+"""Number of messages that the client keeps after it has sent them; each has a work item."""
+
 CLOSING_TIME = 5.0
 """Longest time for which the end of a command waits for the scheduler. [s]"""
 
@@ -71,6 +74,7 @@ def cluster_client(address: str) -> Iterator[Any]:
             workers, or a worker has other sources or library versions.
     """
     try:
+        import dask.config
         from distributed import Client
     except ImportError:
         raise input_error(
@@ -79,8 +83,10 @@ def cluster_client(address: str) -> Iterator[Any]:
     for name in list(logging.root.manager.loggerDict):
         if name.startswith("distributed"):  # its tracebacks would bury our message
             logging.getLogger(name).setLevel(logging.CRITICAL)
+    kept = {"distributed.admin.low-level-log-length": KEPT_MESSAGES}
     try:
-        client = Client(address, timeout=ANSWER_TIME, set_as_default=False)
+        with dask.config.set(kept):
+            client = Client(address, timeout=ANSWER_TIME, set_as_default=False)
     except (OSError, ValueError) as error:
         raise input_error(
             f"no scheduler answers at '{address}' ({type(error).__name__}); "

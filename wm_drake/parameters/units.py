@@ -51,6 +51,7 @@ _FACTORS = {
     ("N*m/rad", "N*mm/rad"): 1000.0,
     ("N*s/mm", "N*s/m"): 1000.0,
     ("N/mm", "N/m"): 1000.0,
+    ("dimensionless", "percent"): 100.0,
     ("kg", "g"): 1000.0,
     ("kg*m", "g*mm"): 1000000.0,
     ("kg*m", "g*m"): 1000.0,

@@ -61,11 +61,6 @@ def signed(value: float) -> str:
     return f"+{number(value, 0)}" if math.isfinite(value) and round(value) > 0 else number(value, 0)
 
 
-def gap_size(distance: float) -> str:
-    """Return a gap with its unit, and that the parts touch where it is not positive. [m]"""
-    return f"{number(MM_PER_M * distance)} mm{' (they touch)' if distance <= 0.0 else ''}"
-
-
 def listed(words: Sequence[str]) -> str:
     """Return words as a list in a sentence: a, b and c."""
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

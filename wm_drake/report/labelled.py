@@ -4,6 +4,7 @@ from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pandas as pd
 import xarray as xr
 
@@ -144,15 +145,17 @@ class TurnedTable(LabelledTable):
 
 def _rows(data: xr.Dataset) -> pd.DataFrame:
     """Return a row for each place of a dataset that has a value, in units for reading."""
-    values = data.map(_in_reading_unit).assign_coords(
-        {name: _in_reading_unit(coordinate) for name, coordinate in data.coords.items()}
-    )
-    if not values.sizes:
-        values = values.expand_dims("place")
-    frame = values.to_dataframe(dim_order=_dims_of(values))
-    frame = frame.dropna(how="all", subset=list(values.data_vars)).reset_index()
-    labels = [*_dims_of(values), *data.coords]
-    return frame[[*(name for name in dict.fromkeys(labels) if name in data.coords), *data]]
+    labels = [*_dims_of(data), *data.coords]
+    names = [*(name for name in dict.fromkeys(labels) if name in data.coords), *data]
+    columns = {name: _values_everywhere(_in_reading_unit(data[name]), data) for name in names}
+    frame = pd.DataFrame(columns)  # many times as fast as `Dataset.to_dataframe`
+    return frame.dropna(how="all", subset=list(data.data_vars)).reset_index(drop=True)
+
+
+def _values_everywhere(array: xr.DataArray, data: xr.Dataset) -> np.ndarray:
+    """Return the values of a variable at each place of its dataset."""
+    variable: Any = array.variable  # xarray has no types for `set_dims`
+    return np.asarray(variable.set_dims(data.sizes).transpose(*_dims_of(data)).values.ravel())
 
 
 def _dims_of(data: xr.Dataset) -> list[Hashable]:
@@ -165,10 +168,12 @@ def _dims_of(data: xr.Dataset) -> list[Hashable]:
 
 
 def _in_reading_unit(array: xr.DataArray) -> xr.DataArray:
-    unit = quantity_of(array).reading
-    if array.dtype.kind not in NUMBERS or (unit.si == unit.shown and units_of(array) is None):
+    if array.dtype.kind not in NUMBERS:
         return array
-    return array.copy(data=shown(array))
+    unit = quantity_of(array).reading
+    if unit.si == unit.shown and units_of(array) is None:
+        return array
+    return array.copy(deep=False, data=shown(array))
 
 
 def _name_in_files(name: str, array: xr.DataArray) -> str:

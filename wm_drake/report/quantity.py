@@ -55,7 +55,11 @@ class Quantity:
     @property
     def unit_text(self) -> str:
         """Unit for reading, without line breaks: `N m`."""
-        return self.reading.label.replace(" ", "\u00a0")
+        return self._unit.replace(" ", "\u00a0")
+
+    @property
+    def _unit(self) -> str:
+        return self.reading.label.replace("^2", "²").replace("^3", "³")
 
     @property
     def label(self) -> str:
@@ -92,7 +96,7 @@ class Quantity:
 
     def text(self, value: Any) -> str:
         """Return an SI value as text with its unit."""
-        return f"{self.number(value)} {self.reading.label}".rstrip()
+        return f"{self.number(value)} {self._unit}".rstrip()
 
     @property
     def _decimals(self) -> int | None:
@@ -156,15 +160,28 @@ def quantity_of(array: "xr.DataArray") -> Quantity:
     if "quantity" in array.attrs:
         quantity: Quantity = array.attrs["quantity"]
         return quantity
-    return _of_measures().get(str(array.name)) or Quantity(str(array.name).replace("_", " "))
+    return _of_measure(str(array.name)) or Quantity(str(array.name).replace("_", " "))
 
 
-def _of_measures() -> dict[str, Quantity]:
-    """Return the quantities of all measures by the names of their variables."""
+def of_measure(name: str) -> Quantity:
+    """Return the quantity of a variable of a measure by its name.
+
+    Raises:
+        KeyError: no measure has the variable.
+    """
+    quantity = _of_measure(name)
+    if quantity is None:
+        raise KeyError(name)
+    return quantity
+
+
+def _of_measure(name: str) -> Quantity | None:
+    """Return the quantity of a variable of a measure by its name; None for another one."""
     from wm_drake.simulation.measures import MEASURES  # registered ones too, so at each call
 
-    variables = [variable for measure in MEASURES.values() for variable in measure.variables]
-    return {v.name: Quantity(v.kind, v.unit, v.studio) for v in variables}
+    variables = (variable for measure in MEASURES.values() for variable in measure.variables)
+    known = next((variable for variable in variables if variable.name == name), None)
+    return None if known is None else Quantity(known.kind, known.unit, known.studio)
 
 
 def named(array: "xr.DataArray", words: str) -> "xr.DataArray":

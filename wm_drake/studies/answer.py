@@ -8,7 +8,7 @@ them; it declares no class of its own.
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import pandas as pd
 import xarray as xr
@@ -23,6 +23,10 @@ if TYPE_CHECKING:
     from rich.table import Table as TerminalTable
 
     from wm_drake.report.page import SectionedPage
+
+
+WritesFile: TypeAlias = Callable[[Path], None]
+"""Function that writes a file."""
 
 
 @dataclass(frozen=True)
@@ -83,11 +87,12 @@ class Answer(Result):
         parts: Sections of the page, with all tables of the result.
         details: How the result was computed, as pairs of word and text.
         method: Sentences on the method, below the details.
-        files: Other files as text or bytes, by their names.
+        files: Other files by their names: text, bytes, or a function that writes the file.
         warned: Sentences on what a reader must know before the answer, in a box at the top and on
             the terminal.
         short: Part in a box between the answer and the contents. Its facts are also printed.
         diverged: A line for each run that diverged, or another reason for exit code 1.
+        others: Answers with pages of their own beside this one, by the names of their files.
         script: Script of the page, beside that of the pictures.
         units: In which its numbers are read, of `report.reading`; those in which it was made.
     """
@@ -98,10 +103,11 @@ class Answer(Result):
     parts: tuple[Part, ...]
     details: tuple[tuple[str, str], ...] = ()
     method: str = ""
-    files: Mapping[str, str | bytes] = field(default_factory=dict)
+    files: "Mapping[str, str | bytes | WritesFile]" = field(default_factory=dict)
     warned: tuple[str, ...] = ()
     short: Part | None = None
     diverged: tuple[str, ...] = ()
+    others: "Mapping[str, Answer]" = field(default_factory=dict)
     script: Path | None = None
     units: str = field(default_factory=READING.get)
     float_format: ClassVar[str] = "%.9g"
@@ -158,12 +164,21 @@ class Answer(Result):
             script=self.script,
         )
 
+    def pages(self, facts: Facts) -> Mapping[str, str]:
+        """Return the page, and those of other answers, by the names of their files."""
+        others = {name: answer.page(facts) for name, answer in self.others.items()}
+        return {**super().pages(facts), **others}
+
     def write(self, folder: Path) -> None:
         """Write the tables as CSV, and the other files."""
         super().write(folder)
         for name, content in self.files.items():
-            data = content.encode("utf-8") if isinstance(content, str) else content
-            (folder / name).write_bytes(data)
+            if isinstance(content, str):
+                (folder / name).write_text(content, encoding="utf-8")
+            elif isinstance(content, bytes):
+                (folder / name).write_bytes(content)
+            else:
+                content(folder / name)
 
     def warnings(self) -> tuple[str, ...]:
         """Return warnings of the result for the terminal."""

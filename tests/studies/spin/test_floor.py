@@ -10,8 +10,8 @@ from wm_drake.report.figure import Line
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import measure
 from wm_drake.simulation.runs import simulate
-from wm_drake.studies.spin.floor import floor_figure, floor_section, floor_warnings, windows
-from wm_drake.studies.spin.page import spin_page
+from wm_drake.studies.spin.floor import floor_figure, floor_parts, floor_warnings, windows
+from wm_drake.studies.spin.page import spin_answer
 from wm_drake.studies.spin.study import CaseResult, SpinRuns
 
 PROFILE = SpinProfile(
@@ -33,19 +33,16 @@ def result(machine, reference):
 
 
 def test_tables_have_the_measures(result):
-    view = floor_section(result)
-    resultant, margins, feet = view.tables
+    plots, tables = floor_parts(result)
+    resultant, margins, feet = (table.frame() for table in tables.tables)
     measures = result.results[0].measures
-    largest = float(measures.cabinet_force_peak.sel(axis="z"))
-    assert resultant.groups[0].rows[0].cells[3] == f"{largest:.0f}"
-    rows = margins.groups[0].rows
-    assert [row.cells[0] for row in rows] == ["whole run", "low"]
-    assert rows[0].cells[2] == f"{float(measures.feet.slide_margin):.1f}"
-    assert [row.cells[0] for row in feet.groups[0].rows] == [
-        *("front left", "front right", "rear right", "rear left")
-    ]
-    assert "friction 0.4" in view.text
-    assert len(view.pictures) == 1
+    largest = resultant.set_index("axis").cabinet_force_peak_N["z"]
+    assert largest == float(measures.cabinet_force_peak.sel(axis="z"))
+    assert margins.part.tolist() == ["whole run", "low"]
+    assert margins.slide_margin_N[0] == float(measures.feet.slide_margin)
+    assert feet.foot.tolist() == ["front_left", "front_right", "rear_right", "rear_left"]
+    assert "friction 0.4" in tables.text
+    assert len(plots.shown) == 1
 
 
 def test_a_slippery_floor_is_warned_of(machine, reference):
@@ -55,18 +52,17 @@ def test_a_slippery_floor_is_warned_of(machine, reference):
     (warning,) = floor_warnings(slippery)
     assert warning.startswith("Load counter (with gasket): the cabinet ")
     assert "turns on the floor" in warning
-    assert floor_section(slippery).tables[1].groups[0].rows[0].kind == "alarm"
-    page = spin_page(slippery)
-    assert "Forces on the cabinet and the floor" in page
-    assert warning in page
+    _, margins, _ = floor_parts(slippery)[1].tables
+    assert margins.data.moves.values[0, 0]
+    assert warning in spin_answer(slippery).warned
 
 
 def test_without_cabinet_the_section_says_so(machine, reference):
     bare = reference.model_copy(update={"cabinet": None})
-    view = floor_section(spin_result(machine, bare))
-    assert len(view.tables) == 1
-    assert "has no cabinet" in view.text
-    assert view.pictures == ()
+    plots, tables = floor_parts(spin_result(machine, bare))
+    assert len(tables.shown) == 1
+    assert "has no cabinet" in tables.text
+    assert not plots.shown
 
 
 def test_figure_shows_the_smallest_values(result):

@@ -1,7 +1,5 @@
 """Regions that a record does not cover: one sample is allowed to be missing, more is said."""
 
-from dataclasses import replace
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -9,22 +7,16 @@ import xarray as xr
 
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.spin import Region
-from wm_drake.parameters.unbalance_cases import UnbalanceCase
 from wm_drake.simulation.vibration import region_rms, region_samples
 from wm_drake.studies.spin_cycle.measured import read_accelerations
-from wm_drake.studies.spin_cycle.page import SpinCycleResult, summary, warnings_of
-from wm_drake.studies.spin_cycle.study import SpinCycleRuns, missing_regions
-from wm_drake.studies.spin_cycle.tables import missing_warnings
+from wm_drake.studies.spin_cycle.page import missing_warnings
+from wm_drake.studies.spin_cycle.study import average_errors, largest, missing_regions
 
 PERIOD = 5e-3
 PROFILE = SpinProfile(
     time=(0.0, 20.0),
     speed=(10.0, 10.0),
     regions=(Region(name="R1", begin=2.0, end=10.0), Region(name="R2", begin=12.0, end=20.0)),
-)
-CASES = tuple(
-    UnbalanceCase(name=name, front=front, rear=rear, phase=0.0)
-    for name, front, rear in (("1", 0.2, 0.0), ("2", 0.0, 0.2))
 )
 LABELS = {"case": ["1", "2"], "region": ["R1", "R2"], "accelerometer": ["S1"], "axis": list("xyz")}
 
@@ -66,52 +58,44 @@ def test_measured_record_that_ends_early(tmp_path, rows, has_last):
 
 
 @pytest.fixture
-def result(reference):
-    """Return a result whose measurement of case 2 has no value in R2, and is 25 % larger else."""
+def result():
+    """Return displacements; the measurement of case 2 has no value in R2, and is 25 % larger else."""
     computed = xr.DataArray(np.full((2, 2, 1, 3), 8e-3), LABELS, list(LABELS))
     measured = 1.25 * computed
     measured.loc["2", "R2"] = np.nan
-    by_case = {"case": LABELS["case"]}
-    tension = xr.DataArray(np.ones((2, 1)), {**by_case, "spring": ["left"]})
-    gap = xr.DataArray([0.02, 0.02], by_case)
-    return SpinCycleRuns(
-        reference,
-        PROFILE,
-        CASES,
-        computed,
-        computed,
-        gap,
-        tension,
-        ("", ""),
-        xr.Dataset(),
-        measured,
-    )
+    return xr.Dataset({"rms": computed, "measured": measured})
 
 
 def test_errors_say_which_regions_they_leave_out(result):
-    assert missing_regions(result.displacement, result.measured) == {"R2": ["2"]}
-    (text,) = SpinCycleResult(result, "compiled").warnings()
-    assert text.startswith("The errors leave regions out")
+    assert missing_regions(result.rms, result.measured) == {"R2": ["2"]}
+    (text,) = missing_warnings(result.rms, result.measured)
     assert "R2 in case 2" in text
-    assert text in warnings_of(result)
-    compared = "Compared with the measurement without R2, the average error is 20.0 %"
-    assert compared in summary(result, "compiled")
+    np.testing.assert_allclose(average_errors(result.rms, result.measured), 0.2)
 
 
 def test_complete_measurements_have_no_such_warning(result):
-    complete = replace(result, measured=1.25 * result.displacement)
-    assert missing_warnings(complete.displacement, complete.measured) == []
-    assert SpinCycleResult(complete, "compiled").warnings() == []
-    assert "Compared with the measurement, the average error" in summary(complete, "compiled")
+    assert missing_warnings(result.rms, 1.25 * result.rms) == []
 
 
 def test_a_case_that_was_not_measured_misses_nothing(result):
     only_first = result.measured.copy()
     only_first.loc["2"] = np.nan
-    assert missing_regions(result.displacement, only_first) == {}
+    assert missing_regions(result.rms, only_first) == {}
 
 
 def test_a_run_that_did_not_complete_a_region_leaves_it_out(result):
-    stopped = result.displacement.copy()
+    stopped = result.rms.copy()
     stopped.loc["1", "R2"] = np.nan
     assert missing_regions(stopped, result.measured) == {"R2": ["1", "2"]}
+
+
+def test_the_largest_displacement_has_the_labels_of_its_place(result):
+    rms = result.rms.copy()
+    rms.loc["1", "R2", "S1", "y"] = 9e-3
+    rms.loc["2", "R1", "S1", "z"] = np.nan
+    worst = largest(rms)
+    assert [worst[dim].item() for dim in LABELS] == ["1", "R2", "S1", "y"]
+    of_cases = largest(rms, ["case"])
+    np.testing.assert_allclose(of_cases, [9e-3, 8e-3])
+    assert of_cases.axis.values.tolist() == ["y", "x"]
+    assert largest(np.nan * rms).isnull()

@@ -41,7 +41,6 @@ AMPLITUDES = Measure(
             "amplitude",
             "largest absolute value of the envelopes",
             short="{}",
-            json="amplitudes_mm/*",
         ),
         Variable(
             "critical_speed",
@@ -50,7 +49,6 @@ AMPLITUDES = Measure(
             "critical speed",
             "drum speed at which the amplitude occurs",
             better="",
-            json="critical_rpm/*",
             studio=None,
         ),
     ),
@@ -92,7 +90,7 @@ POWER_MEANS = Measure(
             "power mean",
             "power mean of order 20 of the filtered displacement; a smooth substitute of the "
             "amplitude",
-            json=None,
+            is_in_spin=False,
             studio=None,
         ),
     ),

@@ -14,9 +14,7 @@ def _drive(run: Run) -> list[FloatArray]:
     return measured_drive(run.time, run.drum_angle, run.drum_speed, run.motor_torque, run.profile)
 
 
-def _number(
-    name: str, unit: Unit, about: str, json: str | None, better: Better = "smaller"
-) -> Variable:
+def _number(name: str, unit: Unit, about: str, better: Better = "smaller") -> Variable:
     """Return a variable that is one number of the run and a response of studies."""
     return Variable(
         f"drive_{name}",
@@ -26,7 +24,6 @@ def _number(
         about,
         better=better,
         is_response=not name.startswith("caught"),
-        json=json and f"motor/{json}",
         studio=None,
     )
 
@@ -40,50 +37,31 @@ def _of_order_one(name: str, unit: str, about: str) -> Variable:
 DRIVE = Measure(
     "drive",
     (
+        _number("peak_torque", _TORQUE, "largest torque of the motor on the drum"),
+        _number("mean_torque", _TORQUE, "largest torque of the motor averaged over a revolution"),
         _number(
-            "peak_torque", _TORQUE, "largest torque of the motor on the drum", "peak_torque_Nm"
+            "mean_torque_speed", _SPEED, "speed of the drum at the largest mean torque", better=""
         ),
-        _number(
-            "mean_torque",
-            _TORQUE,
-            "largest torque of the motor averaged over a revolution",
-            "mean_torque_Nm",
-        ),
-        _number(
-            "mean_torque_speed",
-            _SPEED,
-            "speed of the drum at the largest mean torque",
-            "mean_torque_rpm",
-            "",
-        ),
-        _number("peak_power", Unit("W", "W"), "largest power of the motor", "peak_power_W"),
-        _number("energy", Unit("J", "J"), "work of the motor over the run", "energy_J"),
-        _number(
-            "speed_ripple",
-            _RIPPLE,
-            "largest coefficient of fluctuation of the speed",
-            "speed_ripple_percent",
-        ),
+        _number("peak_power", Unit("W", "W"), "largest power of the motor"),
+        _number("energy", Unit("J", "J"), "work of the motor over the run"),
+        _number("speed_ripple", _RIPPLE, "largest coefficient of fluctuation of the speed"),
         _number(
             "end_speed",
             _SPEED,
             "speed of the drum at the end, averaged over a revolution",
-            None,
             "larger",
         ),
         _number(
             "caught_speed",
             _SPEED,
             "speed at which the drum is caught; NaN if it is not",
-            "caught_rpm",
-            "",
+            better="",
         ),
         _number(
             "caught_torque",
             _TORQUE,
             "mean torque of the motor where the drum is caught",
-            "caught_mean_torque_Nm",
-            "",
+            better="",
         ),
         _of_order_one("torque", "N*m", "torque with cosine and sine of the drum angle"),
         _of_order_one("acceleration", "rad/s^2", "acceleration of the drum with them"),

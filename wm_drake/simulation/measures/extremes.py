@@ -15,7 +15,6 @@ EXTREMES = Measure(
             "point nearest to the detergent box",
             group="D",
             short="D{}",
-            json="detergent_box_mm/D*",
         ),
         Variable(
             "gasket_force",
@@ -25,7 +24,6 @@ EXTREMES = Measure(
             "largest force of the gasket on the housing",
             group="F",
             short="gasket F{}",
-            json="gasket_force_N/F*",
             studio=1,
         ),
         Variable(
@@ -36,7 +34,6 @@ EXTREMES = Measure(
             "largest moment of the gasket on the housing",
             group="M",
             short="gasket M{}",
-            json="gasket_moment_Nm/M*",
         ),
     ),
     each_run(lambda run: [*run.largest]),

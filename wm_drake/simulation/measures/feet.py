@@ -16,26 +16,22 @@ _MARGINS = {
     "smallest_foot_load": (
         _FORCE,
         "smallest normal load of any foot; 0 if one lifts off",
-        "smallest_normal_force_N",
     ),
     "slide_margin": (
         _FORCE,
         "horizontal force that friction can still take; the cabinet slides below 0",
-        "slide_margin_N",
     ),
     "turn_margin": (
         _MOMENT,
         "vertical moment that friction can still take beside the horizontal force; the cabinet "
         "turns below 0",
-        "turn_margin_Nm",
     ),
     "tilt_margin": (
         _MOMENT,
         "moment that keeps the cabinet from tipping over; it tips below 0",
-        "tilt_margin_Nm",
     ),
 }
-"""Unit, words, and key in JSON of each margin."""
+"""Unit and words of each margin."""
 
 
 def _words(name: str) -> str:
@@ -57,7 +53,7 @@ FEET = Measure(
                 _words(name),
                 _LOADS[name],
                 better="smaller" if name.endswith("largest") else "larger",
-                json=None,
+                is_in_spin=False,
                 studio=None,
             )
             for name in BY_FOOT
@@ -70,10 +66,9 @@ FEET = Measure(
                 _words(name),
                 about,
                 better="larger",
-                json=f"feet/{key}",
                 studio=None,
             )
-            for name, (unit, about, key) in _MARGINS.items()
+            for name, (unit, about) in _MARGINS.items()
         ),
     ),
     _evaluate((*BY_FOOT, *MARGINS)),
@@ -91,10 +86,9 @@ IN_REGIONS = Measure(
             _words(name),
             f"{about}; smallest in each region",
             better="larger",
-            json=f"feet/regions/*/{key}",
             studio=None,
         )
-        for name, (unit, about, key) in _MARGINS.items()
+        for name, (unit, about) in _MARGINS.items()
     ),
     _evaluate(tuple(f"region_{name}" for name in MARGINS)),
     ("feet",),

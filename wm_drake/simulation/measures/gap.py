@@ -40,7 +40,6 @@ GAP = Measure(
             "smallest distance between tub group and housing; the tub touches at 0 and below",
             better="larger",
             group="gap",
-            json="smallest_gap_mm",
         ),
     ),
     each_run(_gap),

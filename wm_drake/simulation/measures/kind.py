@@ -35,8 +35,7 @@ class Variable:
         title: Words for one number, with {} for its labels. If empty, the kind and the labels.
         short: Title for a narrow table, with {} for the labels. If empty, the title.
         is_response: Whether studies may choose its numbers as responses.
-        json: Keys in the JSON of `wm-drake spin`, separated by "/", with "*" for a label. If
-            empty, name and unit, then the labels; None if it is not there.
+        is_in_spin: Whether every run of `wm-drake spin` has it.
         studio: Decimals in the studio; None if the studio does not show it.
     """
 
@@ -50,7 +49,7 @@ class Variable:
     title: str = ""
     short: str = ""
     is_response: bool = True
-    json: str | None = ""
+    is_in_spin: bool = True
     studio: int | None = 2
 
     @property
@@ -82,18 +81,8 @@ class Variable:
         labels = tuple(labels)
         return self.short.format(" ".join(labels)) if self.short else self.title_of(labels)
 
-    def json_keys(self, labels: Sequence[str]) -> list[str]:
-        """Return the keys of one number in the JSON of `wm-drake spin`, outermost first."""
-        unit = self.unit.shown.replace("*", "").replace("/", "_per_").replace("^", "")
-        path = self.json or "/".join(
-            ["_".join(filter(None, [self.name, unit])), *"*" * len(labels)]
-        )
-        remaining = iter(labels)
-        return [part.replace("*", next(remaining)) if "*" in part else part
-                for part in path.split("/")]  # fmt: skip
 
-
-detail = partial(Variable, is_response=False, json=None, studio=None)
+detail = partial(Variable, is_response=False, is_in_spin=False, studio=None)
 """Declare a variable that only tables of runs and their files have."""
 
 
@@ -124,7 +113,7 @@ class Measure:
     @property
     def is_in_spin(self) -> bool:
         """Whether every spin run has it."""
-        return any(variable.json is not None for variable in self.variables)
+        return any(variable.is_in_spin for variable in self.variables)
 
 
 def each_run(evaluate: Callable[[Run], Sequence[FloatArray]]) -> Evaluate:

@@ -18,7 +18,6 @@ MOUNTS = Measure(
             f"{WORDS[kind]} of the force of each mount on the cabinet",
             title=f"{TITLES[kind]} force {{}}",
             short="{}",
-            json=f"mount_force_N/*/{kind}",
             studio=1 if kind == "peak" else None,
         )
         for kind in KINDS
@@ -37,12 +36,11 @@ CABINET = Measure(
             unit,
             f"{TITLES[kind]} {quantity} on the cabinet",
             f"{WORDS[kind]} of the {quantity} of all mounts on the cabinet{about}",
-            json=f"cabinet_wrench/{key}/*/{kind}",
             studio=None,
         )
-        for quantity, unit, about, key in (
-            ("force", Unit("N", "N"), "", "force_N"),
-            ("moment", Unit("N*m", "N*m"), f" about {POINT}", "moment_Nm"),
+        for quantity, unit, about in (
+            ("force", Unit("N", "N"), ""),
+            ("moment", Unit("N*m", "N*m"), f" about {POINT}"),
         )
         for kind in KINDS
     ),

@@ -1,6 +1,7 @@
 """Record -> measures: a record is a block of one run."""
 
 import functools
+import itertools
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -14,8 +15,7 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cabinet import Walk, walk
 from wm_drake.simulation.drive import DriveMeasures, drive_measures
 from wm_drake.simulation.feet import FootLoads, foot_loads
-from wm_drake.simulation.measures.as_json import labelled_values
-from wm_drake.simulation.measures.kind import Measure
+from wm_drake.simulation.measures.kind import Measure, Variable
 from wm_drake.simulation.measures.registry import MEASURES, measure_named
 from wm_drake.simulation.measures.run import FeetLoaded, Need, Run
 from wm_drake.simulation.mount_forces import speed_ranges
@@ -121,6 +121,22 @@ class Measures:
         """
         names = [*MEASURES["feet"].names, *MEASURES["feet regions"].names]
         return self.table[names] if self.has_cabinet else None
+
+
+def labelled_values(
+    table: xr.Dataset, variable: Variable
+) -> list[tuple[tuple[str, ...], float | None]]:
+    """Return labels and value of each number of a variable of one run. [unit for reading]
+
+    A value that is NaN is None, because JSON has no NaN.
+    """
+    values = table[variable.name]
+    along = [map(str, table[dim].values) for dim in values.dims]
+    numbers = (float(value) for value in values.values.flat)
+    return [
+        (labels, variable.unit.from_si(number) if number == number else None)
+        for labels, number in zip(itertools.product(*along), numbers, strict=True)
+    ]
 
 
 def measure(

@@ -28,7 +28,7 @@ REGIONS = Measure(
             Unit("m", "mm"),
             "RMS displacement",
             "RMS displacement in each region of the spin profile",
-            json=None,
+            is_in_spin=False,
             studio=None,
         ),
         Variable(
@@ -37,7 +37,7 @@ REGIONS = Measure(
             Unit("m", "mm"),
             "RMS displacement from acceleration",
             "RMS displacement in each region, from the acceleration integrated twice",
-            json=None,
+            is_in_spin=False,
             studio=None,
         ),
     ),

@@ -30,7 +30,7 @@ MEASURES: Registry[Measure] = Registry(
 def tabulated() -> list[Variable]:
     """Return the variables of every spin run that pages and terminal show by their declaration."""
     shown = (measure for measure in MEASURES.values() if measure.has_table)
-    return [one for measure in shown for one in measure.variables if one.json is not None]
+    return [one for measure in shown for one in measure.variables if one.is_in_spin]
 
 
 def measure_named(name: str, key: str = "") -> Measure:

@@ -15,7 +15,6 @@ TENSIONS = Measure(
             better="larger",
             group="spring_tension",
             title="smallest tension {}",
-            json="smallest_spring_tension_N/*",
             studio=None,
         ),
         detail(

@@ -9,7 +9,7 @@ from wm_drake.parameters import MachineParameters, machine_yaml
 from wm_drake.parameters.measured import EXPERIMENT
 from wm_drake.report.formatting import number
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import quantity_of, shown, text_of
+from wm_drake.report.quantity import quantity_of, text_of
 from wm_drake.simulation.displacements import band_of
 from wm_drake.simulation.records import Record
 from wm_drake.studies.answer import Answer, Part, Plot
@@ -406,10 +406,8 @@ def _envelopes(record: Record, title: str, amplitudes: xr.DataArray) -> Plot:
         amplitudes: Amplitudes of the case over source and sensor. [m]
     """
     low, high = band_of(record)
-    measured = amplitudes.sel(source=EXPERIMENT)
-    by_sensor = dict(zip(measured.sensor.values.tolist(), shown(measured).tolist(), strict=True))
     return Plot(
-        envelopes_figure(record, by_sensor),
+        envelopes_figure(record, amplitudes.sel(source=EXPERIMENT)),
         f"Envelopes, load {title}.",
         f"Load {title}: displacement in the band {low:g}–{high:.3g} Hz. The shaded area extends "
         "from the lower to the upper envelope. Dashed lines: measured amplitude.",

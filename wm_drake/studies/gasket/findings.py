@@ -57,7 +57,8 @@ def answer_text(screening: xr.Dataset, words: Words) -> str:
     """
     label = nearest(screening)
     if label is None:
-        led = Counter(_leader(at(screening, label)) for label in labels_of(screening))
+        shares = screening[["share"]]
+        led = Counter(_leader(at(shares, label)) for label in labels_of(shares))
         factor, count = led.most_common(1)[0]
         return (
             f"{_capital(words.factor(factor))} has the largest effect on {count} of {led.total()} "
@@ -265,8 +266,9 @@ def _largest(difference: xr.DataArray) -> tuple[float, Label]:
 def _drivers(screening: xr.Dataset, words: Words) -> list[str]:
     """Return a sentence for each of the factors that lead most responses, at most three."""
     led: dict[str, dict[str, list[str]]] = {}
-    for load, name in labels_of(screening):
-        first = mains(at(screening, (load, name))).share.isel(term=0)
+    shares = screening[["share"]]
+    for load, name in labels_of(shares):
+        first = mains(at(shares, (load, name))).share.isel(term=0)
         if first >= LEADING_MAIN:
             factor = first.term.item()
             led.setdefault(factor, {}).setdefault(load, []).append(words.response(name))
@@ -373,10 +375,9 @@ def _of_model(screening: xr.Dataset, words: Words) -> list[str]:
 
 def load_findings(screening: xr.Dataset, load: str, words: Words) -> list[str]:
     """Return a sentence for each response of a load: the leading terms and their direction."""
-    return [
-        _driver_sentence(at(screening, (load, name)), words)
-        for name in screening.response.values.tolist()
-    ]
+    effects = screening[["mean", "share", "effect"]]
+    names = screening.response.values.tolist()
+    return [_driver_sentence(at(effects, (load, name)), words) for name in names]
 
 
 def _driver_sentence(of_label: xr.Dataset, words: Words) -> str:

@@ -172,7 +172,7 @@ def analyse(design: Design, runs: xr.Dataset) -> xr.Dataset:
         array = np.full(runs.value.shape, np.nan)
         for of_load, good, rows in zip(tables, trials, array, strict=True):
             rows[good] = np.column_stack([getattr(table, name) for table in of_load])
-        screening[name] = runs.value.copy(data=array)
+        screening[name] = runs.value.copy(deep=False, data=array)
     terms = [term.name for term in tables[0][0].terms]
     labels = {"term": terms, "level": list(LEVELS), "other_level": list(OTHER_LEVELS)}
     return screening.assign_coords(labels).assign_attrs(design=design)

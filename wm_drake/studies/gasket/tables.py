@@ -18,7 +18,6 @@ from wm_drake.studies.gasket.screening import (
     OTHER_LEVELS,
     SHARE,
     VALUE,
-    Label,
     at,
     compared_terms,
     labels_of,
@@ -54,13 +53,10 @@ def variance_table(screening: xr.Dataset, published: xr.Dataset, words: Words) -
             f"as a share of that; rows in which it is above {WHOLE.text(FAR)} are marked."
         )
     data, design = _variance(screening, published), screening.design
-    data["leading_terms"] = (
-        ("load", "response"),
-        np.reshape(
-            [_leading_text(screening, published, label) for label in labels_of(screening)],
-            screening["mean"].shape,
-        ),
-    )
+    terms = _terms_of(screening, published)
+    texts = [_leading_text(at(terms, label)) for label in labels_of(screening)]
+    shape = screening["mean"].shape
+    data["leading_terms"] = (("load", "response"), np.reshape(texts, shape))
     return LabelledTable(
         "variance",
         data,
@@ -104,17 +100,30 @@ def _variance(screening: xr.Dataset, published: xr.Dataset) -> xr.Dataset:
     return data
 
 
-def _leading_text(screening: xr.Dataset, published: xr.Dataset, label: Label) -> str:
+def _terms_of(screening: xr.Dataset, published: xr.Dataset) -> xr.Dataset:
+    """Return the shares of all terms, with the published ones beside them if there are any.
+
+    Returns:
+        `share`; of published results `published_share`, `is_compared` and `sign_differs`.
+    """
+    terms = screening[["share"]]
+    if published:
+        terms["published_share"] = named(published.share, "published contribution")
+        terms["is_compared"] = compared_terms(published)
+        terms["sign_differs"] = sign_differs(screening, published)
+    return terms
+
+
+def _leading_text(of_label: xr.Dataset) -> str:
     """Return the leading terms of a response with their percentages, and the published ones."""
-    of_label, texts = at(screening, label), []
+    texts = []
     for term in leading(of_label):
-        theirs = mark = ""
-        if published and at(published.share, label).sel(term=term).notnull():
-            turned = at(sign_differs(screening, published), label).sel(term=term)
-            mark = SIGN_MARK if turned else ""
-            theirs = f" ({WHOLE.number(at(published.share, label).sel(term=term))}{mark})"
-        share = WHOLE.number(of_label.share.sel(term=term))
-        texts.append(f"{term.replace(':', ' × ')} {share}{theirs}")
+        one = of_label.sel(term=term)
+        text = f"{term.replace(':', ' × ')} {WHOLE.number(one.share)}"
+        if "published_share" in one and one.published_share.notnull():
+            mark = SIGN_MARK if one.sign_differs else ""
+            text += f" ({WHOLE.number(one.published_share)}{mark})"
+        texts.append(text)
     return ", ".join(texts)
 
 
@@ -124,18 +133,17 @@ def leading_table(screening: xr.Dataset, published: xr.Dataset, words: Words) ->
     Published numbers are beside ours; a term that was published is in the table although it is not
     among our leading terms.
     """
-    terms = screening.term.values.tolist()
-    values = [words.values(term.split(":")[0]) for term in terms]
-    data = screening[["effect"]].assign(values=("term", values), share=screening.share)
+    names, terms = screening.term.values.tolist(), _terms_of(screening, published)
+    values = [words.values(name.split(":")[0]) for name in names]
+    data = screening[["effect"]].assign(values=("term", values))
+    data = data.assign(terms.drop_vars("is_compared", errors="ignore"))
     if published:
-        data["published_share"] = named(published.share, "published contribution")
         data["published_effect"] = named(published.effect, "published effect")
-        data["sign_differs"] = sign_differs(screening, published)
-    symbols = {term: term.replace(":", " × ") for term in terms}
+    symbols = {name: name.replace(":", " × ") for name in names}
     places = [
         (*label, term, other)
         for label in labels_of(screening)
-        for term in _shown_terms(screening, published, label)
+        for term in _shown_terms(at(terms, label))
         for other in (OTHER_LEVELS[1:] if ":" in term else OTHER_LEVELS[:1])
     ]
     columns = zip(*places, strict=True) if places else ((), (), (), ())
@@ -164,12 +172,12 @@ def leading_table(screening: xr.Dataset, published: xr.Dataset, words: Words) ->
     )
 
 
-def _shown_terms(screening: xr.Dataset, published: xr.Dataset, label: Label) -> list[str]:
+def _shown_terms(of_label: xr.Dataset) -> list[str]:
     """Return the leading terms of a response, then those that were published."""
-    terms = leading(at(screening, label))
-    if published:
-        compared = at(compared_terms(published), label)
-        terms += [t for t in compared.term.values[compared.values].tolist() if t not in terms]
+    terms = leading(of_label)
+    if "is_compared" in of_label:
+        compared = of_label.term.values[of_label.is_compared.values].tolist()
+        terms += [term for term in compared if term not in terms]
     return terms
 
 

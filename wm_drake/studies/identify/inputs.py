@@ -14,7 +14,6 @@ from wm_drake.studies.components import Target, existing_files
 from wm_drake.studies.fitting.methods import METHODS
 from wm_drake.studies.identify.models import Given, fields_of_law, unit_of_field, units_of_fields
 from wm_drake.studies.identify.options import IdentifyOptions
-from wm_drake.studies.identify.problem import motion_sentences
 from wm_drake.studies.inputs import LOOP_WORDS, channel_names, pairs_of, quantities_of
 from wm_drake.studies.rig.study import FREQUENCY
 
@@ -69,8 +68,6 @@ def motions_of(
                 err=True,
             )
         motions = [without_inertia(motion, driven_mass) for motion in motions]
-    for text in motion_sentences(motions):
-        say(text, err=True)
     return motions
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from wm_drake.errors import input_error
+from wm_drake.report.terminal import say
 from wm_drake.rigs.measured import MeasuredMotion
 from wm_drake.studies.answer import Answer
 from wm_drake.studies.components import axes_of, existing_files, mass_of, target_of
@@ -34,6 +35,7 @@ from wm_drake.studies.identify.options import (
     IdentifyOptions,
 )
 from wm_drake.studies.identify.page import fit_answer
+from wm_drake.studies.identify.problem import motion_sentences
 from wm_drake.studies.identify.static_task import IdentifyStaticTask
 from wm_drake.studies.inputs import pairs_of, quantities_of
 from wm_drake.studies.rig.study import DRIVEN_MASS, SPONGE_MASS
@@ -63,6 +65,8 @@ class IdentifyTask(Task):
     def run(self, executor: Executor) -> Answer:
         """Fit one law, or compare several."""
         names, options = list(self.models), self.options
+        for text in motion_sentences((*self.motions, *self.validation)):
+            say(text, err=True)
         component = replace(self.component, out=executor.out or Path())
         if len(names) == 1 and not self.validation:
             (model,) = self.models.values()

@@ -31,7 +31,7 @@ from wm_drake.studies.compare.study import (
     rms_of,
 )
 from wm_drake.studies.fitting.fit import Fit
-from wm_drake.studies.fitting.methods import least_squares
+from wm_drake.studies.fitting.methods import identify
 from wm_drake.studies.fitting.problem import FitProblem, Measurement, Progress
 from wm_drake.studies.spin_identify.study import Sought, at_point
 
@@ -216,7 +216,7 @@ def calibrated(
         return np.concatenate([scaled[:, valid[:, k], k] for k in used], axis=1)
 
     problem = FitProblem(tuple(one.unknown for one in model.sought), tests, evaluate)
-    fit = least_squares(problem, seed=seed, starts=2, screened=8, progress=progress)
+    fit = identify(problem, seed=seed, starts=2, screened=8, progress=progress)
     fit = with_sensor_errors(fit, problem)
     after = model.computed([at_point(model.parameters, model.sought, fit.values)])[0]
     dims = ("place", "sensor")

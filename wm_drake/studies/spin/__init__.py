@@ -1,5 +1,5 @@
-"""Run cases of a machine over spin profiles and collect records and measures for the report.
+"""Run cases of a machine over spin profiles and show records, measures and their differences.
 
-Enters: machine parameters and cases. Leaves: a `SpinRuns`.
-May import: `simulation` and the rooms before it.
+Enters: machine parameters and cases. Leaves: `SpinRuns`, and an `Answer` that shows them.
+May import: `studies.modes`, `simulation` and the rooms before it.
 """

@@ -3,14 +3,17 @@
 from typing import Any
 
 import numpy as np
-import pandas as pd
+import xarray as xr
 
 from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import Unit
 from wm_drake.report import figure as fig
-from wm_drake.report.formatting import GM_PER_KGM, RPM_PER_RAD_S, listed, number, plain, shape_name
-from wm_drake.report.page import Picture, Section, picture
-from wm_drake.report.table import Column, Table, table_of
+from wm_drake.report.formatting import listed, shape_name
+from wm_drake.report.labelled import LabelledTable
+from wm_drake.report.quantity import SPEED, TIME, Quantity
 from wm_drake.simulation.balance import Balance, balance_of
+from wm_drake.studies.answer import Part, Plot
+from wm_drake.studies.spin.data import ANGLE, rows_of
 from wm_drake.studies.spin.figures import speed_axis
 from wm_drake.studies.spin.study import CaseResult, SpinRuns
 
@@ -20,8 +23,11 @@ WINDOW = 0.1
 MOST_DOTS = 500
 """Largest number of points of a ball in a figure."""
 
-SMALLEST = 1e-3
-"""Smallest unbalance that a logarithmic axis shows. [g m]"""
+SMALLEST = 1e-6
+"""Smallest unbalance that a logarithmic axis shows. [kg m]"""
+
+UNBALANCE = Quantity("unbalance", Unit("kg*m", "g*m"), 1)
+REMAINING = Quantity("at the end", UNBALANCE.unit, 2)
 
 BALLS = (
     "Angles are from the top of the drum, positive as it turns. The unbalance in a plane is the "
@@ -31,117 +37,76 @@ BALLS = (
 """Sentences of the section."""
 
 
-def balances(result: SpinRuns) -> list[tuple[CaseResult, Balance]]:
-    """Return the cases of a machine with rings of balls that have samples, with their balance."""
-    pairs = [(c, balance_of(c.case, result.parameters, c.record)) for c in result.results]
-    return [(case, balance) for case, balance in pairs if balance is not None]
-
-
-def balance_section(result: SpinRuns) -> Section:
-    """Return the section; it is empty for a machine without rings."""
-    shown = balances(result)
-    if not shown:
-        return Section("balance", "Balls and remaining unbalance")
-    pictures = [_picture(c, b) for c, b in shown if len(b.time) > 1]
-    tables = (balance_table(result),)
-    return Section("balance", "Balls and remaining unbalance", pictures, tables, BALLS)
-
-
-def balance_frame(result: SpinRuns) -> pd.DataFrame:
-    """Return the unbalance in each plane: of the load, largest, and at the end of the run."""
-    rows = [
-        {
-            "load": case.case.name,
-            "gasket": case.record.attrs["gasket"],
-            "plane": ring,
-            **numbers,
-            "smaller_from_rpm": RPM_PER_RAD_S * balance.balanced_from,
-        }
-        for case, balance in balances(result)
-        for ring, numbers in _of_planes(balance).items()
+def balances(runs: SpinRuns) -> list[tuple[str, CaseResult, Balance]]:
+    """Return label, case and balance of the cases of a machine with rings that have samples."""
+    every = zip(runs.labels, runs.results, strict=True)
+    return [
+        (name, case, balance)
+        for name, case in every
+        if (balance := balance_of(case.case, runs.parameters, case.record))
     ]
-    return pd.DataFrame(rows)
 
 
-def _of_planes(balance: Balance) -> dict[str, dict[str, float]]:
-    """Return the unbalance in the plane of each ring, with units in the names."""
-    size, planes = GM_PER_KGM * balance.size, range(len(balance.planes))
-    at = size.argmax(axis=0)
-    return {
-        balance.rings[p]: {
-            "load_gm": float(GM_PER_KGM * balance.load_size[p]),
-            "largest_gm": float(size[at[p], p]),
-            "largest_rpm": float(RPM_PER_RAD_S * balance.speed[at[p]]),
-            "end_gm": float(GM_PER_KGM * balance.at_end[p]),
-        }
-        for p in planes
-    }
-
-
-def balance_table(result: SpinRuns) -> Table:
-    """Return `balance_frame` for reading."""
-    caption = (
+def balance_parts(runs: SpinRuns) -> tuple[Part, Part]:
+    """Return the pictures and the tables; both are empty for a machine without rings."""
+    shown = balances(runs)
+    if not shown:
+        return Part("Balls and remaining unbalance"), Part("Remaining unbalance")
+    plots = [_plot(case, balance) for _, case, balance in shown if len(balance.time) > 1]
+    table = LabelledTable(
+        "balance",
+        xr.concat([of_planes(name, balance) for name, _, balance in shown], "row"),
+        "Remaining unbalance",
         "Unbalance in the plane of each ring: of the load alone, largest of load and balls with "
-        "its drum speed, and mean over the last turn of the drum. Last column: speed from which "
+        "its drum speed, and mean over the last turn of the drum. Smaller from: speed from which "
         "the sum over the planes is smaller than that of the load alone; below it the balls add "
-        "to the unbalance."
+        "to the unbalance.",
+        marked=("is_worse", "alarm"),
+        is_in_terminal=True,
     )
-    unit, frame = "g\u00a0m", balance_frame(result)
-    columns = {
-        "plane": Column("plane of"),
-        "load_gm": Column("load alone", unit, 1),
-        "largest_gm": Column("largest", unit, 1),
-        "largest_rpm": Column("at", "rpm", 0),
-        "end_gm": Column("at the end", unit, 2),
-        "smaller_from_rpm": Column("smaller from", "rpm", 0),
-    }
-    is_worse = (frame.end_gm > frame.load_gm) & (frame.end_gm > SMALLEST)
-    kinds = ["alarm" if worse else "" for worse in is_worse]
-    return table_of(frame, caption, columns, kinds, grouped=True)
+    balls = xr.concat([of_balls(*one) for one in shown], "row")
+    return (
+        Part("Balls and remaining unbalance", plots, BALLS),
+        Part("Remaining unbalance", (table, LabelledTable("balls", balls, is_in_json=False))),
+    )
 
 
-def balance_as_json(balance: Balance | None) -> dict[str, Any] | None:
-    """Return the balance of a case for JSON; None for a machine without balls."""
-    if balance is None:
-        return None
-    from_rpm = RPM_PER_RAD_S * balance.balanced_from
-    shown: dict[str, Any] = plain({"smaller_from_rpm": from_rpm, "planes": _of_planes(balance)})
-    return shown
+def of_planes(label: str, balance: Balance) -> xr.Dataset:
+    """Return the unbalance in each plane: of the load, largest, and at the end of the run."""
+    planes = len(balance.planes)
+    at = balance.size.argmax(axis=0)
+    end, of_load = balance.at_end, balance.load_size
+    return rows_of(
+        {"load": [label] * planes, "plane": balance.rings},
+        load_alone=UNBALANCE.named("load alone").variable("row", of_load),
+        largest=UNBALANCE.named("largest").variable("row", balance.size.max(axis=0)),
+        speed=SPEED.named("at").variable("row", balance.speed[at]),
+        end=REMAINING.variable("row", end),
+        smaller_from=SPEED.named("smaller from").variable("row", [balance.balanced_from] * planes),
+        is_worse=("row", (end > of_load) & (end > SMALLEST)),
+    )
 
 
-def balance_line(balance: Balance) -> str:
-    """Return the balance of a case as text for the terminal."""
-    load, end = (GM_PER_KGM * values.sum() for values in (balance.load_size, balance.at_end))
-    text = f"unbalance {load:.1f} g m, with the balls {end:.2f} g m at the end"
-    if np.isfinite(balance.balanced_from):
-        return f"{text}, smaller from {RPM_PER_RAD_S * balance.balanced_from:.0f} rpm on"
-    return f"{text}; the balls make it larger"
-
-
-def ball_table(result: SpinRuns) -> pd.DataFrame:
+def of_balls(label: str, case: CaseResult, balance: Balance) -> xr.Dataset:
     """Return angles of the balls and unbalance in the planes over time, a row for each window."""
-    parts = []
-    for case, balance in balances(result):
-        rows, angles = _sampled(balance, WINDOW), case.record.ball_ring_angle
-        columns: dict[str, Any] = {
-            "load": case.case.name,
-            "gasket": case.record.attrs["gasket"],
-            "time_s": balance.time[rows],
-            "speed_rpm": RPM_PER_RAD_S * balance.speed[rows],
-        }
-        for p, ring in enumerate(balance.rings):
-            columns[f"{ring}_unbalance_gm"] = GM_PER_KGM * balance.size[rows, p]
-        for ring in map(str, angles.ball_ring.values):
-            for ball, values in enumerate(_degrees(case, ring).T, start=1):
-                columns[f"{ring}_ball_{ball}_deg"] = values[rows]
-        parts.append(pd.DataFrame(columns))
-    return pd.concat(parts, ignore_index=True)
+    rows = _sampled(balance, WINDOW)
+    columns: dict[str, Any] = {
+        "time": TIME.variable("row", balance.time[rows]),
+        "speed": SPEED.variable("row", balance.speed[rows]),
+    }
+    for plane, ring in enumerate(balance.rings):
+        values = UNBALANCE.variable("row", balance.size[rows, plane])
+        columns[f"{ring}_unbalance"] = values
+    for ring in map(str, case.record.ball_ring_angle.ball_ring.values):
+        for ball, angles in enumerate(_angles_of(case, ring).T, start=1):
+            columns[f"{ring}_ball_{ball}"] = ANGLE.variable("row", angles[rows])
+    return rows_of({"load": [label] * len(rows)}, **columns)
 
 
-def _degrees(case: CaseResult, ring: str) -> FloatArray:
-    """Return the angles of the balls of a ring. (n, balls) [deg]"""
+def _angles_of(case: CaseResult, ring: str) -> FloatArray:
+    """Return the angles of the balls of a ring. (n, balls) [rad]"""
     angles = case.record.ball_ring_angle.sel(ball_ring=ring).values
-    return np.rad2deg(angles[:, ~np.isnan(angles[0])])
+    return np.asarray(angles[:, ~np.isnan(angles[0])])
 
 
 def _sampled(balance: Balance, window: float) -> np.ndarray:
@@ -150,10 +115,10 @@ def _sampled(balance: Balance, window: float) -> np.ndarray:
     return np.unique(np.searchsorted(balance.time, begins))
 
 
-def _picture(case: CaseResult, balance: Balance) -> Picture:
+def _plot(case: CaseResult, balance: Balance) -> Plot:
     end = listed(
         [
-            f"{number(GM_PER_KGM * size, 2)} g m in the plane of {shape_name(ring)}"
+            f"{REMAINING.text(size)} in the plane of {shape_name(ring)}"
             for ring, size in zip(balance.rings, balance.at_end, strict=True)
         ]
     )
@@ -167,18 +132,18 @@ def _picture(case: CaseResult, balance: Balance) -> Picture:
         f"Angles of the balls and remaining unbalance over time, load {case.title}. At the "
         f"end: {end}."
     )
-    return picture(balance_figure(case, balance), alternative, caption)
+    return Plot(balance_figure(case, balance), alternative, caption)
 
 
 def balance_figure(case: CaseResult, balance: Balance) -> fig.Figure:
     """Return the angles of the balls and the unbalance in the plane of the rings over time."""
-    x = fig.Axis(label="time, s", range=(float(balance.time[0]), float(balance.time[-1])))
+    x = fig.Axis(label=TIME.label, range=(float(balance.time[0]), float(balance.time[-1])))
     turns = fig.Axis(
-        label="angle, degrees",
+        label=ANGLE.label,
         range=(-180.0, 180.0),
         ticks=fig.named(("−180", "−90", "0", "90", "180"), (-180.0, -90.0, 0.0, 90.0, 180.0)),
     )
-    sizes = fig.Axis(label="unbalance, g\u00a0m", is_log=True)
+    sizes = fig.Axis(label=UNBALANCE.label, is_log=True)
     panels = [
         fig.Panel(title=shape_name(ring), marks=marks, x=x, y=turns, top=speed_axis(case.record))
         for p, ring in enumerate(balance.rings)
@@ -204,11 +169,11 @@ def _angles(case: CaseResult, balance: Balance, plane: int) -> tuple[fig.Mark, .
             size=2.5,
             name=f"ball {ball + 1}",
         )
-        for ball, values in enumerate(_degrees(case, balance.rings[plane]).T)
+        for ball, values in enumerate(ANGLE.values(_angles_of(case, balance.rings[plane])).T)
     ]
     x, z = -balance.load[plane]
-    if balance.load_size[plane] > SMALLEST / GM_PER_KGM:
-        at = float(np.rad2deg(np.arctan2(x, z)))
+    if balance.load_size[plane] > SMALLEST:
+        at = float(ANGLE.values(np.arctan2(x, z)))
         marks.append(fig.Rule(at, color=fig.MARK, dash="dashed", key="opposite the load"))
     return tuple(marks)
 
@@ -216,11 +181,10 @@ def _angles(case: CaseResult, balance: Balance, plane: int) -> tuple[fig.Mark, .
 def _sizes(balance: Balance, plane: int) -> tuple[fig.Mark, ...]:
     """Return the unbalance in a plane over time, and that of the load alone."""
     rows = _sampled(balance, WINDOW)
-    largest = GM_PER_KGM * np.maximum.reduceat(balance.size[:, plane], rows)
-    of_load = GM_PER_KGM * balance.load_size[plane]
-    marks: list[fig.Mark] = [
-        fig.Line(balance.time[rows], np.maximum(largest, SMALLEST), key="with balls")
-    ]
-    if of_load > SMALLEST:
+    largest = np.maximum.reduceat(balance.size[:, plane], rows)
+    drawn = UNBALANCE.values(np.maximum(largest, SMALLEST))
+    marks: list[fig.Mark] = [fig.Line(balance.time[rows], drawn, key="with balls")]
+    if balance.load_size[plane] > SMALLEST:
+        of_load = float(UNBALANCE.values(balance.load_size[plane]))
         marks.append(fig.Rule(of_load, color=fig.MEASURED, dash="dashed", key="load alone"))
     return tuple(marks)

@@ -1,17 +1,19 @@
 """Figures of a spin run: envelopes, gasket forces, orbits and gaps."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import xarray as xr
 
 from wm_drake.parameters.types import BoolArray, FloatArray, IndexArray
 from wm_drake.report import figure as fig
-from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number, shape_name
+from wm_drake.report.quantity import SPEED, TIME, Quantity, shown
 from wm_drake.simulation.displacements import axis_motion, envelopes, moment_of_largest_amplitude
 from wm_drake.simulation.outputs import point_positions
 from wm_drake.simulation.records import Record
-from wm_drake.studies.spin.study import CaseResult
+from wm_drake.studies.spin.data import DISPLACEMENT, FORCE, MOMENT, PLACE
+from wm_drake.studies.spin.study import GAP
 
 ORBIT_REVOLUTIONS = 6.0
 """Number of drum revolutions that an orbit shows, with the largest amplitude in the middle."""
@@ -23,36 +25,57 @@ LONGEST_ORBIT = 8.0
 """Longest time that an orbit shows; it matters for a drum that hardly turns. [s]"""
 
 
-def envelopes_figure(record: Record, measured_mm: Mapping[str, float] | None = None) -> fig.Figure:
+def envelopes_figure(record: Record, measured: xr.DataArray | None = None) -> fig.Figure:
     """Return the envelopes of the filtered displacement over time, one panel per sensor.
 
     The drum speed is given along the top.
 
     Args:
         record: A record that is long enough for the filter.
-        measured_mm: Measured amplitude A by sensor, drawn as dashed lines at +-A. [mm]
+        measured: Measured amplitude A (sensor), drawn as dashed lines at +-A. [m]
     """
-    band = envelopes(record) * MM_PER_M
-    largest = np.abs([band.lower.values, band.upper.values]).max()
-    limits = symmetric_limits(max([largest, *(measured_mm or {}).values()]))
+    band = envelopes(record)
+    sizes = [abs(side).max() for side in (band.lower, band.upper)]
+    largest = max([*sizes, *([] if measured is None else [measured.max()])])
+    limits = symmetric_limits(float(DISPLACEMENT.values(largest)))
     panels = []
     for name in map(str, record.sensor.values):
-        lower, upper = band.lower.sel(sensor=name).values, band.upper.sel(sensor=name).values
-        sides = record.time.values, lower, upper
-        marks: list[fig.Mark] = [time_band(sides, limits[1], "wm_drake, lower to upper envelope")]
-        if measured_mm is not None:
-            marks += experiment_rules(measured_mm[name])
-        farther = np.where(np.abs(lower) > np.abs(upper), lower, upper)
-        marks += largest_marks(record, farther, "mm")
-        panels.append(time_panel(record, name, marks, "displacement, mm", limits))
+        marks = envelope_marks(record, band.sel(sensor=name), limits[1])
+        if measured is not None:
+            marks[1:1] = experiment_rules(measured.sel(sensor=name))
+        panels.append(time_panel(record, name, marks, DISPLACEMENT.label, limits))
     return time_figure(panels)
 
 
-def experiment_rules(amplitude_mm: float, color: str = fig.MEASURED) -> list[fig.Mark]:
-    """Return lines at both sides of zero at a measured amplitude. [mm]"""
-    key = "experiment, ± amplitude"
-    at = (-amplitude_mm, amplitude_mm)
-    return [fig.Rule(side, color=color, width=1.6, dash="dashed", key=key) for side in at]
+def envelope_marks(
+    record: Record,
+    band: xr.Dataset,
+    limit: float,
+    key: str = "wm_drake, lower to upper envelope",
+    style: tuple[str, int] = ("", 0),
+) -> list[fig.Mark]:
+    """Return the area between the envelopes of a sensor, and its largest value.
+
+    Args:
+        band: Envelopes `lower` and `upper` (time). [m]
+        limit: Upper end of the vertical axis, in the unit for reading.
+        style: Colour, and line of text at the top of the panel; "" for the usual colours.
+    """
+    lower, upper = DISPLACEMENT.values(band.lower), DISPLACEMENT.values(band.upper)
+    farther = np.where(np.abs(band.lower) > np.abs(band.upper), band.lower, band.upper)
+    color, line = style
+    return [
+        time_band((record.time.values, lower, upper), limit, key, color or fig.OURS),
+        *largest_marks(record, farther, DISPLACEMENT, color or fig.MARK, line),
+    ]
+
+
+def experiment_rules(amplitude: xr.DataArray, color: str = fig.MEASURED) -> list[fig.Mark]:
+    """Return lines at both sides of zero at a measured amplitude."""
+    key, size = "experiment, ± amplitude", float(shown(amplitude))
+    return [
+        fig.Rule(side, color=color, width=1.6, dash="dashed", key=key) for side in (-size, size)
+    ]
 
 
 def gasket_figure(record: Record) -> fig.Figure:
@@ -61,18 +84,16 @@ def gasket_figure(record: Record) -> fig.Figure:
     A band shows the smallest to the largest value in each drum revolution.
     """
     panels = []
-    for letter, variable, label in (
-        ("F", record.bushing_force, "force, N"),
-        ("M", record.bushing_moment, "moment, N m"),
+    for letter, variable, quantity in (
+        ("F", record.bushing_force, FORCE),
+        ("M", record.bushing_moment, MOMENT),
     ):
         gasket = variable.sel(bushing="gasket")
-        limits = symmetric_limits(float(np.abs(gasket).max()))
+        limits = symmetric_limits(float(quantity.values(np.abs(gasket).max())))
         for axis in map(str, record.axis.values):
             values = gasket.sel(axis=axis).values
-            sides = revolution_band(record, values)
-            shown = time_band(sides, limits[1], IN_REVOLUTIONS)
-            marks = [shown, *largest_marks(record, values, label.split(", ")[1])]
-            panels.append(time_panel(record, f"{letter}{axis}", marks, label, limits))
+            marks = revolution_marks(record, values, quantity, limits[1])
+            panels.append(time_panel(record, f"{letter}{axis}", marks, quantity.label, limits))
     return time_figure(panels)
 
 
@@ -88,15 +109,15 @@ def orbits_figure(record: Record, y_front: float, y_rear: float) -> fig.Figure:
         y_rear: Position of the rear point on the drum axis. [m]
     """
     titles = _depths(y_front, y_rear)
-    paths = [axis_path_mm(record, y) for y in (y_front, y_rear)[: len(titles)]]
+    paths = [DISPLACEMENT.values(axis_path(record, y)) for y in (y_front, y_rear)[: len(titles)]]
     largest = moment_of_largest_amplitude(record)
     moments, angle = record.time.values, record.drum_angle.values
     windows = [orbit_window(moments, angle, largest, turns) for turns in (ORBIT_REVOLUTIONS, 1.0)]
     x_limit, z_limit = orbit_limits([path[windows[0]] for path in paths])
-    x = fig.Axis(label="x, to the right, mm", range=(-x_limit, x_limit))
-    z = fig.Axis(label="z, up, mm", range=(-z_limit, z_limit))
-    speed = record.drum_speed.values[largest] * RPM_PER_RAD_S
-    moment = f"largest amplitude: {moments[largest]:.2f} s, {number(speed, 0)} rpm"
+    x = fig.Axis(label=DISPLACEMENT.named("x, to the right").label, range=(-x_limit, x_limit))
+    z = fig.Axis(label=DISPLACEMENT.named("z, up").label, range=(-z_limit, z_limit))
+    speed = SPEED.text(record.drum_speed.values[largest])
+    moment = f"largest amplitude: {TIME.text(moments[largest])}, {speed}"
     time = moments[windows[0]]
     keys = (f"{time[0]:.1f} s to {time[-1]:.1f} s", "revolution around it", moment)
     panels = [
@@ -109,43 +130,47 @@ def orbits_figure(record: Record, y_front: float, y_rear: float) -> fig.Figure:
     )
 
 
-def gaps_figure(results: Sequence[CaseResult]) -> fig.Figure:
-    """Return the smallest gap between tub and housing, one line per case.
+def gaps_figure(gaps: xr.Dataset) -> fig.Figure:
+    """Return the smallest gap between tub and housing, one line per load.
 
     The text at each line gives the two parts and the drum speed at which the gap occurs.
+
+    Args:
+        gaps: As of `gaps_of` in `wm_drake.studies.spin.data`.
     """
-    gaps = [gap for gap in (result.measures.smallest_gap for result in results) if gap is not None]
-    distances = [MM_PER_M * gap.distance for gap in gaps]
+    distances = GAP.values(gaps.smallest_gap)
     low, high = min(0.0, *distances), max(0.0, *distances)
     span = (high - low) or 1.0
     marks: list[fig.Mark] = []
-    for place, (result, gap, distance) in enumerate(zip(results, gaps, distances, strict=True)):
-        color = fig.MEASURED if distance <= 0.0 else fig.OURS
+    for place, distance in enumerate(distances.tolist()):
+        gap, color = gaps.isel(load=place), fig.MEASURED if distance <= 0.0 else fig.OURS
         marks.append(fig.Line([0.0, distance], [place, place], color=color, width=4.0))
         marks.append(fig.Points([distance], [place], color=color, size=10.0))
-        speed = number(result.speed_rpm(gap.time), 0)
-        parts = f"{shape_name(gap.moving)} to {shape_name(gap.fixed)}"
-        text = f"{number(distance)} mm at {speed} rpm\n{parts}"
+        text = (
+            f"{GAP.text(gap.smallest_gap)} at {SPEED.text(gap.speed)}\n"
+            f"{gap.moving_part.item()} to {gap.part_of_the_housing.item()}"
+        )
         marks.append(fig.Text(max(distance, 0.0), place, text, across="left", shift=(14.0, 0.0)))
     marks.append(fig.Rule(0.0, "y", color=fig.MARK))
     x = fig.Axis(
-        label="smallest gap, mm (0: the parts touch)", range=(low - 0.02 * span, high + 1.1 * span)
+        label=f"{GAP.label} (0: the parts touch)", range=(low - 0.02 * span, high + 1.1 * span)
     )
     y = fig.Axis(
-        ticks=fig.named(result.title for result in results),
-        range=(len(results) - 0.4, -0.6),
+        ticks=fig.named(gaps["load"].values.tolist()),
+        range=(len(distances) - 0.4, -0.6),
         has_grid=False,
         has_line=False,
     )
-    return fig.Figure(panels=(fig.Panel(marks=tuple(marks), x=x, y=y),), height=50.0 * len(results))
+    height = 50.0 * len(distances)
+    return fig.Figure(panels=(fig.Panel(marks=tuple(marks), x=x, y=y),), height=height)
 
 
-def axis_path_mm(record: Record, y: float) -> FloatArray:
-    """Return the displacement from rest of the drum-axis point at depth y. (n, 3) [mm]"""
+def axis_path(record: Record, y: float) -> FloatArray:
+    """Return the displacement from rest of the drum-axis point at depth y. (n, 3) [m]"""
     at_rest = point_positions(
         np.asarray(record.attrs["rest_pose"])[None, :], np.array([[0.0, y, 0.0]])
     )[:, 0]
-    return (axis_motion(record, y) - at_rest) * MM_PER_M
+    return axis_motion(record, y) - at_rest
 
 
 def orbit_window(
@@ -180,11 +205,8 @@ def have_one_orbit(y_front: float, y_rear: float) -> bool:
 def _depths(y_front: float, y_rear: float) -> list[str]:
     """Return a title for each orbit that is drawn."""
     if have_one_orbit(y_front, y_rear):
-        return [f"y = {number(y_front * MM_PER_M, 0)} mm"]
-    return [
-        f"{where}, y = {number(y * MM_PER_M, 0)} mm"
-        for where, y in (("front", y_front), ("rear", y_rear))
-    ]
+        return [f"y = {PLACE.text(y_front)}"]
+    return [f"{where}, y = {PLACE.text(y)}" for where, y in (("front", y_front), ("rear", y_rear))]
 
 
 def _orbit(
@@ -270,7 +292,7 @@ def time_panel(
     return fig.Panel(
         name=name,
         marks=(fig.Rule(0.0, color=fig.QUIET, width=0.8), *marks, title),
-        x=fig.Axis(label="time, s", range=(0.0, end)),
+        x=fig.Axis(label=TIME.label, range=(0.0, end)),
         y=fig.Axis(label=label, range=limits),
         top=speed_axis(record),
     )
@@ -293,9 +315,8 @@ def _lowered(name: str, marks: Sequence[fig.Mark]) -> list[fig.Mark]:
 def speed_axis(record: Record) -> fig.Axis:
     """Return an axis that gives the drum speed at round times, for any spin profile."""
     times = fig.round_numbers(0.0, float(record.time[-1]), 7)
-    speeds = np.interp(times, record.time.values, record.drum_speed.values) * RPM_PER_RAD_S
-    ticks = fig.named((number(speed, 0) for speed in speeds), times)
-    return fig.Axis(label="drum speed, rpm", ticks=ticks)
+    speeds = np.interp(times, record.time.values, record.drum_speed.values)
+    return fig.Axis(label=SPEED.label, ticks=fig.named(map(SPEED.number, speeds), times))
 
 
 def symmetric_limits(largest: float, lines: int = 1) -> tuple[float, float]:
@@ -335,19 +356,35 @@ def revolution_band(
     return np.concatenate([time[:1], middle, time[-1:]]), lower, upper
 
 
+def revolution_marks(
+    record: Record, values: FloatArray, quantity: Quantity, limit: float
+) -> list[fig.Mark]:
+    """Return a band of smallest and largest values in each revolution, and the largest value.
+
+    Args:
+        values: Signal (n,). [SI]
+        limit: Upper end of the vertical axis, in the unit for reading.
+    """
+    time, lower, upper = revolution_band(record, values)
+    sides = time, quantity.values(lower), quantity.values(upper)
+    return [time_band(sides, limit, IN_REVOLUTIONS), *largest_marks(record, values, quantity)]
+
+
 def largest_marks(
-    record: Record, values: FloatArray, unit: str, color: str = fig.MARK, line: int = 0
+    record: Record, values: FloatArray, quantity: Quantity, color: str = fig.MARK, line: int = 0
 ) -> list[fig.Mark]:
     """Return a dot at the largest absolute value, and that value with its drum speed at the top.
 
     Args:
+        values: Signal (n,). [SI]
         line: Number of the line of text, counted from the top of the panel.
     """
     index = int(np.argmax(np.abs(values)))
-    speed = record.drum_speed.values[index] * RPM_PER_RAD_S
-    text = f"{number(abs(values[index]))} {unit} at {number(speed, 0)} rpm"
+    size = Quantity("", quantity.unit, 1).text(abs(values[index]))
+    text = f"{size} at {SPEED.text(record.drum_speed.values[index])}"
     at = {"in_data": (False, False), "across": "right", "up": "top"}
-    dot = fig.Points(record.time.values[index : index + 1], values[index : index + 1], color=color)
+    y = quantity.values(values[index : index + 1])
+    dot = fig.Points(record.time.values[index : index + 1], y, color=color)
     return [
         replace(dot, key=LARGEST, size=6.5),
         fig.Text(0.985, 0.965, text, color=color, shift=(0.0, -15.0 * line), **at),  # type: ignore[arg-type]

@@ -11,6 +11,9 @@ from wm_drake.studies.study import MEASURED, PROFILE, Options, Study, imported, 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     from wm_drake.parameters import MachineParameters
 
+MOST_VARIANTS = 6
+"""Largest number of variants that a figure can tell apart."""
+
 
 class SpinOptions(Options):
     """Options of spin runs."""

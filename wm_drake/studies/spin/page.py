@@ -1,51 +1,60 @@
-"""Page of spin runs: the answer, pictures of each load, tables of all measures."""
+"""Show spin runs: the answer, pictures of each load, tables of all measures."""
 
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
+import xarray as xr
 
-from wm_drake.elements.motor import evaluate_motor, packed_limit
-from wm_drake.parameters.drive import motor_of
+from wm_drake.parameters import quantities
+from wm_drake.parameters.measured import measured_notes
 from wm_drake.parameters.plausibility import unusual_numbers
-from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Unit
-from wm_drake.report import figure as fig
-from wm_drake.report.formatting import (
-    MISSING,
-    MM_PER_M,
-    RPM_PER_RAD_S,
-    number,
-    percent,
-    slack_warning,
-)
-from wm_drake.report.page import Picture, Section, SectionedPage, picture, versions_of
-from wm_drake.report.table import Group, Row, Table
-from wm_drake.report.terminal import Printed
-from wm_drake.simulation.balance import balance_of, rings_of
-from wm_drake.simulation.displacements import band_of
-from wm_drake.simulation.drive import CAPTURE_LAG, CAPTURE_TIME, over_revolutions
-from wm_drake.simulation.measures.as_json import as_json
+from wm_drake.report.formatting import slack_warning
+from wm_drake.report.labelled import LabelledTable
+from wm_drake.report.page import versions_of
+from wm_drake.report.quantity import SPEED, Quantity
+from wm_drake.report.table import readable
+from wm_drake.simulation.balance import rings_of
 from wm_drake.simulation.measures.registry import tabulated
-from wm_drake.simulation.mounts import POINT
-from wm_drake.simulation.records import profile_of
+from wm_drake.simulation.records import save_record
 from wm_drake.simulation.spring_tension import slack_springs
+from wm_drake.studies.answer import Answer, Part, Plot, WritesFile
 from wm_drake.studies.modes.page import natural_modes_table
-from wm_drake.studies.spin import figures, tables
-from wm_drake.studies.spin.balance import (
-    balance_as_json,
-    balance_frame,
-    balance_section,
-    ball_table,
+from wm_drake.studies.spin import figures
+from wm_drake.studies.spin.data import (
+    CHANGE,
+    DISPLACEMENT,
+    FORCE,
+    MOMENT,
+    OURS,
+    about_runs,
+    amplitudes_of,
+    differences_of,
+    experiment_of,
+    gaps_of,
+    loads_of,
+    mounts_of,
+    of_sensors,
+    profiles_of,
+    row_of,
+    rows_of,
 )
-from wm_drake.studies.spin.figures import revolution_starts
-from wm_drake.studies.spin.floor import floor_section, floor_warnings
-from wm_drake.studies.spin.study import CaseResult, ComparedCases, SpinRuns, band_text
-from wm_drake.studies.spin.tables import amplitude_table
-from wm_drake.studies.spin.vibration import vibration_pictures
-from wm_drake.studies.study import Facts, Result
+from wm_drake.studies.spin.drive import capture_warnings, drive_in_short, drive_parts
+from wm_drake.studies.spin.floor import floor_parts, floor_warnings
+from wm_drake.studies.spin.study import (
+    GAP,
+    CaseResult,
+    ComparedCases,
+    SpinRuns,
+    band_text,
+    write_replay,
+)
+from wm_drake.studies.spin.vibration import vibration_plots
+
+if TYPE_CHECKING:
+    from wm_drake.studies.modes.study import NaturalModes
 
 AXES = (
     "Axes: for a person who faces the door, x points to the right, y along the drum axis from "
@@ -71,178 +80,206 @@ VERDICT = (
 """How the verdict differs from this page."""
 
 
+MOMENT_OF_GASKET = Quantity("moment", MOMENT.unit, 2)
+
+
 @dataclass(frozen=True)
-class SpinResult(Result):
-    """Spin runs of one machine, as they are shown."""
+class Files:
+    """Which files and pictures of spin runs are written beside the usual ones.
 
-    runs: SpinRuns
-    float_format: ClassVar[str | None] = "%.4f"
+    Attributes:
+        replay: A 3D replay for each case.
+        detail: Pictures of vibration for every case, not only for the one with the largest
+            amplitude.
+        records: The record of each case.
+        part: Part of the names of files that tells machines apart; "" for a single machine.
+    """
 
-    def tables(self) -> dict[str, pd.DataFrame]:
-        """Return the amplitudes, and of a machine with rings of balls what they do."""
-        runs, shown = self.runs, {"amplitudes": tables.banded_amplitudes(self.runs)}
-        if rings_of(runs.parameters) and any(c.record.sizes["time"] for c in runs.results):
-            shown |= {"balance": balance_frame(runs), "balls": ball_table(runs)}
-        return shown
+    replay: bool = False
+    detail: bool = False
+    records: bool = True
+    part: str = ""
 
-    def as_json(self) -> dict[str, Any]:
-        """Return the measures of each case."""
-        runs = self.runs
-        return {
-            "machine": runs.parameters.name,
-            "engine": runs.engine,
-            "cases": cases_as_json(runs),
-        }
+    def replay_of(self, case: CaseResult) -> str:
+        """Return the name of the file with the 3D replay of a case; "" if there is none."""
+        return f"replay_{self._name_of(case)}.html" if self.replay else ""
 
-    def terminal(self) -> Printed:
-        """Return the amplitudes, and lines with the other measures of each case."""
-        runs = self.runs
-        title = f"Displacement amplitudes of machine '{runs.parameters.name}', in mm"
-        lines = [line for case in runs.results for line in tables.case_lines(runs.parameters, case)]
-        amplitudes = tables.amplitude_lines(title, self.tables()["amplitudes"])
-        return [amplitudes, *runs.measured_notes(), *lines]
+    def of_runs(self, runs: SpinRuns) -> dict[str, WritesFile]:
+        """Return what writes records and replays, by the names of their files."""
+        files: dict[str, WritesFile] = {}
+        for case in runs.results:
+            if self.records:
+                files[f"record_{self._name_of(case)}.nc"] = partial(save_record, case.record)
+            if name := self.replay_of(case):
+                files[name] = partial(write_replay, runs.parameters, case)
+        return files
 
-    def page(self, facts: Facts) -> str:
-        """Return the page."""
-        return spin_page(self.runs, facts)
-
-    def write(self, folder: Path) -> None:
-        """Write the amplitudes and the files of the cases."""
-        super().write(folder)
-        self.runs.write_cases(folder)
-
-    def warnings(self) -> list[str]:
-        """Return a warning of springs that go slack, if any do."""
-        return slack_springs_warning(self.runs)
-
-    def failures(self) -> list[str]:
-        """Return a line for each case that diverged."""
-        return self.runs.failures()
+    def _name_of(self, case: CaseResult) -> str:
+        return "_".join(filter(None, [self.part, case.case.name]))
 
 
-def cases_as_json(runs: SpinRuns) -> list[dict[str, Any]]:
-    """Return the measures of each case as objects for JSON."""
-    return [
-        case_as_json(case)
-        | {"balance": balance_as_json(balance_of(case.case, runs.parameters, case.record))}
-        for case in runs.results
-    ]
+def spin_answer(
+    runs: SpinRuns, modes: "NaturalModes | None" = None, files: Files | None = None
+) -> Answer:
+    """Return the answer of spin runs of one machine.
 
-
-def spin_page(result: SpinRuns, facts: Facts | None = None) -> str:
-    """Return the page of spin runs as text of one self-contained HTML file."""
-    table, made = amplitude_table(result), facts or Facts()
-    gaps = _gaps_pictures(result)
-    drive, floor, modes = drive_section(result), floor_section(result), result.modes
-    balance = balance_section(result)
-    more = tuple(tables.variable_table(result, variable) for variable in tabulated())
-    sections = [
-        *_case_sections(result, table),
-        Section("gap", "Smallest gaps", gaps, text=VERDICT if gaps else ""),
-        replace(balance, tables=()),
-        Section("floor", "Feet over time", floor.pictures),
-        Section(
-            "drive", "Speed and torque", drive.pictures, text=drive.text if drive.pictures else ""
+    Args:
+        modes: Natural modes of the machine with the load of the first case; None if it has none or
+            they are not shown.
+        files: What is written beside the usual files.
+    """
+    files, amplitudes = files or Files(), amplitudes_of(runs)
+    parts = (
+        *_case_parts(runs, amplitudes, files),
+        *_measure_parts(runs, amplitudes),
+        _modes_part(modes),
+        _inputs_part(runs),
+    )
+    times = "; ".join(f"{case.title} {case.wall_s:.1f} s" for case in runs.results)
+    return Answer(
+        f"Spin run of machine {runs.parameters.name}",
+        summary(runs, amplitudes),
+        runs.parameters,
+        parts,
+        (
+            ("SDF model", Path(runs.parameters.model).name),
+            ("Engine", f"{runs.engine}, {runs.stepping_text}"),
+            ("Versions of the runs", versions_of(runs.results[0].record.attrs)),
+            ("Computing time", times),
         ),
-        Section("amplitudes", "Amplitudes", tables=(tables.comparison(result, table),)),
-        Section("speeds", "Critical speeds", tables=(tables.critical_speeds(result),)),
-        Section("smallest", "Smallest gap", tables=(tables.smallest_gaps(result),)),
-        Section("forces", "Detergent box and gasket", tables=(tables.largest_values(result),)),
-        Section(
-            "mounts",
-            "Mounts and accelerations",
-            tables=(*tables.mount_force_tables(result), tables.accelerations(result)),
-            is_folded=True,
-        ),
-        Section("remaining", "Remaining unbalance", tables=balance.tables),
-        replace(floor, pictures=(), is_folded=True),
-        replace(drive, pictures=(), text="" if drive.pictures else drive.text),
-        Section("springs", "Springs", tables=(tables.smallest_tensions(result),)),
-        Section("more", "More measures", tables=more),
-    ]
-    if modes:
-        shown = (natural_modes_table(modes).table(),)
-        sections.append(
-            Section("modes", "Natural modes", tables=shown, text=MODES.format(modes.load))
-        )
-    changed = (tables.changed_parameters(result, case) for case in result.results)
-    return SectionedPage(
-        f"Spin run of machine {result.parameters.name}",
-        summary(result, table),
-        sections,
-        facts_of_run(result, made),
-        result.parameters,
-        [*made.warnings, *warnings_of(result)],
-        method=f"{AXES} {drive_in_short(result)}",
-        tables=(*filter(None, changed), tables.loads(result), tables.profiles(result)),
-    ).html()
+        f"{AXES} {drive_in_short(runs)}",
+        files.of_runs(runs),
+        tuple(warnings_of(runs)),
+        diverged=runs.failures(),
+    )
 
 
-def _case_sections(result: SpinRuns, table: pd.DataFrame) -> list[Section]:
-    """Return a section for each case; that with the largest amplitude has its vibration too."""
-    main, sections = max(result.results, key=lambda case: _peak(case)[0]), []
-    for index, case in enumerate(result.results, start=1):
-        title, file = case.title, result.replay_of(case)
+def _case_parts(runs: SpinRuns, amplitudes: xr.Dataset, files: Files) -> list[Part]:
+    """Return a part for each case; that with the largest amplitude has its vibration too."""
+    main, parts = max(runs.results, key=lambda case: _peak(case)[0]), []
+    for case in runs.results:
+        title, file = case.title, files.replay_of(case)
         words = f"3D replay of load {title} around its largest amplitude"
         text = _case_facts(case)
-        pictures = [_envelopes_picture(case, table), _orbits_picture(case), _gasket_picture(case)]
-        if (result.files.detail or case is main) and case.record.sizes["time"] > 1:
-            pictures += vibration_pictures(result, case)
-        if case is main and not result.files.detail and len(result.results) > 1:
+        drawn = (_envelopes_plot(case, amplitudes), _orbits_plot(case), _gasket_plot(case))
+        plots = [plot for plot in drawn if plot]
+        if (files.detail or case is main) and case.record.sizes["time"] > 1:
+            plots += vibration_plots(runs, case)
+        if case is main and not files.detail and len(runs.results) > 1:
             text = f"{text} {ONE_VIBRATION}"
-        shown, links = tuple(filter(None, pictures)), [(file, words)] if file else []
-        sections.append(Section(f"case-{index}", f"Load {title}", shown, text=text, links=links))
-    return sections
+        parts.append(Part(f"Load {title}", plots, text, [(file, words)] if file else []))
+    return parts
 
 
-def summary(result: SpinRuns, table: pd.DataFrame) -> str:
+def _measure_parts(runs: SpinRuns, amplitudes: xr.Dataset) -> list[Part]:
+    """Return the parts with the measures of all cases."""
+    drive, drive_numbers = drive_parts(runs)
+    feet, floor = floor_parts(runs)
+    balls, remaining = Part("Balls"), Part("Remaining unbalance")
+    if rings_of(runs.parameters):
+        from wm_drake.studies.spin.balance import balance_parts  # few machines have rings
+
+        balls, remaining = balance_parts(runs)
+    gaps = gaps_of(runs)
+    plots = [_gaps_plot(gaps)] if gaps.sizes["load"] > 1 else []
+    tension = runs.measures[["smallest_spring_tension"]]
+    slack = tension.assign(is_slack=(tension.smallest_spring_tension == 0.0).any("spring"))
+    return [
+        Part("Smallest gaps", plots, VERDICT if plots else ""),
+        balls,
+        feet,
+        drive,
+        Part("Amplitudes", amplitude_tables(runs, amplitudes)),
+        Part("Sensors", (sensors_table(runs),)),
+        Part("Smallest gap", (gaps_table(gaps),)),
+        Part("Detergent box and gasket", (largest_table(runs),)),
+        Part("Mounts", (_mounts_table(runs),), is_folded=True),
+        remaining,
+        floor,
+        drive_numbers,
+        Part(
+            "Springs",
+            (
+                LabelledTable(
+                    "springs",
+                    slack,
+                    "Springs",
+                    "Smallest tension of each spring over all samples. A spring that only pulls "
+                    "goes slack at 0; a spring that also pushes can fall below.",
+                    across="spring",
+                    marked=("is_slack", "alarm"),
+                    is_in_terminal=True,
+                ),
+            ),
+        ),
+        Part("More measures", _more_tables(runs)),
+    ]
+
+
+def _modes_part(modes: "NaturalModes | None") -> Part:
+    if modes is None:
+        return Part("Natural modes")
+    table = replace(natural_modes_table(modes), is_in_terminal=False)
+    return Part("Natural modes", (table,), MODES.format(modes.load))
+
+
+def _inputs_part(runs: SpinRuns) -> Part:
+    """Return what was run: loads, spin profiles, and numbers of a case that differ."""
+    tables = [
+        LabelledTable(
+            "loads",
+            loads_of(runs),
+            "Loads",
+            "Loads: point masses in the drum. A mass with phase 0 is at the top when the drum "
+            "angle is 0. y is measured from drum mid-depth to the rear.",
+        ),
+        LabelledTable(
+            "profiles",
+            profiles_of(runs),
+            "Spin profile",
+            "Spin profile. The drum speed is linear between these points.",
+        ),
+        LabelledTable("runs", about_runs(runs)),
+    ]
+    changed = changed_parameters(runs)
+    if changed.sizes["row"]:
+        about = "Parameters of loads that differ from those of the machine."
+        tables.append(LabelledTable("changed", changed, "Changed parameters", about))
+    return Part("What was run", tables, is_folded=True)
+
+
+def summary(runs: SpinRuns, amplitudes: xr.Dataset) -> str:
     """Return one paragraph about the cases that reached their end."""
-    ended = [case for case in result.results if not case.record.attrs["diverged"]]
-    count, diverged = len(result.results), len(result.results) - len(ended)
+    ended = [case for case in runs.results if not case.record.attrs["diverged"]]
+    count, diverged = len(runs.results), len(runs.results) - len(ended)
     cases = "1 case was" if count == 1 else f"{count} cases were"
-    fastest = max(case.case.profile.highest_speed for case in result.results)
-    speed = number(RPM_PER_RAD_S * fastest, 0)
-    opening = f"{cases} run with the {result.engine} engine, at drum speeds up to {speed} rpm."
+    speed = SPEED.text(max(case.case.profile.highest_speed for case in runs.results))
+    opening = f"{cases} run with the {runs.engine} engine, at drum speeds up to {speed}."
     if not ended:
         return f"{opening} Every run diverged, so there is no result to summarize."
     if diverged:
         excluded = "1 run diverged and is" if diverged == 1 else f"{diverged} runs diverged and are"
         opening += f" {excluded} excluded from this summary."
-    return " ".join(
-        filter(
-            None,
-            [
-                _contact_sentence(ended),
-                opening,
-                _largest_amplitude_sentence(ended),
-                _agreement_sentence(result, ended, table),
-            ],
-        )
-    )
-
-
-def _largest_amplitude_sentence(cases: list[CaseResult]) -> str:
-    case = max(cases, key=lambda case: _peak(case)[0])
-    size, sensor, speed = _peak(case)
-    return (
-        f"The largest amplitude occurs with load {case.title}: {number(size)} mm at sensor "
-        f"{sensor}, at {number(speed, 0)} rpm."
-    )
+    main = max(ended, key=lambda case: _peak(case)[0])
+    largest = f"The largest amplitude occurs with load {main.title}: {_peak_text(main)}."
+    sentences = (_contact_sentence(ended), opening, largest, _agreement(runs, ended, amplitudes))
+    return " ".join(sentences)
 
 
 def _peak(case: CaseResult) -> tuple[float, str, float]:
-    """Return the largest amplitude [mm], its sensor, and the drum speed there [rpm].
+    """Return the largest amplitude [m], its sensor, and the drum speed there [rad/s].
 
     The amplitude is 0 if the run was too short for the filter.
     """
     amplitude = case.measures.amplitude.fillna(0.0)
     index = int(np.argmax(amplitude.values))
     speed = float(case.measures.critical_speed.values[index])
-    return (
-        MM_PER_M * float(amplitude.values[index]),
-        str(amplitude.sensor.values[index]),
-        RPM_PER_RAD_S * speed,
-    )
+    return float(amplitude.values[index]), str(amplitude.sensor.values[index]), speed
+
+
+def _peak_text(case: CaseResult) -> str:
+    size, sensor, speed = _peak(case)
+    return f"{DISPLACEMENT.text(size)} at sensor {sensor}, at {SPEED.text(speed)}"
 
 
 def _contact_sentence(cases: list[CaseResult]) -> str:
@@ -251,56 +288,54 @@ def _contact_sentence(cases: list[CaseResult]) -> str:
     if not gaps:
         return "The SDF has no shapes on both tub and housing, so contact cannot be judged."
     gap, case = min(gaps, key=lambda pair: pair[0].distance)
-    place = (
-        f"between {gap.parts}, with load {case.title} at {number(case.speed_rpm(gap.time), 0)} rpm"
-    )
-    size = f"smallest gap {number(MM_PER_M * gap.distance)} mm"
-    does = "does not touch"
+    speed = SPEED.text(case.speed_at(gap.time))
+    size, does = f"smallest gap {GAP.text(gap.distance)}", "does not touch"
     if gap.distance <= 0.0:
-        size, does = f"overlap of {number(-MM_PER_M * gap.distance)} mm", "touches"
-    loads = [f"{c.title} {number(MM_PER_M * g.distance)} mm" for g, c in gaps]
+        size, does = f"overlap of {GAP.text(-gap.distance)}", "touches"
+    loads = [f"{c.title} {GAP.text(g.distance)}" for g, c in gaps]
     per_load = f" Smallest gap per load: {', '.join(loads)}." if len(gaps) > 1 else ""
+    place = f"between {gap.parts}, with load {case.title} at {speed}"
     return f"The tub {does} the housing: {size}, {place}.{per_load}"
 
 
 def _case_facts(case: CaseResult) -> str:
-    size, sensor, speed = _peak(case)
     facts = "The run is too short for the band-pass filter, so it has no amplitudes."
     if _has_envelopes(case):
-        facts = (
-            f"Largest amplitude: {number(size)} mm at sensor {sensor}, at {number(speed, 0)} rpm."
-        )
+        facts = f"Largest amplitude: {_peak_text(case)}."
     gap = case.gap_text
     return f"{facts} Smallest gap to the housing: {gap}." if gap else facts
 
 
-def _agreement_sentence(result: SpinRuns, cases: list[CaseResult], table: pd.DataFrame) -> str:
-    changes = [
-        change
-        for case in cases
-        for change in tables.differences(table, case)
-        if np.isfinite(change.percent)
-    ]
-    if not changes:
-        return _why_not_compared(result)
-    mean = float(np.mean([abs(change.percent) for change in changes]))
-    worst = max(changes, key=lambda change: abs(change.percent))
+def _agreement(runs: SpinRuns, cases: list[CaseResult], amplitudes: xr.Dataset) -> str:
+    """Return how far the computed amplitudes are from measured ones, or why that is not known."""
+    changes = differences_of(amplitudes)
+    rows = {case.title: row_of(changes, case, OURS) for case in cases}
+    of_cases = {title: row.difference for title, row in rows.items() if row is not None}
+    if not of_cases:
+        return _why_not_compared(runs)
+    joined = xr.concat([*of_cases.values()], xr.Variable("case", [*of_cases]))
+    places = joined.stack(place=("case", "sensor"))
+    compared = places[np.isfinite(places.values)]
+    if not compared.size:
+        return _why_not_compared(runs)
+    worst = compared[int(np.abs(compared.values).argmax())]
+    mean = Quantity("", CHANGE.unit, 0).text(abs(compared).mean())
     return (
-        f"{len(changes)} amplitudes can be compared with the experiment. The mean absolute "
-        f"difference is {number(mean, 0)} %. The largest difference is {percent(worst.percent)}, "
-        f"at sensor {worst.sensor} with load {worst.case}."
+        f"{compared.size} amplitudes can be compared with the experiment. The mean absolute "
+        f"difference is {mean}. The largest difference is {CHANGE.text(worst)}, at sensor "
+        f"{worst.sensor.item()} with load {worst.case.item()}."
     )
 
 
-def _why_not_compared(result: SpinRuns) -> str:
-    if not result.parameters.measured:
+def _why_not_compared(runs: SpinRuns) -> str:
+    if not runs.parameters.measured:
         return "The machine file has no measured amplitudes."
-    if result.comparison is ComparedCases.NONE:
+    if runs.comparison is ComparedCases.NONE:
         return (
             "There is no comparison with the measured amplitudes of the machine file, because its "
             "numbers were changed."
         )
-    if not any(result.is_compared(case) for case in result.results):
+    if not any(runs.is_compared(case) for case in runs.results):
         return (
             "There is no comparison with the measured amplitudes of the machine file, because they "
             "belong to other loads or to another spin profile."
@@ -308,62 +343,169 @@ def _why_not_compared(result: SpinRuns) -> str:
     return "The machine file has no measured amplitudes for these cases."
 
 
-def warnings_of(result: SpinRuns) -> list[str]:
-    """Return warnings about unusual numbers, divergence, overlaps, and springs that go slack."""
-    warnings = [
-        f"{problem.key}: {problem.message}." for problem in unusual_numbers(result.parameters)
-    ]
-    for case in result.results:
-        gap, title = case.measures.smallest_gap, case.title
-        if case.record.attrs["diverged"]:
-            warnings.append(
-                f"Load {title}: {case.record.attrs['diverged']}. The results below cover the time "
-                "before that."
-            )
-        if gap is not None and gap.distance <= 0.0:
-            warnings.append(
-                f"Load {title}: {gap.parts} overlap by {number(-MM_PER_M * gap.distance)} mm. The "
-                "model has no contact forces. In the real machine these parts would collide, and "
-                "the motion after that is not valid."
-            )
-    return (
-        warnings + slack_springs_warning(result) + floor_warnings(result) + capture_warnings(result)
-    )
-
-
-def slack_springs_warning(result: SpinRuns) -> list[str]:
-    """Return a warning of the springs that go slack, or none."""
-    return slack_warning(
-        {c.title: slack_springs(c.measures.smallest_tension) for c in result.results}, "load"
-    )
-
-
-def facts_of_run(result: SpinRuns, made: Facts) -> list[tuple[str, str]]:
-    """Return what was run and with which software, as pairs of heading and text."""
-    attrs = result.results[0].record.attrs
-    times = [f"{case.title} {number(case.wall_s)} s" for case in result.results]
+def warnings_of(runs: SpinRuns) -> list[str]:
+    """Return warnings about unusual numbers, runs that diverged, gaps, springs, feet and drive."""
+    unusual = unusual_numbers(runs.parameters)
     return [
-        ("Machine", result.parameters.name),
-        ("SDF model", Path(result.parameters.model).name),
-        ("Engine", f"{result.engine}, {result.stepping_text}"),
-        ("Versions", versions_of(attrs)),
-        ("Computing time", "; ".join(times)),
-        *replace(made, step=0.0).rows(),  # the line of the engine has the step
+        *(f"{problem.key}: {problem.message}." for problem in unusual),
+        *(f"Load {text}. The results cover the time before that." for text in runs.failures()),
+        *overlap_warnings(runs),
+        *slack_warning(
+            {c.title: slack_springs(c.measures.smallest_tension) for c in runs.results}, "load"
+        ),
+        *floor_warnings(runs),
+        *capture_warnings(runs),
     ]
+
+
+def overlap_warnings(runs: SpinRuns) -> list[str]:
+    """Return a warning for each load with which tub and housing overlap."""
+    gaps = [(case.title, case.measures.smallest_gap) for case in runs.results]
+    return [
+        f"Load {title}: {gap.parts} overlap by {GAP.text(-gap.distance)}. The model has no contact "
+        "forces. In the real machine these parts would collide, and the motion after that is not "
+        "valid."
+        for title, gap in gaps
+        if gap is not None and gap.distance <= 0.0
+    ]
+
+
+def amplitude_tables(runs: SpinRuns, amplitudes: xr.Dataset) -> list[LabelledTable]:
+    """Return the amplitudes, and their differences from measured ones if there are any.
+
+    Args:
+        amplitudes: As of `amplitudes_of`.
+    """
+    notes = measured_notes(runs.parameters) if any(map(runs.is_compared, runs.results)) else []
+    caption = (
+        "Amplitude of the displacement at each sensor: the largest absolute value of its envelopes "
+        f"in the band {band_text(*runs.results)}."
+    )
+    tables = [
+        LabelledTable(
+            "amplitudes",
+            amplitudes,
+            f"Displacement amplitudes of machine '{runs.parameters.name}'",
+            " ".join([caption, *notes]),
+            across="sensor",
+            is_in_terminal=True,
+        )
+    ]
+    differences = differences_of(amplitudes)
+    if differences.sizes["row"]:
+        about = "Differences from the experiment: (value − experiment) / experiment, [B] Eq. (1)."
+        is_ours = ("row", differences.source.values == OURS)
+        tables.append(
+            LabelledTable(
+                "differences",
+                differences.assign(is_ours=is_ours),
+                "Differences from the experiment",
+                about,
+                across="sensor",
+                marked=("is_ours", "difference"),
+            )
+        )
+    return tables
+
+
+def sensors_table(runs: SpinRuns) -> LabelledTable:
+    """Return amplitude, critical speed and acceleration of each sensor."""
+    return LabelledTable(
+        "sensors",
+        of_sensors(runs),
+        "Sensors",
+        "Amplitude of each sensor; critical speed: the drum speed at which its displacement is "
+        "largest; acceleration of the tub along its axis: largest absolute value and RMS over the "
+        "whole run, without gravity and unfiltered.",
+    )
+
+
+def gaps_table(gaps: xr.Dataset) -> LabelledTable:
+    """Return the smallest gap of each case: its width, the two parts, the time and the place."""
+    return LabelledTable(
+        "gaps",
+        gaps,
+        "Smallest gap",
+        "Smallest gap between the housing and the parts that move with the tub, over all samples. "
+        "A negative gap means that the parts overlap. x (to the right), y (to the rear), z (up): "
+        "position of the nearest point of the moving part, from drum mid-depth at rest.",
+        marked=("touches", "alarm"),
+        is_in_terminal=True,
+    )
+
+
+def largest_table(runs: SpinRuns) -> LabelledTable:
+    """Return D, F and M of [B] for each case and axis."""
+    names = {
+        "detergent_displacement": DISPLACEMENT.named("D"),
+        "gasket_force": FORCE.named("F"),
+        "gasket_moment": MOMENT_OF_GASKET.named("M"),
+    }
+    data = runs.measures[[*names]]
+    for name, quantity in names.items():
+        data[name].attrs = quantity.attributes()
+    parameters = runs.parameters
+    assumed = f" (assumption: frame {parameters.clearance_frame}, as the first sensor)"
+    return LabelledTable(
+        "largest",
+        data,
+        "Detergent box and gasket",
+        "D: largest displacement, from the rest position, of the tub point nearest to the "
+        f"detergent box{'' if parameters.clearance else assumed}. F, M: largest force and moment "
+        "of the gasket on the housing. All are the largest absolute values over the whole run, "
+        "for each axis.",
+    )
+
+
+def _mounts_table(runs: SpinRuns) -> LabelledTable:
+    return LabelledTable(
+        "mounts",
+        mounts_of(runs),
+        "Forces of the mounts",
+        "Size of the force of each mount on the cabinet: at rest, largest with its drum speed, and "
+        "RMS without the mean in ranges of drum speed or in the regions of the profile.",
+        across="range",
+    )
+
+
+def _more_tables(runs: SpinRuns) -> list[LabelledTable]:
+    """Return a table of each variable that has no other place on the page."""
+    return [
+        LabelledTable(
+            variable.name,
+            runs.measures[[variable.name]],
+            variable.kind.capitalize(),
+            f"{variable.about[0].upper()}{variable.about[1:]}.",
+            across=variable.dims[-1] if variable.dims else "",
+            is_in_terminal=True,
+        )
+        for variable in tabulated()
+    ]
+
+
+def changed_parameters(runs: SpinRuns) -> xr.Dataset:
+    """Return the parameters of cases that differ from those of the machine, as text."""
+    common = {key: value for key, value, _ in quantities(runs.parameters)}
+    rows = [
+        (label, key, readable(value, unit))
+        for label, case in zip(runs.labels, runs.results, strict=True)
+        for key, value, unit in quantities(case.case.parameters or runs.parameters)
+        if case.case.parameters is not None and common.get(key) != value
+    ]
+    labels = {"load": [load for load, *_ in rows], "key": [key for _, key, _ in rows]}
+    return rows_of(labels, value=("row", [text for *_, text in rows]))
 
 
 def _has_envelopes(case: CaseResult) -> bool:
     return not bool(case.measures.amplitude.isnull().any())
 
 
-def _envelopes_picture(case: CaseResult, table: pd.DataFrame) -> Picture | None:
+def _envelopes_plot(case: CaseResult, amplitudes: xr.Dataset) -> Plot | None:
     if not _has_envelopes(case):
         return None
-    measured = tables.experiment_mm(table, case)
-    amplitude = case.measures.amplitude
+    measured, of_case = experiment_of(amplitudes, case), case.measures.amplitude
     largest = ", ".join(
-        f"{name} {number(MM_PER_M * float(amplitude.sel(sensor=name)))} mm"
-        for name in amplitude.sensor.values
+        f"{name} {DISPLACEMENT.text(of_case.sel(sensor=name))}" for name in of_case.sensor.values
     )
     caption = (
         f"Displacement at each sensor over time, in the band {band_text(case)}. The shaded area "
@@ -373,10 +515,10 @@ def _envelopes_picture(case: CaseResult, table: pd.DataFrame) -> Picture | None:
     if measured is not None:
         caption += " Dashed lines: measured amplitude, on both sides of zero."
     alternative = f"Envelopes of the displacement over time, load {case.title}. Largest: {largest}."
-    return picture(figures.envelopes_figure(case.record, measured), alternative, caption)
+    return Plot(figures.envelopes_figure(case.record, measured), alternative, caption)
 
 
-def _orbits_picture(case: CaseResult) -> Picture | None:
+def _orbits_plot(case: CaseResult) -> Plot | None:
     if case.record.sizes["time"] < 2:
         return None
     depths = case.record.sensor_point.sel(axis="y")
@@ -390,193 +532,32 @@ def _orbits_picture(case: CaseResult) -> Picture | None:
     )
     orbits = "Orbit of the drum axis" if is_one else "Orbits of the drum axis, front and rear"
     alternative = f"{orbits}, around the largest amplitude, load {case.title}."
-    return picture(figures.orbits_figure(case.record, *ends), alternative, caption)
+    return Plot(figures.orbits_figure(case.record, *ends), alternative, caption)
 
 
-def _gasket_picture(case: CaseResult) -> Picture | None:
+def _gasket_plot(case: CaseResult) -> Plot | None:
     if not case.has_gasket or case.record.sizes["time"] < 2:
         return None
     force, moment = (
-        np.asarray(values) for values in (case.measures.gasket_force, case.measures.gasket_moment)
+        np.asarray(values).max()
+        for values in (case.measures.gasket_force, case.measures.gasket_moment)
     )
     caption = (
-        "Force (upper row, N) and moment (lower row, N m) of the gasket on the housing over time. "
+        "Force (upper row) and moment (lower row) of the gasket on the housing over time. "
         "The shaded area extends from the smallest to the largest value within each drum "
         "revolution. The dot marks the largest absolute value."
     )
     alternative = (
-        f"Gasket force and moment over time, load {case.title}. Largest force "
-        f"{number(float(force.max()))} N, largest moment {number(float(moment.max()), 2)} N m."
+        f"Gasket force and moment over time, load {case.title}. Largest force {FORCE.text(force)}, "
+        f"largest moment {MOMENT_OF_GASKET.text(moment)}."
     )
-    return picture(figures.gasket_figure(case.record), alternative, caption)
+    return Plot(figures.gasket_figure(case.record), alternative, caption)
 
 
-def _gaps_pictures(result: SpinRuns) -> tuple[Picture, ...]:
-    cases = [case for case in result.results if case.measures.smallest_gap]
-    if len(cases) < 2:
-        return ()
+def _gaps_plot(gaps: xr.Dataset) -> Plot:
     caption = (
         "Smallest gap for each load, the two parts between which it occurs, and the drum speed at "
         "that time."
     )
     words = "Smallest gap between tub and housing per load; the numbers are in the table below."
-    return (picture(figures.gaps_figure(cases), words, caption),)
-
-
-def drive_section(result: SpinRuns) -> Section:
-    """Return the section: measures, and speed and torque over time of each load with a motor."""
-    drive, pictures = motor_of(result.parameters.drive), tuple[Picture, ...]()
-    text = (
-        "The drum follows the spin profile exactly, whatever torque that takes. The option "
-        "--drive motor shows what a motor with a torque limit does."
-    )
-    if drive is not None:
-        n = drive.belt_ratio
-        text = (
-            "A motor with a torque limit and a PI speed controller turns the drum by a belt of "
-            f"ratio {n:g}. Torques are those at the drum; at the motor's shaft they are {n:g} "
-            "times smaller. None of the motor's numbers is published: see their sources in the "
-            "table of parameters."
-        )
-        shown = [case for case in result.results if case.record.sizes["time"] > 1]
-        pictures = tuple(_picture(result, case) for case in shown)
-    return Section("torques", "Drive", pictures, (drive_table(result),), text)
-
-
-def drive_in_short(result: SpinRuns) -> str:
-    """Return one sentence about the drive."""
-    if motor_of(result.parameters.drive) is None:
-        return "The drum follows the spin profile exactly; the motor torque has no limit."
-    return "A motor turns the drum; the spin profile is the speed that its controller wants."
-
-
-def capture_warnings(result: SpinRuns) -> list[str]:
-    """Return a warning for each case in which the drum is caught below the wanted speed."""
-    return [
-        f"Load {case.title}: caught at {number(RPM_PER_RAD_S * caught.speed, 0)} rpm "
-        f"from {number(caught.begin)} s to {number(caught.end)} s with a mean torque of "
-        f"{number(caught.torque, 2)} N m. The drive is too weak to pass (Sommerfeld effect), or to "
-        "lift the unbalance."
-        for case in result.results
-        if (caught := case.measures.drive.capture)
-    ]
-
-
-def drive_table(result: SpinRuns) -> Table:
-    """Return the measures of the drive for each load."""
-    groups = []
-    for case in result.results:
-        drive = case.measures.drive
-        caught = drive.capture
-        cells = (
-            number(drive.peak_torque),
-            number(drive.mean_torque, 2),
-            number(RPM_PER_RAD_S * drive.mean_torque_speed, 0),
-            number(drive.peak_power, 0),
-            number(drive.energy, 0),
-            number(100.0 * drive.speed_ripple),
-            f"{number(RPM_PER_RAD_S * caught.speed, 0)} rpm, {number(caught.torque, 2)} N\u00a0m"
-            if caught
-            else MISSING,
-        )
-        row = Row(cells, "alarm" if caught else "")
-        groups.append(Group(case.title, (row,)))
-    caption = (
-        "Torque of the motor on the drum: largest value, and largest average over a revolution "
-        "with its speed; largest power; work over the run. Ripple: largest difference between "
-        "highest and lowest speed in a revolution, in parts of the mean, from 60 rpm on. Caught: "
-        f"mean speed and torque of a drum that stays for {CAPTURE_TIME:g} s or longer more than "
-        f"{100.0 * CAPTURE_LAG:g} % below the wanted speed."
-    )
-    header = (
-        "load",
-        "largest torque, N\u00a0m",
-        "over a revolution, N\u00a0m",
-        "at, rpm",
-        "largest power, W",
-        "work, J",
-        "speed ripple, %",
-        "caught at",
-    )
-    return Table(caption, header, tuple(groups))
-
-
-def _picture(result: SpinRuns, case: CaseResult) -> Picture:
-    drive = case.measures.drive
-    caption = (
-        f"Load {case.title}. Upper panel: speed of the drum, and the wanted one (dashed). "
-        "Lower panel: torque of the motor on the drum, from the smallest to the largest in each "
-        "revolution, its average over a revolution (line), and the limit (dashed)."
-    )
-    alternative = (
-        f"Speed and torque over time, load {case.title}: up to {number(drive.peak_torque)} N m."
-    )
-    return picture(drive_figure(result, case), alternative, caption)
-
-
-def drive_figure(result: SpinRuns, case: CaseResult) -> fig.Figure:
-    """Return speed and torque of a drive with a motor over time."""
-    record, time = case.record, case.record.time.values
-    torque, speed = record.motor_torque.values, record.drum_speed.values
-    starts = revolution_starts(record)
-    target = RPM_PER_RAD_S * np.asarray(profile_of(record).speed_at(time))
-    above: list[fig.Mark] = [
-        fig.Line(time, RPM_PER_RAD_S * speed, width=1.4, key="speed of the drum"),
-        fig.Line(time, target, color=fig.MARK, width=1.4, dash="dashed", key="wanted"),
-    ]
-    if caught := case.measures.drive.capture:
-        above.insert(0, fig.Span(caught.begin, caught.end, color=fig.MEASURED, opacity=0.12))
-        x, y = 0.5 * (caught.begin + caught.end), RPM_PER_RAD_S * caught.speed
-        text = f"caught at {number(y, 0)} rpm"
-        above.append(fig.Text(x, y, text, color=fig.MEASURED, up="top", shift=(0.0, -8.0)))
-    low, high = (side.reduceat(torque, starts) for side in (np.minimum, np.maximum))
-    mean = over_revolutions(time, record.drum_angle.values, torque)
-    key = "torque, average over a revolution"
-    below: list[fig.Mark] = [
-        fig.band(time[starts], low, high, opacity=0.25),
-        fig.Line(time, mean, key=key),
-    ]
-    limit = _limit(result, speed[starts])
-    if np.abs(limit).min() < 4.0 * np.abs(torque).max():  # else it would hide the torque
-        below.append(fig.Line(time[starts], limit, color=fig.QUIET, dash="dashed", key="limit"))
-    x_axis = fig.Axis(label="time, s", range=(0.0, float(time[-1])))
-    labels = {"speed, rpm": above, "torque at the drum, N\u00a0m": below}
-    panels = [
-        fig.Panel(name=label.split(",")[0], marks=tuple(marks), x=x_axis, y=fig.Axis(label=label))
-        for label, marks in labels.items()
-    ]
-    return fig.Figure(panels=fig.in_grid(panels, 1, share="x"), height=200.0)
-
-
-def _limit(result: SpinRuns, speed: FloatArray) -> FloatArray:
-    """Return the torque limit at the drum at speeds of the drum (n,). [N m]"""
-    drive = motor_of(result.parameters.drive)
-    assert drive is not None
-    packed, of_motor, limit = packed_limit(drive), np.empty(2), np.empty(len(speed))
-    for index, rate in enumerate(drive.belt_ratio * speed):
-        evaluate_motor(np.array([0.0, rate]), packed, of_motor)
-        limit[index] = drive.belt_ratio * of_motor[1]
-    return limit
-
-
-def case_as_json(case: CaseResult) -> dict[str, Any]:
-    """Return the measures of a case as an object for JSON."""
-    measures = case.measures
-    tree = as_json(measures.table)
-    tree["cabinet_wrench"]["about"] = POINT
-    if not measures.has_cabinet:
-        tree["feet"] = None
-    walk = measures.walk
-    return {
-        "load": case.case.name,
-        "gasket": case.has_gasket,
-        **tree,
-        "walk": walk
-        and {
-            "distance_mm": Unit("m", "mm").from_si(walk.distance),
-            "turn_deg": Unit("rad", "deg").from_si(walk.turn),
-        },
-        "displacement_band_hz": list(band_of(case.record)),
-        "diverged": case.record.attrs["diverged"] or None,
-        "wall_s": case.wall_s,
-    }
+    return Plot(figures.gaps_figure(gaps), words, caption)

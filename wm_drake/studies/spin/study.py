@@ -1,34 +1,36 @@
 """Spin runs: cases with their records and measures, in one or several processes."""
 
+import multiprocessing
 import os
+import signal
 import time
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
 from wm_drake.batch.runs import Runner
 from wm_drake.batch.work_items import Preparation
 from wm_drake.engines.memory import RECORDS_OF_BATCH
-from wm_drake.errors import InputError
+from wm_drake.errors import InputError, WmDrakeError
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
 from wm_drake.model.scene import Scene
 from wm_drake.parameters import MachineParameters, Sensor
-from wm_drake.parameters.measured import measured_notes
-from wm_drake.report.formatting import MS_PER_S, RPM_PER_RAD_S, gap_size, number
+from wm_drake.parameters.units import Unit
+from wm_drake.report.quantity import SPEED, STEP, TIME, Quantity
 from wm_drake.simulation.cases import Case, is_as_measured, notice_jumping_friction
 from wm_drake.simulation.displacements import band_of, largest_motion
-from wm_drake.simulation.measures import Measures, measure
-from wm_drake.simulation.records import Record, sample_period, save_record
+from wm_drake.simulation.measures import MEASURES, Measures, measure
+from wm_drake.simulation.records import Record, sample_period
 from wm_drake.simulation.runs import DEFAULT_ENGINE, DivergenceWarning, simulate
 from wm_drake.simulation.steps import checked_integrator, checked_step
-from wm_drake.studies.spin.processes import can_start_processes, map_in_processes
 
 if TYPE_CHECKING:
     from wm_drake.studies.modes.study import NaturalModes
@@ -36,7 +38,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class CaseResult:
-    """Result of one case.
+    """Result of one case: its record, which has times of its own, and its measures.
 
     `wall_s` is the time for simulation and measures together; of runs side by side, a share. [s]
     """
@@ -62,23 +64,30 @@ class CaseResult:
         gap = self.measures.smallest_gap
         if gap is None:
             return ""
-        at = f"{number(self.speed_rpm(gap.time), 0)} rpm ({number(gap.time, 2)} s)"
+        at = f"{SPEED.text(self.speed_at(gap.time))} ({TIME.text(gap.time)})"
         return f"{gap_size(gap.distance)} between {gap.parts}, at {at}"
 
     @property
     def stepping_text(self) -> str:
         """Integrator and step that the run used, and the time between its samples."""
         how = self.record.attrs
-        step = f"{how['step_s'] * MS_PER_S:g} ms"
+        step = STEP.text(how["step_s"])
         words = f"steps of up to {step} with controlled error"
         if "integrator" in how:
             words = f"{how['integrator']}, steps of {step}"
-        return f"{words}, samples every {sample_period(self.record) * MS_PER_S:g} ms"
+        return f"{words}, samples every {STEP.text(sample_period(self.record))}"
 
-    def speed_rpm(self, time: float) -> float:
-        """Return the drum speed at a time. [rpm]"""
-        speed = np.interp(time, self.record.time.values, self.record.drum_speed.values)
-        return float(speed) * RPM_PER_RAD_S
+    def speed_at(self, time: float) -> float:
+        """Return the drum speed at a time. [rad/s]"""
+        return float(np.interp(time, self.record.time.values, self.record.drum_speed.values))
+
+
+GAP = Quantity("smallest gap", Unit("m", "mm"), 1)
+
+
+def gap_size(distance: float) -> str:
+    """Return a gap as text, and that the parts touch where it is not positive. [m]"""
+    return f"{GAP.text(distance)}{' (they touch)' if distance <= 0.0 else ''}"
 
 
 def band_text(*cases: CaseResult) -> str:
@@ -103,43 +112,37 @@ class ComparedCases(Enum):
 
 
 @dataclass(frozen=True)
-class Files:
-    """Which files and pictures of spin runs are written beside the usual ones.
-
-    Attributes:
-        replay: A 3D replay for each case.
-        detail: Pictures of vibration for every case, not only for the one with the largest
-            amplitude.
-        records: The record of each case.
-        part: Part of the names of files that tells machines apart; "" for a single machine.
-    """
-
-    replay: bool = False
-    detail: bool = False
-    records: bool = True
-    part: str = ""
-
-
-@dataclass(frozen=True)
 class SpinRuns:
-    """Results of all cases, in the order in which the cases were given.
+    """Runs of all cases, in the order in which the cases were given.
 
-    `modes` are the natural modes of the machine with the load of the first case; None if they were
-    not asked for, or if the machine has none.
+    They are no labelled dataset, as each record has times and motion of its own; `measures` is.
     """
 
     parameters: MachineParameters
     engine: str
     results: tuple[CaseResult, ...]
     comparison: ComparedCases = ComparedCases.AS_MEASURED
-    modes: "NaturalModes | None" = None
-    files: Files = Files()
 
     def is_compared(self, result: CaseResult) -> bool:
         """Return whether a case is compared with the measured amplitudes of the machine."""
         if self.comparison is not ComparedCases.AS_MEASURED:
             return self.comparison is ComparedCases.ALL
         return is_as_measured(self.parameters, result.case)
+
+    @property
+    def labels(self) -> list[str]:
+        """Name of the load of each case; with or without gasket too if a load occurs twice."""
+        names = [case.case.name for case in self.results]
+        if len(set(names)) == len(names):
+            return names
+        return [case.title for case in self.results]
+
+    @cached_property
+    def measures(self) -> xr.Dataset:
+        """Measures of all cases over `load`. [SI] Numbers of a gasket that is not there are NaN."""
+        tables = [_of_parts(case) for case in self.results]
+        loads = xr.Variable("load", self.labels)
+        return xr.concat(tables, loads, data_vars="all", coords="minimal", compat="override")
 
     @property
     def stepping_text(self) -> str:
@@ -150,33 +153,27 @@ class SpinRuns:
         """Return the displacement sensors of the machine that a case was run with."""
         return (case.case.parameters or self.parameters).sensors
 
-    def replay_of(self, case: CaseResult) -> str:
-        """Return the name of the file with the 3D replay of a case; "" if there is none."""
-        return f"replay_{self._name_of(case)}.html" if self.files.replay else ""
-
-    def _name_of(self, case: CaseResult) -> str:
-        return "_".join(filter(None, [self.files.part, case.case.name]))
-
-    def measured_notes(self) -> list[str]:
-        """Return what the measured amplitudes in the comparison are, by their files."""
-        compared = any(map(self.is_compared, self.results))
-        return measured_notes(self.parameters) if compared else []
-
-    def write_cases(self, folder: Path) -> None:
-        """Write the record of each case and its 3D replay where wanted."""
-        for case in self.results:
-            if self.files.records:
-                save_record(case.record, folder / f"record_{self._name_of(case)}.nc")
-            if file := self.replay_of(case):
-                (folder / file).write_text(case_replay(self.parameters, case), encoding="utf-8")
-
-    def failures(self) -> list[str]:
+    def failures(self) -> tuple[str, ...]:
         """Return a line for each case that diverged."""
-        return [
+        return tuple(
             f"{case.case.name}: {case.record.attrs['diverged']}"
             for case in self.results
             if case.record.attrs["diverged"]
-        ]
+        )
+
+
+def _of_parts(case: CaseResult) -> xr.Dataset:
+    """Return the measures of a case; those of a gasket that was taken out are NaN."""
+    table = case.measures.table
+    if case.has_gasket:
+        return table
+    changed = {
+        name: table[name].where(table.mount != "gasket")
+        for name in MEASURES["mounts"].names
+        if name in table
+    }
+    gasket = [name for name in table if str(name).startswith("gasket_")]
+    return table.assign(changed | {name: np.nan * table[name] for name in gasket})
 
 
 @dataclass(frozen=True)
@@ -198,7 +195,6 @@ def run_spin(
     progress: Callable[[int, float], None] = lambda index, fraction: None,
     workers: int | None = None,
     comparison: ComparedCases = ComparedCases.AS_MEASURED,
-    modes: bool = False,
 ) -> SpinRuns:
     """Run cases and return their records and measures.
 
@@ -209,12 +205,12 @@ def run_spin(
         cases: Cases to run.
         engine: Name of the engine, key of `wm_drake.simulation.runs.ENGINES`.
         step: Step size; None for that of the machine. [s]
-        progress: Called with the index of a case and the fraction of it that is done.
+        progress: Called with the index of a case and the fraction of it that is done; for cases in
+            processes, when a case has ended.
         workers: Number of processes for an engine that needs processes; None for the number of
             cores. A single case always runs in this process, and all cases do in a daemon process,
             which cannot start others.
         comparison: Which cases are compared with the measured amplitudes of the machine.
-        modes: Whether to compute the natural modes with the load of the first case.
 
     Raises:
         InputError: a case or an argument is wrong.
@@ -233,19 +229,18 @@ def run_spin(
     work_items = [_WorkItem(parameters, case, engine, step) for case in cases]
     if engine == DEFAULT_ENGINE:
         results = _run_side_by_side(built, cases, step, progress)
-    elif count > 1 and can_start_processes():  # Python systems of Drake block other threads
-        results = map_in_processes(_build_and_run, work_items, count, progress)
+    elif count > 1 and not multiprocessing.current_process().daemon:  # such one may start no other
+        results = _run_in_processes(work_items, count, progress)
     else:
         scene = Scene(parameters)
         results = [
             _run(item, built, scene, partial(progress, index))
             for index, item in enumerate(work_items)
         ]
-    natural = _modes_of(built, cases[0]) if modes else None
-    return SpinRuns(parameters, engine, tuple(results), comparison, natural)
+    return SpinRuns(parameters, engine, tuple(results), comparison)
 
 
-def _modes_of(machine: Machine, case: Case) -> "NaturalModes | None":
+def natural_modes_of(machine: Machine, case: Case) -> "NaturalModes | None":
     """Return the natural modes of a machine with the load of a case; None if it has none."""
     from wm_drake.studies.modes.study import three_linearisations
 
@@ -256,6 +251,35 @@ def _modes_of(machine: Machine, case: Case) -> "NaturalModes | None":
     except InputError:  # its cabinet moves, or the compiled engine does not represent it
         return None
     return replace(natural, load=case.name)
+
+
+def _run_in_processes(
+    items: Sequence[_WorkItem], count: int, progress: Callable[[int, float], None]
+) -> list[CaseResult]:
+    """Return the results of runs in new processes: systems of Drake in Python block other threads.
+
+    Raises:
+        WmDrakeError: a process ended before its time, such as for lack of memory.
+    """
+    from concurrent.futures import ProcessPoolExecutor, as_completed  # slow to import
+    from concurrent.futures.process import BrokenProcessPool
+
+    # a fork of a process with threads or with Drake is not safe; Ctrl-C ends a worker at once
+    spawn, at_begin = multiprocessing.get_context("spawn"), (signal.SIGINT, signal.SIG_DFL)
+    pool = ProcessPoolExecutor(count, spawn, signal.signal, at_begin)
+    try:
+        futures = {pool.submit(_build_and_run, item): index for index, item in enumerate(items)}
+        for future in as_completed(futures):
+            future.result()
+            progress(futures[future], 1.0)
+        return [future.result() for future in futures]
+    except BrokenProcessPool:
+        raise WmDrakeError(
+            "a worker process ended before its result; a script that uses several workers needs "
+            '`if __name__ == "__main__":`'
+        ) from None
+    finally:
+        pool.shutdown(cancel_futures=True)
 
 
 def _run_side_by_side(
@@ -286,9 +310,10 @@ def _run_side_by_side(
     return [results[number] for number in range(len(cases))]
 
 
-def _build_and_run(item: _WorkItem, report: Callable[[float], None]) -> CaseResult:
+def _build_and_run(item: _WorkItem) -> CaseResult:
     """Return the result of a case in a process that has no built machine yet."""
-    return _run(item, build_machine(item.parameters), Scene(item.parameters), report)
+    machine, scene = build_machine(item.parameters), Scene(item.parameters)
+    return _run(item, machine, scene, lambda fraction: None)
 
 
 def _run(
@@ -302,8 +327,8 @@ def _run(
     return CaseResult(item.case, record, measures, time.perf_counter() - begin)
 
 
-def case_replay(parameters: MachineParameters, case: CaseResult) -> str:
-    """Return the page of the 3D replay of a case around its largest amplitude."""
+def write_replay(parameters: MachineParameters, case: CaseResult, path: Path) -> None:
+    """Write the page of the 3D replay of a case around its largest amplitude."""
     from wm_drake.model.replay import Motion, replay_page
 
     time, positions = largest_motion(case.record)
@@ -313,10 +338,11 @@ def case_replay(parameters: MachineParameters, case: CaseResult) -> str:
         cabinet = np.hstack([shown.cabinet_angle.values, shown.cabinet_position.values])
     gasket = case.has_gasket
     words = "" if gasket or parameters.gasket is None else ", without gasket"
-    return replay_page(
+    text = replay_page(
         parameters,
         Motion(time, positions, shown.drum_speed.values, cabinet),
         title=f"Machine {parameters.name}, load {case.case.name}{words}",
         load=case.case.load,
         gasket=gasket,
     )
+    path.write_text(text, encoding="utf-8")

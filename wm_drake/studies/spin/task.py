@@ -1,7 +1,7 @@
 """Task of the command `wm-drake spin`: one machine, or a comparison of several variants."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from wm_drake.errors import check_known, input_error, shortened
@@ -9,19 +9,12 @@ from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.runs import DEFAULT_ENGINE, ENGINES
+from wm_drake.studies.answer import Answer
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import selected_cases
-from wm_drake.studies.spin.comparison import (
-    MOST_VARIANTS,
-    Variant,
-    check_comparable,
-    difference_table,
-    effects,
-)
-from wm_drake.studies.spin.comparison_page import SpinComparisonResult
-from wm_drake.studies.spin.options import SpinOptions
-from wm_drake.studies.spin.page import SpinResult
-from wm_drake.studies.spin.study import ComparedCases, Files, run_spin
+from wm_drake.studies.spin.options import MOST_VARIANTS, SpinOptions
+from wm_drake.studies.spin.page import Files, spin_answer
+from wm_drake.studies.spin.study import ComparedCases, SpinRuns, natural_modes_of, run_spin
 from wm_drake.studies.study import Task
 
 LONGEST_FILE_PART = 60
@@ -48,7 +41,7 @@ class SpinTask(Task):
         self._check_variants(machines)
         parameters = [machine.parameters for machine in machines]
         loads = list(options.load) or (_common_loads(parameters) if len(machines) > 1 else [])
-        gaskets = (True, False) if options.compare_gasket else (not options.no_gasket,)
+        gaskets = (False, True) if options.compare_gasket else (not options.no_gasket,)
         self.planned = [
             _Planned(
                 self._name(machine.parameters, gasket),
@@ -75,6 +68,8 @@ class SpinTask(Task):
                 where="--machine",
             )
         if len(machines) > 1:
+            from wm_drake.studies.spin.comparison import check_comparable
+
             check_comparable([machine.parameters for machine in machines], "--machine")
         for machine in machines if options.compare_gasket else ():
             if machine.parameters.gasket is None:
@@ -89,7 +84,7 @@ class SpinTask(Task):
             return machine
         return words if len(self.options.machine) == 1 else f"{machine}, {words}"
 
-    def run(self, executor: Executor) -> SpinResult | SpinComparisonResult:
+    def run(self, executor: Executor) -> Answer:
         """Run all cases of all variants."""
         is_one, options = len(self.planned) == 1, self.options
         is_changed = options.sets or options.drive
@@ -100,31 +95,41 @@ class SpinTask(Task):
             for planned in self.planned
             for case in planned.cases
         ]
-        parts = [""] if is_one else file_parts([planned.name for planned in self.planned])
-        variants, finished = list[Variant](), 0
+        variants, finished = dict[str, SpinRuns](), 0
         with executor.fractions(names) as progress:
-            for planned, part in zip(self.planned, parts, strict=True):
+            for planned in self.planned:
 
                 def of_all(index: int, fraction: float, before: int = finished) -> None:
                     progress(before + index, fraction)
 
-                result = run_spin(
+                variants[planned.name] = run_spin(
                     planned.machine,
                     planned.cases,
                     self.engine,
                     progress=of_all,
                     comparison=comparison,
-                    modes=is_one,
                 )
                 if self.engine == DEFAULT_ENGINE:  # the other one controls its error
                     executor.verify(planned.machine, planned.cases)
-                files = Files(options.replay, options.detail, not options.no_records, part)
-                variants.append(Variant(planned.name, replace(result, files=files)))
                 finished += len(planned.cases)
-        if is_one:
-            return SpinResult(variants[0].result)
-        effect = effects(variants) if options.compare_gasket else None
-        return SpinComparisonResult(tuple(variants), difference_table(variants), effect)
+        return self._answer(variants)
+
+    def _answer(self, variants: Mapping[str, SpinRuns]) -> Answer:
+        """Return the answer of one machine, or of the comparison of several variants."""
+        options, names = self.options, list(variants)
+        files = Files(options.replay, options.detail, not options.no_records)
+        if len(variants) == 1:
+            planned, runs = self.planned[0], variants[names[0]]
+            modes = natural_modes_of(planned.machine, planned.cases[0])
+            return spin_answer(runs, modes, files)
+        from wm_drake.studies.spin.comparison import comparison_answer  # most runs have one machine
+
+        references = dict.fromkeys(names, names[0])
+        if options.compare_gasket:  # each machine without gasket, then with it
+            references = {name: names[place - place % 2] for place, name in enumerate(names)}
+        parts = zip(names, file_parts(names), strict=True)
+        of_variants = {name: replace(files, part=part) for name, part in parts}
+        return comparison_answer(variants, references, of_variants)
 
 
 def file_parts(names: Sequence[str]) -> list[str]:

@@ -7,14 +7,16 @@ import numpy as np
 import xarray as xr
 
 from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import Unit
 from wm_drake.report.figure import Axis, Cells, Figure, Line, Mark, Panel, Scale, Text, in_grid
-from wm_drake.report.formatting import MM_PER_M, number
-from wm_drake.report.page import Picture, picture
+from wm_drake.report.quantity import TIME, Quantity
 from wm_drake.simulation.mount_forces import MountForce, mount_forces
 from wm_drake.simulation.orders import PERIOD, REVOLUTIONS, WINDOW, frequency_map, order_map
 from wm_drake.simulation.records import Record
 from wm_drake.simulation.vibration import sensor_accelerations
+from wm_drake.studies.answer import Plot
 from wm_drake.studies.spin import figures
+from wm_drake.studies.spin.data import ACCELERATION, DISPLACEMENT, FORCE
 from wm_drake.studies.spin.study import CaseResult, SpinRuns
 
 DECADES = 3.0
@@ -23,25 +25,27 @@ DECADES = 3.0
 ORDERS_SHOWN = (1, 2, 3)
 """Orders that are drawn as lines in a map of frequencies."""
 
-LOWEST_LIMIT_HZ = 8.0
+LOWEST_LIMIT = 8.0
 """Smallest upper end of the frequencies that are shown. [Hz]"""
 
+FREQUENCY, ORDER = Quantity("frequency", Unit("Hz", "Hz")), Quantity("order")
 
 ON_MAP = "#fefefe"
 """Colour of lines and texts on a map, in light and in dark."""
 
 
-def vibration_pictures(result: SpinRuns, case: CaseResult) -> list[Picture | None]:
-    """Return mount forces, accelerations and spectra of a case; None where there is nothing."""
-    accelerations = sensor_accelerations(case.record, result.sensors_of(case))
-    return [
-        _mounts_picture(case),
-        _accelerations_picture(case, accelerations),
-        _spectra_picture(case, accelerations),
-    ]
+def vibration_plots(runs: SpinRuns, case: CaseResult) -> list[Plot]:
+    """Return mount forces, accelerations and spectra of a case, as far as it has them."""
+    accelerations = sensor_accelerations(case.record, runs.sensors_of(case))
+    plots = (
+        _mounts_plot(case),
+        _accelerations_plot(case, accelerations),
+        _spectra_plot(case, accelerations),
+    )
+    return [plot for plot in plots if plot]
 
 
-def _mounts_picture(case: CaseResult) -> Picture | None:
+def _mounts_plot(case: CaseResult) -> Plot | None:
     # rings of balls act on the drum, not on the cabinet
     forces = [f for f in mount_forces(case.record) if f.name != "gasket" and f.peak > 0.0]
     if not forces:
@@ -54,12 +58,12 @@ def _mounts_picture(case: CaseResult) -> Picture | None:
     largest = max(forces, key=lambda force: force.peak)
     alternative = (
         f"Mount forces over time, load {case.title}. Largest: {largest.name} "
-        f"{number(largest.peak)} N."
+        f"{FORCE.text(largest.peak)}."
     )
-    return picture(mounts_figure(case.record, forces), alternative, caption)
+    return Plot(mounts_figure(case.record, forces), alternative, caption)
 
 
-def _accelerations_picture(case: CaseResult, accelerations: xr.DataArray) -> Picture | None:
+def _accelerations_plot(case: CaseResult, accelerations: xr.DataArray) -> Plot:
     caption = (
         "Acceleration of the tub at each sensor, along its axis, over time; without gravity and "
         "unfiltered. The shaded area extends from the smallest to the largest value within each "
@@ -67,18 +71,20 @@ def _accelerations_picture(case: CaseResult, accelerations: xr.DataArray) -> Pic
     )
     alternative = (
         f"Accelerations at the sensors over time, load {case.title}. Largest: "
-        f"{number(float(abs(accelerations).max()))} m/s²."
+        f"{ACCELERATION.text(abs(accelerations).max())}."
     )
-    return picture(accelerations_figure(case.record, accelerations), alternative, caption)
+    return Plot(accelerations_figure(case.record, accelerations), alternative, caption)
 
 
-def _spectra_picture(case: CaseResult, accelerations: xr.DataArray) -> Picture | None:
+def _spectra_plot(case: CaseResult, accelerations: xr.DataArray) -> Plot | None:
     amplitude = case.measures.amplitude.fillna(0.0)
     sensor = str(amplitude.sensor.values[int(np.argmax(amplitude.values))])
-    displacement = MM_PER_M * case.record.displacement.sel(sensor=sensor).values
     signals = [
-        (f"{sensor} displacement", "mm", displacement),
-        (f"{sensor} acceleration", "m/s²", accelerations.sel(sensor=sensor).values),
+        (quantity.named(f"{sensor} {quantity.words}"), of_sensors.sel(sensor=sensor).values)
+        for quantity, of_sensors in (
+            (DISPLACEMENT, case.record.displacement),
+            (ACCELERATION, accelerations),
+        )
     ]
     figure = spectra_figure(case.record, signals)
     if figure is None:
@@ -95,37 +101,37 @@ def _spectra_picture(case: CaseResult, accelerations: xr.DataArray) -> Picture |
         f"Spectrum, frequency map and order map of displacement and acceleration at sensor "
         f"{sensor}, load {case.title}."
     )
-    return picture(figure, alternative, caption)
+    return Plot(figure, alternative, caption)
 
 
-def spectra_figure(record: Record, signals: Sequence[tuple[str, str, FloatArray]]) -> Figure | None:
+def spectra_figure(record: Record, signals: Sequence[tuple[Quantity, FloatArray]]) -> Figure | None:
     """Return spectrum, frequency map and order map of signals, one row per signal.
 
     The spectrum is the largest amplitude at each frequency over all windows of the map.
 
     Args:
-        signals: Name, unit and values (n,) of each.
+        signals: Quantity and values (n,) of each. [SI]
 
     Returns:
         The figure; None if the record is too short for the windows of the maps.
     """
     time, angle = record.time.values, record.drum_angle.values
-    columns = np.column_stack([values for _, _, values in signals])
+    columns = np.column_stack([quantity.values(values) for quantity, values in signals])
     by_frequency, by_order = frequency_map(columns, time), order_map(columns, angle, time)
     if not by_frequency.sizes["time"] or not by_order.sizes["time"]:
         return None
     fastest = float(np.abs(record.drum_speed.values).max()) / (2.0 * np.pi)
-    highest = max(LOWEST_LIMIT_HZ, (ORDERS_SHOWN[-1] + 0.5) * fastest)  # a little above the third
+    highest = max(LOWEST_LIMIT, (ORDERS_SHOWN[-1] + 0.5) * fastest)  # a little above the third
     panels = []
-    for row, (name, unit, _) in enumerate(signals):
+    for row, (quantity, _) in enumerate(signals):
         frequencies, orders = by_frequency.isel(signal=row), by_order.isel(signal=row)
         largest = float(np.nanmax([frequencies.max(), orders.max()])) or 1.0
-        low, label = largest * 10.0**-DECADES, f"amplitude, {unit}"
+        low, label = largest * 10.0**-DECADES, quantity.named("amplitude").label
         scale = Scale(low=low, high=largest, kind="log", label=label)
         panels += [
-            _spectrum(frequencies, highest, scale, f"{name}, {unit}"),
-            _map(record, frequencies, "frequency", replace(scale, label=""), highest),
-            _map(record, orders, "order", scale),
+            _spectrum(frequencies, highest, scale, quantity.label),
+            _map(record, frequencies, FREQUENCY, replace(scale, label=""), highest),
+            _map(record, orders, ORDER, scale),
         ]
     placed = in_grid(panels, 3)
     placed = tuple(_in_rows(panel, len(signals)) for panel in placed)
@@ -143,36 +149,34 @@ def _in_rows(panel: Panel, rows: int) -> Panel:
 def _spectrum(frequencies: xr.DataArray, highest: float, scale: Scale, label: str) -> Panel:
     largest = frequencies.max("time")
     line = Line(largest.frequency.values, largest.values)
-    x = Axis(label="frequency, Hz", range=(0.0, highest))
+    x = Axis(label=FREQUENCY.label, range=(0.0, highest))
     y = Axis(label=label, range=(scale.low, 1.5 * scale.high), is_log=True)
     return Panel(name=label, marks=(line,), x=x, y=y)
 
 
 def _map(
-    record: Record, values: xr.DataArray, dimension: str, scale: Scale, highest: float = 0.0
+    record: Record, values: xr.DataArray, along: Quantity, scale: Scale, highest: float = 0.0
 ) -> Panel:
     """Return amplitudes over time and frequency or order as cells, one column per window.
 
     Args:
-        values: Amplitudes (time, dimension).
+        values: Amplitudes over time and the dimension of the words of `along`.
         highest: Upper end of the frequencies; 0 for the largest order. [Hz]
     """
     times = np.arange(float(values.time[0]), float(values.time[-1]) + 0.5 * PERIOD, PERIOD)
     # a time without a window stays empty
     even = values.reindex(time=times, method="nearest", tolerance=0.5 * PERIOD)
-    up = values[dimension].values
+    up = values[along.words].values
     shown = up <= (highest or up[-1]) + (up[1] - up[0])
-    cells = even.transpose(dimension, "time").values[shown]
+    cells = even.transpose(along.words, "time").values[shown]
     marks: list[Mark] = [Cells(cells, times, up[shown], scale=scale)]
     top = highest or float(up[-1] + 0.5 * (up[1] - up[0]))
     if highest:
         marks += _order_lines(record, top)
     return Panel(
         marks=tuple(marks),
-        x=Axis(label="time, s", range=(0.0, float(record.time[-1])), has_grid=False),
-        y=Axis(
-            label=f"{dimension}, Hz" if highest else dimension, range=(0.0, top), has_grid=False
-        ),
+        x=Axis(label=TIME.label, range=(0.0, float(record.time[-1])), has_grid=False),
+        y=Axis(label=along.label, range=(0.0, top), has_grid=False),
         top=figures.speed_axis(record),
     )
 
@@ -197,15 +201,12 @@ def accelerations_figure(record: Record, values: xr.DataArray) -> Figure:
 
     A band shows the smallest to the largest value in each drum revolution.
     """
-    limits = figures.symmetric_limits(float(abs(values).max()))
+    limits = figures.symmetric_limits(float(ACCELERATION.values(abs(values).max())))
     panels = []
     for name in map(str, values.sensor.values):
         signal = values.sel(sensor=name).values
-        shown = figures.time_band(
-            figures.revolution_band(record, signal), limits[1], figures.IN_REVOLUTIONS
-        )
-        marks = [shown, *figures.largest_marks(record, signal, "m/s²")]
-        panels.append(figures.time_panel(record, name, marks, "acceleration, m/s²", limits))
+        marks = figures.revolution_marks(record, signal, ACCELERATION, limits[1])
+        panels.append(figures.time_panel(record, name, marks, ACCELERATION.label, limits))
     return figures.time_figure(panels)
 
 
@@ -222,12 +223,9 @@ def mounts_figure(record: Record, forces: Sequence[MountForce]) -> Figure:
         span = (high - low) or 1.0
         limits = low - 0.08 * span, high + 0.28 * span
         for force, signal in zip(of_row, signals, strict=True):
-            shown = figures.time_band(
-                figures.revolution_band(record, signal), limits[1], figures.IN_REVOLUTIONS
-            )
-            marks = [shown, *figures.largest_marks(record, signal, "N")]
+            marks = figures.revolution_marks(record, signal, FORCE, limits[1])
             name = force.name.replace("_", " ")
-            panels.append(figures.time_panel(record, name, marks, "force, N", limits))
+            panels.append(figures.time_panel(record, name, marks, FORCE.label, limits))
         panels += [None] * (figures.COLUMNS - len(of_row))
     return figures.time_figure(panels)
 

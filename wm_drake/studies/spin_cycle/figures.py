@@ -7,9 +7,9 @@ import numpy as np
 import xarray as xr
 
 from wm_drake.parameters import SpinProfile
-from wm_drake.parameters.types import FloatArray
 from wm_drake.report import figure as fig
-from wm_drake.report.formatting import MM_PER_M, RPM_PER_RAD_S, number
+from wm_drake.report.formatting import number
+from wm_drake.report.quantity import SPEED, TIME, quantity_of, shown
 
 WHITE_TEXT_FROM = 0.55
 """Fraction of the colour scale above which text on a cell is white."""
@@ -17,33 +17,32 @@ WHITE_TEXT_FROM = 0.55
 
 def profile_figure(profile: SpinProfile) -> fig.Figure:
     """Return the drum speed over time, with shaded and named regions."""
-    top = RPM_PER_RAD_S * profile.highest_speed
+    speeds = SPEED.values(profile.speed)
+    top = float(np.abs(speeds).max())
     marks: list[fig.Mark] = []
     for index, region in enumerate(profile.regions):
         marks.append(fig.Span(region.begin, region.end, opacity=0.16 if index % 2 else 0.07))
         marks.append(fig.Text(0.5 * (region.begin + region.end), 1.09 * top, region.name))
-    marks.append(fig.Line(profile.time, RPM_PER_RAD_S * np.array(profile.speed), width=2.4))
-    x = fig.Axis(label="time, s", range=(0.0, profile.duration))
-    y = fig.Axis(label="drum speed, rpm", range=(0.0, 1.18 * top))
+    marks.append(fig.Line(profile.time, speeds, width=2.4))
+    x = fig.Axis(label=TIME.label, range=(0.0, profile.duration))
+    y = fig.Axis(label=SPEED.label, range=(0.0, 1.18 * top))
     return fig.Figure(panels=(fig.Panel(marks=tuple(marks), x=x, y=y),), height=190.0)
 
 
-def heat_map_figure(
-    values: FloatArray, rows: Sequence[str], columns: Sequence[str], notes: Sequence[Sequence[str]]
-) -> fig.Figure:
-    """Return a table of numbers on coloured cells, with one colour scale.
+def heat_map_figure(values: xr.DataArray, notes: Sequence[Sequence[str]]) -> fig.Figure:
+    """Return numbers on coloured cells, with one colour scale.
 
     Args:
-        values: (rows, columns) RMS displacement. [m]
-        rows, columns: Names of the rows and columns.
+        values: Two-dimensional, with labels of rows and columns.
         notes: (rows, columns) small text below each number, or "".
     """
-    shown = MM_PER_M * values
-    top = float(np.nanmax(shown)) or 1.0
-    scale = fig.Scale(low=0.0, high=top, shades="Blues", label="RMS displacement, mm")
-    marks: list[fig.Mark] = [fig.Cells(shown, range(len(columns)), range(len(rows)), scale=scale)]
-    for row, column in np.ndindex(*shown.shape):
-        value = float(shown[row, column])
+    cells, quantity = shown(values), quantity_of(values)
+    rows, columns = (list(map(str, values[dim].values)) for dim in values.dims)
+    top = float(np.nanmax(cells)) or 1.0
+    scale = fig.Scale(low=0.0, high=top, shades="Blues", label=quantity.label)
+    marks: list[fig.Mark] = [fig.Cells(cells, range(len(columns)), range(len(rows)), scale=scale)]
+    for row, column in np.ndindex(*cells.shape):
+        value = float(cells[row, column])
         ink = "#ffffff" if value > WHITE_TEXT_FROM * top else fig.MARK
         note = notes[row][column]
         up = 0.14 if note else 0.0
@@ -57,10 +56,7 @@ def heat_map_figure(
 
 
 def bars_figure(
-    computed: xr.DataArray,
-    integrated: xr.DataArray | None,
-    measured: xr.DataArray | None,
-    name: str = "measured",
+    computed: xr.DataArray, integrated: xr.DataArray | None, measured: xr.DataArray | None
 ) -> fig.Figure:
     """Return the RMS displacement per region, as [A] Figs. 24 to 26.
 
@@ -74,30 +70,31 @@ def bars_figure(
     places, width = np.arange(len(regions)), 0.72 if measured is None else 0.36
     shift = 0.0 if measured is None else 0.5 * width
     key = "wm_drake" if integrated is None else "wm_drake, displacement"
-    shown = [values for values in (computed, integrated, measured) if values is not None]
-    top = 1.3 * MM_PER_M * max(float(values.max()) for values in shown)  # room for the names
+    drawn = [values for values in (computed, integrated, measured) if values is not None]
+    top = 1.3 * max(float(shown(values.max(keep_attrs=True))) for values in drawn)  # for names
     x = fig.Axis(ticks=fig.named(regions), range=(-0.6, len(regions) - 0.4), has_grid=False)
-    y = fig.Axis(label="RMS, mm", range=(0.0, top or 1.0))
+    y = fig.Axis(label=quantity_of(computed).named("RMS").label, range=(0.0, top or 1.0))
     panels = []
     for sensor in sensors:
         for direction in directions:
             here = {"accelerometer": sensor, "axis": direction}
             marks: list[fig.Mark] = []
             if measured is not None:
-                sizes = MM_PER_M * measured.sel(here).values
+                sizes = shown(measured.sel(here))
+                at = places - shift
                 marks.append(
-                    fig.Bars(places - shift, sizes, thickness=width, color=fig.MEASURED, key=name)
+                    fig.Bars(at, sizes, thickness=width, color=fig.MEASURED, key="measured")
                 )
-            sizes = MM_PER_M * computed.sel(here).values
+            sizes = shown(computed.sel(here))
             marks.append(fig.Bars(places + shift, sizes, thickness=width, color=fig.OURS, key=key))
             if integrated is not None:
-                ends = MM_PER_M * integrated.sel(here).values
+                ends = shown(integrated.sel(here))
                 points = fig.Points(
                     places + shift, ends, symbol="line-ew", color=fig.MARK, size=14.0
                 )
                 marks.append(replace(points, key="wm_drake, from acceleration"))
             title = f"{sensor} {direction}"
-            at = fig.Text(0.02, 0.96, title, size=fig.TITLE, is_bold=True, in_data=(False, False))
-            marks.append(replace(at, across="left", up="top"))
+            text = fig.Text(0.02, 0.96, title, size=fig.TITLE, is_bold=True, in_data=(False, False))
+            marks.append(replace(text, across="left", up="top"))
             panels.append(fig.Panel(name=title, marks=tuple(marks), x=x, y=y))
     return fig.Figure(panels=fig.in_grid(panels, len(directions), share="both"), height=140.0)

@@ -14,25 +14,23 @@ from wm_drake.parameters.recorded import ACCELERATION, ChannelNames, ChannelUse,
 from wm_drake.parameters.recorded.clock import UNEVEN
 from wm_drake.parameters.recorded.formats import SUFFIXES
 from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import Unit
+from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.band import HIGH_PASS_HZ
 from wm_drake.simulation.vibration import high_passed, integrated_twice, region_rms
 
 DIMS = ("case", "region", "accelerometer", "axis")
 
-RMS_COLUMNS = ["case", "region", "sensor", "axis", "rms_mm"]
-"""Columns of a table of RMS displacements, as read by `read_rms` and returned by `rms_table`."""
+RMS = Quantity("RMS displacement", Unit("m", "mm"), 3)
+
+RMS_COLUMNS = ["case", "region", "sensor", "axis", f"rms{RMS.suffix}"]
+"""Columns of a file of RMS displacements, as read by `read_rms` and written by the study."""
 
 LEAST_ROWS = 32
 """Smallest number of samples that the high-pass filter and the removal of the mean need."""
 
 COARSEST = 0.05 / HIGH_PASS_HZ
 """Largest sampling interval: ten samples of the slowest motion that the filter passes. [s]"""
-
-
-def rms_table(displacement: xr.DataArray) -> pd.DataFrame:
-    """Return RMS displacements as a table with `RMS_COLUMNS`, one value per row. [mm]"""
-    table = (1e3 * displacement).rename("rms_mm").to_dataframe().reset_index()
-    return table.rename(columns={"accelerometer": "sensor"})[RMS_COLUMNS]
 
 
 def read_rms(path: Path, labels: Mapping[str, Sequence[str]]) -> xr.DataArray:
@@ -55,7 +53,7 @@ def read_rms(path: Path, labels: Mapping[str, Sequence[str]]) -> xr.DataArray:
     if names.duplicated().any():
         name = " ".join(names[names.duplicated()].iloc[0])
         raise input_error(f"{name} occurs twice; each value may occur once", where=str(path))
-    values = pd.to_numeric(table["rms_mm"], errors="coerce").to_numpy(dtype=float)
+    values = pd.to_numeric(table[RMS_COLUMNS[-1]], errors="coerce").to_numpy(dtype=float)
     if not (np.isfinite(values) & (values >= 0.0)).all():
         raise input_error("an RMS displacement is not a number of at least 0", where=str(path))
     measured = np.full([len(labels[dim]) for dim in DIMS], np.nan)
@@ -63,7 +61,7 @@ def read_rms(path: Path, labels: Mapping[str, Sequence[str]]) -> xr.DataArray:
         [labels[dim].index(name) for name in names[column]]
         for column, dim in zip(RMS_COLUMNS, DIMS, strict=False)
     ]
-    measured[tuple(places)] = 1e-3 * values
+    measured[tuple(places)] = RMS.to_si(values)
     return xr.DataArray(measured, labels, DIMS)
 
 

@@ -1,351 +1,451 @@
-"""What the study of a spin cycle shows: files, JSON, terminal and page."""
+"""Show the study of a spin cycle: displacements, cases, regions, forces on the floor, drive."""
 
-from dataclasses import dataclass
+import itertools
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import pandas as pd
+import xarray as xr
 
+from wm_drake.parameters import MachineParameters, SpinProfile
 from wm_drake.parameters.unbalance_cases import UnbalanceCase
-from wm_drake.report.formatting import (
-    MM_PER_M,
-    MS_PER_S,
-    gap_size,
-    listed,
-    number,
-    plain,
-    slack_warning,
-)
-from wm_drake.report.page import Picture, Section, SectionedPage, picture
-from wm_drake.report.terminal import Printed
-from wm_drake.simulation.measures.as_json import as_json
+from wm_drake.parameters.units import Share, Unit
+from wm_drake.report.formatting import MISSING, listed, slack_warning
+from wm_drake.report.labelled import LabelledTable
+from wm_drake.report.quantity import SPEED, STEP, TIME, Quantity, quantity_of, text_of
+from wm_drake.simulation.feet import MARGINS
+from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.spring_tension import slack_springs
-from wm_drake.studies.spin_cycle import tables
+from wm_drake.simulation.vibration import MOST_MISSING
+from wm_drake.studies.answer import Answer, Part, Plot, diverged_runs
+from wm_drake.studies.spin.drive import drive_data
+from wm_drake.studies.spin.study import gap_size
 from wm_drake.studies.spin_cycle.figures import bars_figure, heat_map_figure, profile_figure
-from wm_drake.studies.spin_cycle.measured import rms_table
+from wm_drake.studies.spin_cycle.measured import DIMS
 from wm_drake.studies.spin_cycle.study import (
-    SpinCycleRuns,
+    ERROR,
+    MASS,
+    PHASE,
     average_errors,
     disagreement,
     largest,
-    mean_and_deviation,
     missing_regions,
     region_errors,
 )
-from wm_drake.studies.study import Facts, Result
 
-SHOWN_MASSES = ((0.4, 0.0, 0.0), (0.0, 0.4, 0.0), (0.4, 0.4, 180.0))
-"""Front mass, rear mass and phase of the cases of [A] Figs. 24 to 26. [kg, kg, deg]"""
+SHOWN_MASSES = ((0.4, 0.0, 0.0), (0.0, 0.4, 0.0), (0.4, 0.4, np.pi))
+"""Front mass, rear mass and phase of the cases of [A] Figs. 24 to 26. [kg, kg, rad]"""
 
+MASSES = ["front", "rear", "phase"]
+"""Labels of the cases beside their names."""
 
-@dataclass(frozen=True)
-class SpinCycleResult(Result):
-    """Result of the study, and the engine of its runs."""
+LARGE_DISAGREEMENT = 0.01
+"""Relative error of integrated displacements from which on a page warns of it."""
 
-    result: SpinCycleRuns
-    engine: str
-
-    def tables(self) -> dict[str, pd.DataFrame]:
-        """Return RMS displacements, cases and, if measured, feet and drive."""
-        result, drive = self.result, tables.drive_frame(self.result)
-        shown = {"rms": rms_table(result.displacement), "cases": tables.case_frame(result)}
-        if "turn_margin" in result.forces:
-            shown["feet"] = tables.feet_frame(result)
-        return shown if drive is None else shown | {"drive": drive}
-
-    def write(self, folder: Path) -> None:
-        """Write the tables; that of the cases has four digits."""
-        super().write(folder)
-        table = tables.case_frame(self.result)
-        table.to_csv(folder / "cases.csv", index=False, float_format="%.4g")
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the result for JSON."""
-        result = self.result
-        shown = {
-            "machine": result.parameters.name,
-            "engine": self.engine,
-            "regions": [region.name for region in result.profile.regions],
-            "sensors": list(map(str, result.displacement.accelerometer.values)),
-            "axes": list(map(str, result.displacement.axis.values)),
-            "cases": [
-                _case_as_json(result, case, diverged)
-                for case, diverged in zip(result.cases, result.diverged, strict=True)
-            ],
-            "disagreement_of_integration": disagreement(result).max("case"),
-        }
-        if result.measured is not None:
-            errors = region_errors(result.displacement, result.measured)
-            mean, deviation = mean_and_deviation(errors)
-            shown["relative_error"] = {
-                "by_region_mean": mean,
-                "by_region_deviation": deviation,
-                "by_case_average": average_errors(result.displacement, result.measured),
-                "missing_regions": missing_regions(result.displacement, result.measured),
-            }
-        return plain(shown)
-
-    def terminal(self) -> Printed:
-        """Return the table of the cases."""
-        title = f"Spin cycle of machine '{self.result.parameters.name}'"
-        return [tables.cases(self.result).terminal(title)]
-
-    def warnings(self) -> list[str]:
-        """Return a warning of the regions that the errors leave out, if there are any."""
-        return _missing(self.result)
-
-    def failures(self) -> list[str]:
-        """Return a line for each case that diverged."""
-        pairs = zip(self.result.cases, self.result.diverged, strict=True)
-        return [f"case {case.name}: {text}" for case, text in pairs if text]
-
-    def page(self, facts: Facts) -> str:
-        """Return the page: profile, largest displacements, cases, floor and drive."""
-        result = self.result
-        shown = shown_cases(result)
-        titles = {case.name: f"Case {case.name}: {case_description(case)}" for case in shown}
-        bars = tuple(_bars(result, case, title) for case, title in titles.items())
-        numbers = tuple(tables.displacements(result, case, title) for case, title in titles.items())
-        worst = _worst_picture(result)
-        remark = "" if worst else "No run completed a region."
-        sections = [
-            Section("profile", "Spin profile", (_profile_picture(result),)),
-            Section("worst", "Largest displacements", worst, text=remark),
-            Section("each", "Displacements of each case", bars),
-            Section("cases", "Cases", tables=(tables.cases(result),)),
-            Section("regions", "Regions", tables=(tables.regions(result),)),
-        ]
-        for anchor, heading, table in (
-            ("floor", "Forces on the floor", tables.floor_table(result)),
-            ("drive", "Drive", tables.drive_table(result)),
-        ):
-            if table:
-                sections.append(Section(anchor, heading, tables=(table,)))
-        sections.append(Section("numbers", "Each case in numbers", tables=numbers))
-        return SectionedPage(
-            f"Spin cycle of machine {result.parameters.name}",
-            summary(result, self.engine),
-            sections,
-            _facts(result, self.engine, facts),
-            result.parameters,
-            [*facts.warnings, *warnings_of(result)],
-        ).html()
+INTEGRATED = Quantity("direct vs. integrated", Share(), 2)
 
 
-def _missing(result: SpinCycleRuns) -> list[str]:
-    if result.measured is None:
-        return []
-    return tables.missing_warnings(result.displacement, result.measured)
+def spin_cycle_answer(
+    parameters: MachineParameters,
+    profile: SpinProfile,
+    cases: Sequence[UnbalanceCase],
+    data: xr.Dataset,
+    engine: str,
+) -> Answer:
+    """Return the answer of the study.
 
-
-def _case_as_json(result: SpinCycleRuns, case: UnbalanceCase, diverged: str) -> dict[str, Any]:
-    here = {"case": case.name}
-    tension, forces = result.smallest_tension.sel(here), as_json(result.forces.sel(here))
-    return {
-        "case": case.name,
-        "front_kg": case.front,
-        "rear_kg": case.rear,
-        "phase_deg": float(np.rad2deg(case.phase)),
-        "rms_mm": 1e3 * result.displacement.sel(here),
-        "rms_from_acceleration_mm": 1e3 * result.integrated.sel(here),
-        "smallest_gap_mm": 1e3 * result.smallest_gap.sel(here),
-        "smallest_spring_tension_N": dict(
-            zip(map(str, tension.spring.values), tension.values, strict=True)
-        ),
-        **{key: forces.get(key) for key in ("mount_force_N", "feet", "motor")},
-        "diverged": diverged or None,
-    }
-
-
-def summary(result: SpinCycleRuns, engine: str) -> str:
-    """Return one paragraph about displacements, gaps, and errors against a measurement."""
-    count = len(result.cases)
-    sentences = [
-        f"{count} unbalance case{'s were' if count > 1 else ' was'} run over the spin profile with "
-        f"the {engine} engine."
+    Args:
+        data: As of `run_spin_cycle` in `wm_drake.studies.spin_cycle.study`, with measured RMS
+            displacements as `measured` if there are any.
+    """
+    titles = {case.name: f"Case {case.name}: {case_description(case)}" for case in cases}
+    chosen = shown_cases(cases, data)
+    sensors = [
+        f"{name} (frame {frame})" for name, frame in parameters.accelerometer_frames().items()
     ]
-    worst = largest(result.displacement)
-    if worst:
-        sentences.append(
-            f"The largest RMS displacement is {number(MM_PER_M * worst.value, 2)} mm. It occurs in "
-            f"case {worst.case} ({case_description(_case(result, worst.case))}), in region "
-            f"{worst.region}, at sensor {worst.accelerometer}, axis {worst.axis}."
-        )
-    gaps = result.smallest_gap.dropna("case")
-    if gaps.size:
-        nearest = str(gaps.case.values[int(np.argmin(gaps.values))])
-        sentences.append(
-            "The smallest gap between tub and housing is "
-            f"{gap_size(float(gaps.min()))}, in case {nearest} "
-            f"({case_description(_case(result, nearest))})."
-        )
-    apart = float(disagreement(result).max(skipna=True))
-    if np.isfinite(apart):
-        sentences.append(
-            "The RMS displacements computed directly and by integrating the acceleration twice "
-            f"differ by at most {number(100 * apart, 2)} % in any region."
-        )
-    if result.measured is None:
-        sentences.append("No measurement was given for comparison.")
-    else:
-        errors = average_errors(result.displacement, result.measured)
-        mean, deviation = (
-            number(100.0 * float(value))
-            for value in (errors.mean(skipna=True), errors.std(skipna=True))
-        )
-        missing = missing_regions(result.displacement, result.measured)
-        without = f" without {listed(list(missing))}" if missing else ""
-        sentences.append(
-            f"Compared with the measurement{without}, the average error is {mean} %, with a "
-            f"standard deviation of {deviation} % over the cases. ([A] reports 20.1 % and 4.1 % "
-            "for its own model and machine.)"
-        )
-    return " ".join(sentences)
+    period = STEP.text(profile.sample_period(parameters.output_period))
+    return Answer(
+        f"Spin cycle of machine {parameters.name}",
+        summary(cases, data, engine),
+        parameters,
+        (
+            Part("Spin profile", (profile_plot(profile),)),
+            _worst(data),
+            Part("Displacements of each case", [bars_plot(data, n, titles[n]) for n in chosen]),
+            Part("Cases", (cases_table(data),)),
+            Part("Regions", (regions_table(profile, data),)),
+            Part("Forces on the floor", _feet_tables(parameters, data)),
+            Part("Drive", _drive_tables(data)),
+            Part(
+                "Each case in numbers",
+                (
+                    LabelledTable(
+                        "displacements",
+                        by_channel(data.rms.sel(case=chosen)).to_dataset(name="rms"),
+                        "Each case in numbers",
+                        "RMS displacement of each sensor and axis.",
+                        across="channel",
+                        is_in_json=False,
+                    ),
+                    rms_table("rms", data.rms),
+                    rms_table("rms_from_acceleration", data.rms_from_acceleration),
+                    *_files(data),
+                ),
+            ),
+        ),
+        (
+            ("SDF model", Path(parameters.model).name),
+            ("Engine", engine),
+            ("Sensors", f"{', '.join(sensors)}; axes x to the right, y to the rear, z up"),
+            (
+                "Displacement",
+                "from the rest position, with a high-pass filter of 0.5 Hz; RMS over all samples "
+                f"of a region, one every {period}",
+            ),
+        ),
+        warned=tuple(warnings_of(parameters, data, period)),
+        diverged=diverged_runs(data),
+    )
 
 
 def case_description(case: UnbalanceCase) -> str:
     """Return the masses and the phase of a case, for example `400 g at the front`."""
     masses = [
-        f"{number(1e3 * mass, 0)} g {where}"
+        f"{MASS.text(mass)} {where}"
         for mass, where in ((case.front, "at the front"), (case.rear, "at the rear"))
         if mass > 0.0
     ]
-    phase = f", {number(float(np.rad2deg(case.phase)), 0)}° apart" if len(masses) == 2 else ""
+    phase = f", {PHASE.number(case.phase)}° apart" if len(masses) == 2 else ""
     return (" and ".join(masses) or "empty drum") + phase
 
 
-def shown_cases(result: SpinCycleRuns) -> list[UnbalanceCase]:
-    """Return the cases that the page shows in detail.
+def shown_cases(cases: Sequence[UnbalanceCase], data: xr.Dataset) -> list[str]:
+    """Return the names of the cases that the page shows in detail.
 
     These are the cases of the figures of [A], or the first three if none of them was run, and the
     case with the largest RMS displacement.
     """
     published = [
-        case
+        case.name
         for masses in SHOWN_MASSES
-        for case in result.cases
-        if np.allclose((case.front, case.rear, np.rad2deg(case.phase)), masses, atol=1e-6)
+        for case in cases
+        if np.allclose((case.front, case.rear, case.phase), masses, atol=1e-6)
     ]
-    worst = largest(result.displacement)
-    chosen = (published or list(result.cases[:3])) + ([_case(result, worst.case)] if worst else [])
-    return list({case.name: case for case in chosen}.values())
+    worst = largest(data.rms)
+    chosen = published or [case.name for case in cases[:3]]
+    return list(dict.fromkeys([*chosen, *([worst.case.item()] if worst.notnull() else [])]))
 
 
-def warnings_of(result: SpinCycleRuns) -> list[str]:
-    """Return warnings about divergence, overlap, slack springs, integration, imperfections."""
+def summary(cases: Sequence[UnbalanceCase], data: xr.Dataset, engine: str) -> str:
+    """Return one paragraph about displacements, gaps, and errors against a measurement."""
+    about = {case.name: f"case {case.name} ({case_description(case)})" for case in cases}
+    sentences = [
+        f"{len(cases)} unbalance case{'s were' if len(cases) > 1 else ' was'} run over the spin "
+        f"profile with the {engine} engine."
+    ]
+    worst, gaps = largest(data.rms), data.smallest_gap.dropna("case")
+    if worst.notnull():
+        sentences.append(
+            f"The largest RMS displacement is {text_of(worst)}. It occurs in "
+            f"{about[worst.case.item()]}, in region {worst.region.item()}, at sensor "
+            f"{worst.accelerometer.item()}, axis {worst.axis.item()}."
+        )
+    if gaps.size:
+        smallest = gaps.isel(case=gaps.argmin("case"))
+        sentences.append(
+            "The smallest gap between tub and housing is "
+            f"{gap_size(smallest.item())}, in {about[smallest.case.item()]}."
+        )
+    apart = float(disagreement(data).max())
+    if np.isfinite(apart):
+        sentences.append(
+            "The RMS displacements computed directly and by integrating the acceleration twice "
+            f"differ by at most {INTEGRATED.text(apart)} in any region."
+        )
+    return " ".join([*sentences, _about_measurement(data)])
+
+
+def _about_measurement(data: xr.Dataset) -> str:
+    if "measured" not in data:
+        return "No measurement was given for comparison."
+    errors = average_errors(data.rms, data.measured)
+    missing = missing_regions(data.rms, data.measured)
+    without = f" without {listed(list(missing))}" if missing else ""
+    return (
+        f"Compared with the measurement{without}, the average error is "
+        f"{ERROR.text(errors.mean())}, with a standard deviation of {ERROR.text(errors.std())} "
+        "over the cases. ([A] reports 20.1 % and 4.1 % for its own model and machine.)"
+    )
+
+
+def warnings_of(parameters: MachineParameters, data: xr.Dataset, period: str) -> list[str]:
+    """Return warnings about divergence, overlap, slack springs, feet, integration, imperfections.
+
+    Args:
+        period: Time between samples, as text.
+    """
     texts = [
-        f"Case {case.name}: {text}. Regions that this run did not complete have no values."
-        for case, text in zip(result.cases, result.diverged, strict=True)
-        if text
+        f"Case {text}. Regions that this run did not complete have no values."
+        for text in diverged_runs(data)
     ]
-    texts += _missing(result)
-    gaps = result.smallest_gap
-    touching = list(map(str, gaps.case.values[gaps.values <= 0.0]))
+    texts += missing_warnings(data.rms, data.measured) if "measured" in data else []
+    touching = data.case.values[data.smallest_gap.values <= 0.0].tolist()
     if touching:
         texts.append(
             f"Tub and housing overlap in case {', '.join(touching)}. The model has no contact "
             "forces. In the real machine, tub and housing would collide."
         )
-    smallest = result.smallest_tension
-    names = map(str, smallest.case.values)
-    texts += slack_warning({c: slack_springs(smallest.sel(case=c)) for c in names}, "case")
-    texts += tables.floor_warnings(result)
-    apart = float(disagreement(result).max(skipna=True))
-    if apart > 0.01:
+    tensions = data.smallest_spring_tension
+    slack = {name: slack_springs(tensions.sel(case=name)) for name in data.case.values.tolist()}
+    texts += slack_warning(slack, "case")
+    texts += floor_warnings(parameters, data)
+    apart = float(disagreement(data).max())
+    if apart > LARGE_DISAGREEMENT:
         texts.append(
             "In at least one region, the RMS displacements from integrated acceleration differ by "
-            f"{number(100 * apart, 1)} % from the direct ones. The motion there is too small for "
-            f"the integration, or too fast for a sampling interval of {_sample_period(result)}."
+            f"{ERROR.text(apart)} from the direct ones. The motion there is too small for "
+            f"the integration, or too fast for a sampling interval of {period}."
         )
-    faults = result.parameters.imperfections
+    return texts + _imperfections(parameters)
+
+
+def _imperfections(parameters: MachineParameters) -> list[str]:
+    """Return a sentence for each imperfection of a machine."""
+    texts, faults = [], parameters.imperfections
     if faults.residual_imbalance.mass > 0.0:
-        texts.append(
-            "The drum has a residual imbalance of "
-            f"{number(1e3 * faults.residual_imbalance.mass)} g."
-        )
+        mass = Quantity("", MASS.unit, 1).text(faults.residual_imbalance.mass)
+        texts.append(f"The drum has a residual imbalance of {mass}.")
     if faults.phase_error != 0.0:
-        texts.append(
-            "The phase between front and rear masses has an error of "
-            f"{number(float(np.rad2deg(faults.phase_error)))}°."
-        )
+        angle = Quantity("", PHASE.unit, 1).number(faults.phase_error)
+        texts.append(f"The phase between front and rear masses has an error of {angle}°.")
     if faults.bearing:
-        radial, tilting = 1e-3 * faults.bearing.radial_stiffness, faults.bearing.tilting_stiffness
+        radial = Quantity("", Unit("N/m", "N/mm"), 0).text(faults.bearing.radial_stiffness)
+        tilting = Quantity("", Unit("N*m/rad", "N*m/rad"), 0)
         texts.append(
             "The drum bearing is compliant, so the drum can whirl: the radial stiffness is "
-            f"{number(radial, 0)} N/mm and the tilting stiffness {number(tilting, 0)} N m/rad."
+            f"{radial} and the tilting stiffness {tilting.text(faults.bearing.tilting_stiffness)}."
         )
     return texts
 
 
-def _sample_period(result: SpinCycleRuns) -> str:
-    """Return the time between the samples of a run."""
-    period = result.profile.sample_period(result.parameters.output_period)
-    return f"{MS_PER_S * period:g} ms"
+def missing_warnings(computed: xr.DataArray, measured: xr.DataArray) -> list[str]:
+    """Return a warning of the regions that the errors leave out, or none."""
+    missing = missing_regions(computed, measured)
+    if not missing:
+        return []
+    parts = [f"{region} in case {', '.join(cases)}" for region, cases in missing.items()]
+    return [
+        f"The errors leave regions out, which have no measured value or were not completed by the "
+        f"run: {'; '.join(parts)}. A record counts for a region if at most "
+        f"{Quantity('', Share(), 0).text(MOST_MISSING)} of it is missing at its end."
+    ]
 
 
-def _case(result: SpinCycleRuns, name: str) -> UnbalanceCase:
-    return next(case for case in result.cases if case.name == name)
+def floor_warnings(parameters: MachineParameters, data: xr.Dataset) -> list[str]:
+    """Return a warning that names the cases in which the cabinet would slide, turn or tip."""
+    if parameters.cabinet is None:
+        return []
+    margins = np.min([data[name].values for name in MARGINS[1:]], axis=0)
+    moving = data.case.values[(margins <= 0.0) & (data.diverged.values == "")].tolist()
+    if not moving:
+        return []
+    if parameters.cabinet_moves:
+        return [f"The cabinet slides, turns or lifts a side in case {', '.join(moving)}."]
+    return [
+        f"The cabinet would slide, turn or tip over in case {', '.join(moving)}. The model keeps "
+        "it in its place."
+    ]
 
 
-def _profile_picture(result: SpinCycleRuns) -> Picture:
-    names = ", ".join(region.name for region in result.profile.regions)
-    return picture(
-        profile_figure(result.profile),
+def profile_plot(profile: SpinProfile) -> Plot:
+    """Return the spin profile with its regions."""
+    names = ", ".join(region.name for region in profile.regions)
+    return Plot(
+        profile_figure(profile),
         f"Spin profile with the regions {names}.",
         "Drum speed over time. Shaded areas: regions.",
     )
 
 
-def _worst_picture(result: SpinCycleRuns) -> tuple[Picture, ...]:
-    """Return the largest displacements of all cases; nothing if no run completed a region."""
-    if largest(result.displacement) is None:
-        return ()
-    values, which = tables.worst_of_all(result.displacement)
-    regions = list(map(str, result.displacement.region.values))
-    notes = [
-        [f"case {result.cases[index].name}" if len(result.cases) > 1 else "" for index in row]
-        for row in which
+def by_channel(displacement: xr.DataArray) -> xr.DataArray:
+    """Return displacements with one dimension `channel` in place of sensor and axis."""
+    names = [
+        f"{sensor} {axis}"
+        for sensor in displacement.accelerometer.values
+        for axis in displacement.axis.values
     ]
+    flat = displacement.reset_coords(drop=True).stack(channel=DIMS[2:])
+    return flat.drop_vars(["channel", *DIMS[2:]]).assign_coords(channel=names)
+
+
+def _worst(data: xr.Dataset) -> Part:
+    """Return the largest displacements of all cases; no picture if no run completed a region."""
+    if largest(data.rms).isnull():
+        return Part("Largest displacements", text="No run completed a region.")
+    values, several = largest(data.rms, DIMS[1:]), data.sizes["case"] > 1
+    names = by_channel(values.case).values
     caption = (
-        "Largest RMS displacement of all cases in mm, for each region (rows), sensor and axis "
-        "(columns)."
+        "Largest RMS displacement of all cases, for each region (rows), sensor and axis (columns)."
     )
-    if len(result.cases) > 1:
+    if several:
         caption += " The case in which it occurs is given below the number."
-    values = np.where(values < 0.0, np.nan, values)
-    figure = heat_map_figure(values, regions, tables.channels(result.displacement), notes)
+    notes = [[f"case {name}" if several else "" for name in row] for row in names]
+    figure = heat_map_figure(by_channel(values), notes)
     words = "Heat map of the largest RMS displacement, region by sensor and axis."
-    return (picture(figure, words, caption),)
+    return Part("Largest displacements", (Plot(figure, words, caption),))
 
 
-def _bars(result: SpinCycleRuns, case: str, title: str) -> Picture:
-    computed, integrated = (v.sel(case=case) for v in (result.displacement, result.integrated))
-    measured = result.measured.sel(case=case) if result.measured is not None else None
+def bars_plot(data: xr.Dataset, case: str, title: str) -> Plot:
+    """Return the RMS displacements of a case per region, beside those measured."""
+    of_case = data.sel(case=case)
+    measured = of_case.get("measured")
     if measured is not None and not np.isfinite(measured).any():
         measured = None
     caption = (
         f"{title}: RMS displacement per region. Each row is a sensor, each column an axis. All "
         "panels have the same scale."
     )
-    words = f"{title}: RMS displacement per region."
-    return picture(bars_figure(computed, integrated, measured), words, caption)
+    figure = bars_figure(of_case.rms, of_case.get("rms_from_acceleration"), measured)
+    return Plot(figure, f"{title}: RMS displacement per region.", caption)
 
 
-def _facts(result: SpinCycleRuns, engine: str, facts: Facts) -> list[tuple[str, str]]:
-    sensors = [
-        f"{name} (frame {frame})"
-        for name, frame in result.parameters.accelerometer_frames().items()
-    ]
+def cases_table(data: xr.Dataset) -> LabelledTable:
+    """Return the cases with their results; a collision or a slack spring is an alarm."""
+    worst = largest(data.rms, DIMS[:1])
+    sensor = worst.accelerometer + " " + worst.axis
+    tension = data.smallest_spring_tension.min("spring", keep_attrs=True)
+    shown = {
+        "largest_rms": _named(worst, "largest RMS"),
+        "in_region": ("case", np.where(worst.notnull(), worst.region, MISSING)),
+        "sensor_axis": ("case", np.where(worst.notnull(), sensor, MISSING)),
+        "smallest_gap": data.smallest_gap.variable,
+        "smallest_spring_tension": _named(tension, "smallest spring tension"),
+        "is_alarm": ("case", (data.smallest_gap.values <= 0.0) | (tension.values == 0.0)),
+    }
+    caption = (
+        "Cases in the order of the input table, with the largest RMS displacement of any sensor "
+        "and axis in any region, the smallest gap between tub and housing, and the smallest "
+        "tension of any spring; a spring goes slack at 0."
+    )
+    if "measured" in data:
+        shown["average_error"] = ERROR.variable("case", average_errors(data.rms, data.measured))
+        caption += (
+            " Average error: mean over regions, sensors and axes of |measured − computed| / "
+            "measured."
+        )
+    if data.published_error.notnull().any():
+        shown["published_error"] = data.published_error.variable
+        caption += (
+            " [A] Table 9: average error of the model of [A] against the experiment of [A], with "
+            "its own machine."
+        )
+    labels = {name: data[name] for name in ("case", *MASSES)}
+    return LabelledTable(
+        "cases",
+        xr.Dataset(shown, labels),
+        "Cases",
+        caption,
+        marked=("is_alarm", "alarm"),
+        is_in_terminal=True,
+    )
+
+
+def regions_table(profile: SpinProfile, data: xr.Dataset) -> LabelledTable:
+    """Return limits and results of each region, and its errors if there is a measurement.
+
+    One column compares RMS displacements computed directly and by integrating the acceleration.
+    """
+    worst = largest(data.rms, DIMS[1:2])
+    at = [(region.begin, region.end) for region in profile.regions]
+    shown = {
+        "begin": TIME.named("from").variable("region", [begin for begin, _ in at]),
+        "end": TIME.named("to").variable("region", [end for _, end in at]),
+        "speeds": ("region", [_speeds_text(profile, *ends) for ends in at]),
+        "largest_rms": _named(worst, "largest RMS"),
+        "in_case": ("region", np.where(worst.notnull(), worst.case, MISSING)),
+        "disagreement": INTEGRATED.variable("region", disagreement(data).max("case")),
+    }
+    caption = (
+        "Regions of the spin profile. Direct vs. integrated: difference between the RMS "
+        "displacements computed directly and by integrating the acceleration twice, with norms "
+        "over all sensors and axes, for the worst case."
+    )
+    if "measured" in data:
+        errors = region_errors(data.rms, data.measured)
+        mean = ERROR.named("mean error, [A] Eq. (9)")
+        shown["mean_error"] = mean.variable("region", errors.mean("case"))
+        # as in [A], of these cases, not an estimate for a population
+        deviation = ERROR.named("standard deviation")
+        shown["deviation"] = deviation.variable("region", errors.std("case"))
+        caption += (
+            " Error: |measured − computed| / |measured| with norms over sensors and axes, [A] Eq. "
+            "(9); mean and standard deviation over the cases."
+        )
+    return LabelledTable("regions", xr.Dataset(shown, {"region": data.region}), "Regions", caption)
+
+
+def _speeds_text(profile: SpinProfile, begin: float, end: float) -> str:
+    """Return the drum speeds at the corners of a profile between two times."""
+    inner = (time for time in profile.time if begin < time < end)
+    speeds = map(SPEED.number, profile.speed_at([begin, *inner, end]))
+    return f"{' – '.join(text for text, _ in itertools.groupby(speeds))} {SPEED.unit_text}"
+
+
+def _named(array: xr.DataArray, words: str) -> xr.Variable:
+    """Return the variable of an array with other words."""
+    variable = array.variable.copy()
+    variable.attrs = quantity_of(array).named(words).attributes()
+    return variable
+
+
+def rms_table(name: str, displacement: xr.DataArray) -> LabelledTable:
+    """Return RMS displacements in the form of files with measured ones, see `read_rms`."""
+    data = displacement.reset_coords(drop=True).rename(accelerometer="sensor")
+    return LabelledTable(name, data.to_dataset(name="rms"))
+
+
+def _files(data: xr.Dataset) -> list[LabelledTable]:
+    """Return what only files have: forces of the mounts, and tension of each spring."""
+    mounts = [*MEASURES["mounts"].names]
+    plain = data.reset_coords(MASSES, drop=True)
     return [
-        ("Machine", result.parameters.name),
-        ("SDF model", Path(result.parameters.model).name),
-        ("Engine", engine),
-        ("Sensors", f"{', '.join(sensors)}; axes x to the right, y to the rear, z up"),
-        (
-            "Displacement",
-            "from the rest position, with a high-pass filter of 0.5 Hz; RMS over all samples of a "
-            f"region, one every {_sample_period(result)}",
-        ),
-        *facts.rows(),
+        LabelledTable("mounts", plain[mounts]),
+        LabelledTable("springs", plain[["smallest_spring_tension"]]),
     ]
+
+
+def _feet_tables(parameters: MachineParameters, data: xr.Dataset) -> list[LabelledTable]:
+    """Return the smallest loads and margins of each case and region; none without a cabinet."""
+    if parameters.cabinet is None:
+        return []
+    plain = data.reset_coords(MASSES, drop=True)
+    margins = plain[[*MARGINS]]
+    margins["turn_margin_smallest_in"] = plain.region_turn_margin.fillna(np.inf).idxmin("region")
+    margins["moves"] = margins[[*MARGINS]].to_array().min("variable") <= 0.0
+    which, below = "which the model keeps in its place", "Below 0 the cabinet would slide, turn"
+    if parameters.cabinet_moves:
+        which, below = "which moves on them", "At 0 the cabinet slides or turns, or is about to"
+    caption = (
+        f"Feet of the rigid cabinet, {which}: smallest normal load of any foot; horizontal force "
+        "that friction can still take; vertical moment that friction can still take beside it, "
+        "and the region where this is smallest; moment that still keeps the cabinet down. "
+        f"{below} or tip. feet_regions.csv has each region."
+    )
+    table = LabelledTable(
+        "feet", margins, "Forces on the floor", caption, marked=("moves", "alarm")
+    )
+    return [table, LabelledTable("feet_regions", plain[[*MEASURES["feet regions"].names]])]
+
+
+def _drive_tables(data: xr.Dataset) -> list[LabelledTable]:
+    """Return the measures of the drive of each case; none without a motor."""
+    if "drive_peak_torque" not in data:
+        return []
+    caption = (
+        "Drive: largest torque on the drum; largest torque averaged over a revolution, and the "
+        "speed there; largest power; work over the run; speed ripple, the largest coefficient of "
+        "fluctuation in a revolution; speed at the end; speed and mean torque at which the drum "
+        "stays below the wanted speed (Sommerfeld effect)."
+    )
+    of_drive = drive_data(data.reset_coords(MASSES, drop=True))
+    return [LabelledTable("drive", of_drive, "Drive", caption, marked=("is_caught", "alarm"))]

@@ -1,7 +1,7 @@
 """Spin cycle: RMS displacement per region, sensor and axis for unbalance cases ([A] section 4)."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -17,88 +17,29 @@ from wm_drake.model.scene import Scene
 from wm_drake.parameters import MachineParameters, SpinProfile
 from wm_drake.parameters.drive import motor_of
 from wm_drake.parameters.unbalance_cases import TABLE_9, UnbalanceCase, load_unbalance_cases
+from wm_drake.parameters.units import Share, Unit
+from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.cases import Case
-from wm_drake.simulation.measures import MEASURES as KNOWN_MEASURES
 from wm_drake.simulation.measures import measure
-from wm_drake.simulation.mounts import mount_names
 from wm_drake.simulation.vibration import relative_error
 from wm_drake.studies.executor import RunCases
 from wm_drake.studies.inputs import channel_names, existing_file
 from wm_drake.studies.spin.study import run_spin
-from wm_drake.studies.spin_cycle.measured import DIMS, read_accelerations, read_rms
+from wm_drake.studies.spin_cycle.measured import DIMS, RMS, read_accelerations, read_rms
 from wm_drake.studies.spin_cycle.options import SpinCycleDataOptions
 
-FORCES = ("mounts", "cabinet")
-"""Measures of the forces on the cabinet."""
-
-MEASURES = ("regions", "gap", "spring tensions", *FORCES)
+MEASURES = ("regions", "gap", "spring tensions", "mounts", "cabinet")
 """Measures of each run, as for `simulate_many`."""
 
-FEET = ("feet", "feet regions")
-"""Measures of each run of a machine with a cabinet."""
-
-DRIVE = ("drive",)
-"""Measures of each run of a machine with a motor."""
-
-
-@dataclass(frozen=True)
-class SpinCycleRuns:
-    """Results of a spin-cycle study.
-
-    Attributes:
-        profile: Spin profile with regions.
-        cases: The cases, in the order of the runs.
-        displacement: (case, region, accelerometer, axis) RMS displacement from the displacement
-            itself; NaN where a run ended before the region did. [m]
-        integrated: (case, region, accelerometer, axis) RMS displacement from the acceleration,
-            integrated twice. [m]
-        smallest_gap: (case) smallest gap between tub group and housing. [m]
-        smallest_tension: (case, spring) smallest tension of each spring. [N]
-        diverged: (case) time and reason if a run diverged, else "".
-        forces: Forces of the mounts and, if the machine has a cabinet, loads and margins of its
-            feet; with a motor, measures of the drive: the variables of `simulate_many` over case.
-            SI.
-        measured: (case, region, accelerometer, axis) measured RMS displacement; NaN where nothing
-            was measured. None without a measurement. [m]
-    """
-
-    parameters: MachineParameters
-    profile: SpinProfile
-    cases: tuple[UnbalanceCase, ...]
-    displacement: xr.DataArray
-    integrated: xr.DataArray
-    smallest_gap: xr.DataArray
-    smallest_tension: xr.DataArray
-    diverged: tuple[str, ...]
-    forces: xr.Dataset
-    measured: xr.DataArray | None = None
+MASS = Quantity("mass", Unit("kg", "g"), 0)
+PHASE = Quantity("phase", Unit("rad", "deg"), 0)
+ERROR = Quantity("average error", Share(), 1)
 
 
 def measures_of(parameters: MachineParameters) -> tuple[str, ...]:
-    """Return the measures of each run of a machine, as for `simulate_many`."""
-    return (*MEASURES, *forces_measured(parameters)[len(FORCES) :])
-
-
-def forces_measured(parameters: MachineParameters) -> tuple[str, ...]:
-    """Return the measures of the forces of a machine: on cabinet and floor, and of its motor."""
-    feet = FEET if parameters.cabinet else ()
-    return (*FORCES, *feet, *(DRIVE if motor_of(parameters.drive) else ()))
-
-
-def forces_of(
-    parameters: MachineParameters, table: xr.Dataset, labels: dict[str, list[str]]
-) -> xr.Dataset:
-    """Return the forces of a table of runs, with cases and regions by name."""
-    coordinates = {name: labels[name] for name in ("case", "region", "axis")}
-    coordinates["mount"] = list(mount_names(parameters))
-    if parameters.cabinet:
-        coordinates["foot"] = list(parameters.cabinet.corners)
-    measures = forces_measured(parameters)
-    if "drive" in measures:
-        coordinates["order"] = ["cosine", "sine"]
-    names = [name for measure in measures for name in KNOWN_MEASURES[measure].names]
-    variables = {name: (("case", *table[name].dims[1:]), table[name].values) for name in names}
-    return xr.Dataset(variables, coordinates)
+    """Return the measures of each run of a machine: also of its feet and of its motor."""
+    feet = ("feet", "feet regions") if parameters.cabinet else ()
+    return (*MEASURES, *feet, *(("drive",) if motor_of(parameters.drive) else ()))
 
 
 def runs_of(
@@ -123,29 +64,36 @@ def run_spin_cycle(
     cases: Sequence[UnbalanceCase],
     profile: SpinProfile,
     evaluate: RunCases,
-) -> SpinCycleRuns:
+) -> xr.Dataset:
     """Run unbalance cases and label their measures.
+
+    Returns:
+        The measures of `simulate_many` over `case`, with masses [kg] and phase [rad] of each case,
+        and regions by name. RMS displacements over case, region, accelerometer and axis are `rms`
+        and `rms_from_acceleration`, NaN where a run ended before the region did. [m]
+        `published_error` is that of [A] Table 9, NaN if there is none.
 
     Raises:
         InputError: the profile has no regions, or the machine does not define the planes of the
             unbalance masses.
     """
     table = evaluate(runs_of(parameters, cases, profile))
-    labels = labels_of(parameters, cases, profile)
-    direct, integrated = (
-        xr.DataArray(table[name].values, labels, DIMS, attrs={"units": "m"})
-        for name in ("region_displacement", "region_displacement_integrated")
+    data = (
+        table.swap_dims(run="case")
+        .drop_vars("run")
+        .rename(region_displacement="rms", region_displacement_integrated="rms_from_acceleration")
     )
-    gap = xr.DataArray(table.smallest_gap.values, {"case": labels["case"]}, attrs={"units": "m"})
-    tension = xr.DataArray(
-        table.smallest_spring_tension.values,
-        {"case": labels["case"], "spring": list(parameters.springs)},
-        attrs={"units": "N"},
-    )
-    diverged = tuple(map(str, table.diverged.values))
-    forces = forces_of(parameters, table, labels)
-    measured = direct, integrated, gap, tension
-    return SpinCycleRuns(parameters, profile, tuple(cases), *measured, diverged, forces)
+    for name in ("rms", "rms_from_acceleration"):
+        data[name].attrs |= RMS.attributes()
+    published = [case.published_error_percent for case in cases]
+    errors = ERROR.to_si([np.nan if error is None else error for error in published])
+    labels = {
+        "front": MASS.named("front mass").variable("case", [case.front for case in cases]),
+        "rear": MASS.named("rear mass").variable("case", [case.rear for case in cases]),
+        "phase": PHASE.variable("case", [case.phase for case in cases]),
+    }
+    data["published_error"] = ERROR.named("average error, [A] Table 9").variable("case", errors)
+    return data.assign_coords({**labels_of(parameters, cases, profile), **labels})
 
 
 def labels_of(
@@ -159,15 +107,15 @@ def labels_of(
     )
 
 
-def disagreement(result: SpinCycleRuns) -> xr.DataArray:
+def disagreement(data: xr.Dataset) -> xr.DataArray:
     """Return the relative error (case, region) of the displacements from integrated acceleration.
 
     It is [A] Eq. (9) with norms over all sensors and axes; the reference is the displacement
     itself.
     """
-    direct, integrated = (_flat(values) for values in (result.displacement, result.integrated))
+    direct, integrated = (_flat(data[name]) for name in ("rms", "rms_from_acceleration"))
     return xr.DataArray(
-        relative_error(integrated, direct), {dim: result.displacement[dim] for dim in DIMS[:2]}
+        relative_error(integrated, direct), {dim: data[dim] for dim in DIMS[:2]}, DIMS[:2]
     )
 
 
@@ -207,38 +155,18 @@ def missing_regions(computed: xr.DataArray, measured: xr.DataArray) -> dict[str,
     return {region: of_region for region, of_region in cases.items() if of_region}
 
 
-def mean_and_deviation(errors: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
-    """Return mean and standard deviation of errors over the cases.
+def largest(displacement: xr.DataArray, over: Sequence[str] = ()) -> xr.DataArray:
+    """Return the largest of displacements, with the labels where it occurs as coordinates.
 
-    As in [A], it is the standard deviation of these cases, not an estimate for a population.
+    Args:
+        displacement: Over case, region, accelerometer and axis. [m]
+        over: Dimensions that the result keeps.
+
+    Returns:
+        Over the kept dimensions; NaN where no run completed a region. [m]
     """
-    return errors.mean("case", skipna=True), errors.std("case", skipna=True)
-
-
-@dataclass(frozen=True)
-class Largest:
-    """The largest RMS displacement, with the names of its case, region, sensor and axis. [m]"""
-
-    case: str
-    region: str
-    accelerometer: str
-    axis: str
-    value: float
-
-
-def largest(displacement: xr.DataArray) -> Largest | None:
-    """Return the largest value of an array (case, region, accelerometer, axis).
-
-    The result is None if no run completed a region.
-    """
-    values = displacement.values
-    if not np.isfinite(values).any():
-        return None
-    index = np.unravel_index(int(np.nanargmax(values)), values.shape)
-    case, region, sensor, axis = (
-        str(displacement[dim].values[i]) for dim, i in zip(DIMS, index, strict=True)
-    )
-    return Largest(case, region, sensor, axis, float(values[index]))
+    others = [dim for dim in displacement.dims if dim not in over]
+    return displacement.isel(displacement.fillna(-1.0).argmax(others))
 
 
 def _flat(values: xr.DataArray) -> np.ndarray:

@@ -1,6 +1,5 @@
 """Check the options of the study of a spin cycle, and run it."""
 
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -8,8 +7,9 @@ from wm_drake.errors import check_known
 from wm_drake.model.machine import Machine
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import runnable_profile
+from wm_drake.studies.spin_cycle.measured import DIMS, RMS
 from wm_drake.studies.spin_cycle.options import SpinCycleOptions
-from wm_drake.studies.spin_cycle.page import SpinCycleResult
+from wm_drake.studies.spin_cycle.page import spin_cycle_answer
 from wm_drake.studies.spin_cycle.study import (
     cases_of_table,
     drake_runs,
@@ -47,9 +47,11 @@ class SpinCycleTask(Task):
         if self.engine == "drake":
             with executor.progress(len(self.cases), "cases") as progress:
                 evaluate = drake_runs(parameters, progress=progress)
-                result = run_spin_cycle(parameters, self.cases, self.profile, evaluate)
+                data = run_spin_cycle(parameters, self.cases, self.profile, evaluate)
         else:
             measures = measures_of(parameters)
             evaluate = partial(executor.simulate, self.machine, measures, what="cases")
-            result = run_spin_cycle(parameters, self.cases, self.profile, evaluate)
-        return SpinCycleResult(replace(result, measured=self.measured), self.engine)
+            data = run_spin_cycle(parameters, self.cases, self.profile, evaluate)
+        if self.measured is not None:
+            data["measured"] = RMS.variable(DIMS, self.measured)
+        return spin_cycle_answer(parameters, self.profile, self.cases, data, self.engine)

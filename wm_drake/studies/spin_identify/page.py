@@ -13,9 +13,13 @@ from wm_drake.report.quantity import HIDDEN, Quantity, text_of
 from wm_drake.studies.answer import Answer, Part, Plot
 from wm_drake.studies.fitting.fit import Fit, verdict_of
 from wm_drake.studies.fitting.page import estimates_of, fit_parts, search_facts
-from wm_drake.studies.spin_cycle.figures import bars_figure, profile_figure
-from wm_drake.studies.spin_cycle.page import case_description
-from wm_drake.studies.spin_cycle.tables import missing_warnings
+from wm_drake.studies.spin_cycle.figures import bars_figure
+from wm_drake.studies.spin_cycle.page import (
+    case_description,
+    missing_warnings,
+    profile_plot,
+    rms_table,
+)
 from wm_drake.studies.spin_identify.study import (
     KNOWN,
     RELATIVE_ERROR,
@@ -68,11 +72,11 @@ def spin_identify_answer(
                 "Measured and fitted",
                 (
                     *bars,
-                    _displacements("measured", identified),
-                    _displacements("after", identified),
+                    rms_table("measured", identified.measured),
+                    rms_table("rms", identified.after),
                 ),
             ),
-            Part("Spin profile", (_profile(model),)),
+            Part("Spin profile", (profile_plot(model.profile),)),
             search,
             Part(
                 "Values found",
@@ -179,20 +183,6 @@ def _parameters(
         f"unknown have the same value. Bold: determined to within {WITHIN}.",
         marked=("is_identified", "ours"),
         is_in_terminal=True,
-    )
-
-
-def _displacements(name: str, identified: xr.Dataset) -> LabelledTable:
-    """Return RMS displacements, in the form of files with measured ones."""
-    data = identified[[name]].rename({name: "rms", "accelerometer": "sensor"})
-    return LabelledTable("measured" if name == "measured" else "rms", data)
-
-
-def _profile(model: SpinModel) -> Plot:
-    return Plot(
-        profile_figure(model.profile),
-        "Spin profile with its regions.",
-        "Drum speed over time. Shaded areas: regions.",
     )
 
 

@@ -22,7 +22,7 @@ from wm_drake.parameters import (
 from wm_drake.parameters.keys import allowed_range
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.unbalance_cases import UnbalanceCase
-from wm_drake.parameters.units import Share, Unit
+from wm_drake.parameters.units import Share
 from wm_drake.parameters.variation import number_at, range_of
 from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.cases import Case
@@ -30,7 +30,7 @@ from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.fitting.fit import Fit
 from wm_drake.studies.fitting.methods import identify
 from wm_drake.studies.fitting.problem import FitProblem, Measurement, Progress, Unknown
-from wm_drake.studies.spin_cycle.measured import DIMS
+from wm_drake.studies.spin_cycle.measured import DIMS, RMS
 from wm_drake.studies.spin_cycle.study import average_errors, labels_of, region_errors, runs_of
 
 SPAN = 1.5
@@ -42,7 +42,6 @@ PLANTED = (0.8, 1.25)
 AVERAGE_ERROR = Quantity("average error of an RMS displacement", Share(), 1)
 RELATIVE_ERROR = Quantity("relative error", Share(), 2)
 HALF_WIDTH = Quantity("95 % interval, ±", Share(), 2)
-DISPLACEMENT = Quantity("RMS displacement", Unit("m", "mm"), 2)
 
 KNOWN = 0.02
 """Largest relative half-width of the 95 % confidence interval of an identified unknown."""
@@ -263,11 +262,11 @@ def identify_from_spin(
     computed = [
         measured.copy(data=values) for values in model.displacements(np.stack([start, fit.values]))
     ]
-    data: dict[str, Any] = {"measured": DISPLACEMENT.variable(DIMS, measured)}
+    data: dict[str, Any] = {"measured": RMS.variable(DIMS, measured)}
     for name, values in zip(("before", "after"), computed, strict=True):
         error = region_errors(values, measured).mean("region")
         average = average_errors(values, measured).mean()
-        data[name] = DISPLACEMENT.named(name).variable(DIMS, values)
+        data[name] = RMS.named(name).variable(DIMS, values)
         data[f"error_{name}"] = RELATIVE_ERROR.named(name).variable("case", error)
         words = f"{AVERAGE_ERROR.words} {name}"
         data[f"average_error_{name}"] = AVERAGE_ERROR.named(words).variable((), average)
