@@ -154,7 +154,8 @@ class Contents:
             for y in self.depths
             for axis in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
         ]
-        rows: list[Any] = [pack(setup)[0], lengths, setup.measured_points.ravel(), *orbits]
+        points = setup.measured_points.ravel(), *orbits
+        rows: list[FloatArray] = [pack(setup)[0], np.array(lengths), *points]
         if setup.cabinet:
             rows.append(packed_feet(setup.cabinet.cabinet, parameters.gravity))
         return np.concatenate(rows)

@@ -273,7 +273,8 @@ function nodeAt(tree, base, path) {
   return node;
 }
 
-const scaled = (text, factor) => text.replace(/[-+]?[\d.]+(?:e[-+]?\d+)?(?=[,)])/gi, (number) => digits(factor * Number(number)));
+/** Return the ordinates of a table, a text or one with its source, times a factor. */
+const scaled = (column, factor) => (column.value ?? column).replace(/[-+]?[\d.]+(?:e[-+]?\d+)?(?=[,)])/gi, (number) => digits(factor * Number(number)));
 
 /** Return the command that runs a state, and a machine file with what differs. */
 export function take(state) {
