@@ -68,7 +68,12 @@ FILES = {  # what a block with a file is called in the commands of its page
     "docs/how-to/drive.md": ["drive.yaml"],
     "docs/how-to/floor.md": ["on_my_floor.yaml", "on_soft_feet.yaml"],
     "docs/how-to/gasket-drawing.md": ["one_fold.yaml", "measured_rubber.yaml"],
-    "docs/how-to/own-machine.md": ["mine.yaml", "four_springs.yaml", "imperfect.yaml", "with_buffer.yaml"],
+    "docs/how-to/own-machine.md": [
+        "mine.yaml",
+        "four_springs.yaml",
+        "imperfect.yaml",
+        "with_buffer.yaml",
+    ],
     "docs/how-to/rubber.md": ["rubber.yaml"],
     "docs/how-to/tolerances.md": ["mine.yaml", "limits.yaml"],
     "docs/theory/ball-ring.md": ["balls.yaml"],
