@@ -105,12 +105,14 @@ class Worker:
         )
         self.lines: queue.Queue[str] = queue.Queue()
         threading.Thread(target=self._read, daemon=True).start()
-        self.lines.get(timeout=600.0)
+        if not self.lines.get(timeout=600.0):
+            raise RuntimeError("tests/fuzz/worker.py ended before it was ready")
 
     def _read(self) -> None:
         assert self.process.stdout is not None
         for line in self.process.stdout:
             self.lines.put(line)
+        self.lines.put("")  # the process has ended
 
     def outcome(self, number: int) -> dict[str, Any] | None:
         """Return the outcome of a case; None if it hangs or ends the process."""
@@ -119,7 +121,7 @@ class Worker:
             self.process.stdin.write(f"{number}\n")
             self.process.stdin.flush()
             return dict(json.loads(self.lines.get(timeout=SECONDS)))
-        except (OSError, queue.Empty):
+        except (OSError, queue.Empty, json.JSONDecodeError):
             self.process.kill()
             return None
 

@@ -32,7 +32,7 @@ COMPUTATIONS = (
     "wm_drake.studies.spin_cycle.study.run_spin_cycle",
     "wm_drake.studies.spin_identify.study.identify_from_spin",
     "wm_drake.studies.gasket_damping.task.virtual_experiment",
-    "wm_drake.studies.gasket_damping.task.least_squares",
+    "wm_drake.studies.gasket_damping.task.identify",
     "wm_drake.studies.fitting.methods.identify",
     "wm_drake.solid.curves.Gasket.curve",
     "wm_drake.studies.calibrate.study.calibrate",
