@@ -43,14 +43,6 @@ def three_digits(value: float) -> str:
     )
 
 
-def with_interval(value: float, lower: float, upper: float) -> str:
-    """Return a number with the ends of its interval, `2 (1 to 3)`; without ends if they are NaN."""
-    if not math.isfinite(value):
-        return MISSING
-    ends = f" ({significant(lower)} to {significant(upper)})" if math.isfinite(lower) else ""
-    return f"{significant(value)}{ends}"
-
-
 def percent(value: float) -> str:
     """Return a difference in whole percent, with its sign; NaN becomes a dash."""
     return f"{signed(value)} %" if math.isfinite(value) else MISSING
