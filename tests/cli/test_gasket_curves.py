@@ -27,6 +27,7 @@ def drawing(**changes):
     return f"about: test\nmeridian:\n{meridian}rubber: {numbers['rubber']}\n"
 
 
+@pytest.mark.slow
 def test_curves_of_a_drawing_give_a_machine_that_spins(wm_drake):
     ended = wm_drake("gasket", "curves", "folded", *SMALL, "--out", "out")
     assert ended.code == 0, ended.err

@@ -7,8 +7,8 @@ from pydrake.autodiffutils import ExtractGradient, ExtractValue, InitializeAutoD
 from scipy.spatial.transform import Rotation
 
 from wm_drake.compiler.compilation import generic
+from wm_drake.elements.bearing import DRUM_BEARING_NUMBERS, evaluate_drum_bearing
 from wm_drake.elements.bearing import FORCE_SIZE as BEARING_FORCE_SIZE
-from wm_drake.elements.bearing import evaluate_drum_bearing
 from wm_drake.elements.bushing import (
     SixComponentBushingParameters,
     evaluate_six_component_bushing,
@@ -64,12 +64,15 @@ def telescope(name):
 
 
 # element -> packed numbers, function, trees of the plant, own forces, states
+LOOSE = DRUM_BEARING_NUMBERS.pack(
+    clearance=2e-4, contact_stiffness=1e5, contact_damping=50.0, bushing=PLACED.packed()
+)
 ELEMENTS = {
     "spring, number": (spring(5e3), evaluate_spring_strut, 1, 1, 0),
     "spring, table": (spring(ForceTable(**LINEAR_TABLE)), evaluate_spring_strut, 1, 1, 0),
     "spring, nearly slack": (spring(5e3, taut_from=300.0), evaluate_spring_strut, 1, 1, 0),
     "bushing": (PLACED.packed(), evaluate_six_component_bushing, 1, 6, 0),
-    "bearing": (PLACED.packed(), evaluate_drum_bearing, 2, BEARING_FORCE_SIZE, 0),
+    "bearing": (LOOSE, evaluate_drum_bearing, 2, BEARING_FORCE_SIZE, 0),
     "telescopic damper": (telescope("mstv"), evaluate_telescopic_damper, 2, FORCE_SIZE, 1),
 } | {
     f"damper, {name}": (damper(name), evaluate_friction_damper, 1, 1, int(entry.has_sponge))

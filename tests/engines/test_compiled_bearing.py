@@ -43,6 +43,7 @@ def test_they_agree_in_and_beyond_a_clearance():
     assert difference(build_machine(with_bearing(load_machine("reference"), **LOOSE))) < 1e-10
 
 
+@pytest.mark.slow
 def test_a_drum_that_hits_its_bearing_moves_as_in_drake():
     machine = build_machine(with_bearing(load_machine("reference"), step=1e-4, **LOOSE))
     case = Case("two", LOAD, SpinProfile(time=(0.0, 0.301, 1.0), speed=(8.0, 30.0, 60.0)))

@@ -79,6 +79,7 @@ def at(result, name, time):
     return result[name][np.searchsorted(result["time"], time + 1e-9) - 1]
 
 
+@pytest.mark.slow
 def test_validator_has_nothing_to_say(fmu):
     from fmpy.validation import validate_fmu
 

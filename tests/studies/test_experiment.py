@@ -4,6 +4,7 @@ import gc
 import tracemalloc
 
 import numpy as np
+import pytest
 import xarray as xr
 from made_up_runs import made_up
 
@@ -82,6 +83,7 @@ def test_changes_that_machine_or_step_refuse_are_left_out(machine):
     assert allowed["good"].gasket.damping_x == 20.0
 
 
+@pytest.mark.slow
 def test_what_is_kept_of_a_run_are_its_numbers(machine, reference, tmp_path):
     """Compare the memory of three times as many runs; a machine alone takes 4.6 kB."""
     count, grown = KEPT_NUMBERS + 200, []

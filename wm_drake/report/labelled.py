@@ -149,7 +149,9 @@ def _rows(data: xr.Dataset) -> pd.DataFrame:
     names = [*(name for name in dict.fromkeys(labels) if name in data.coords), *data]
     columns = {name: _values_everywhere(_in_reading_unit(data[name]), data) for name in names}
     frame = pd.DataFrame(columns)  # many times as fast as `Dataset.to_dataframe`
-    return frame.dropna(how="all", subset=list(data.data_vars)).reset_index(drop=True)
+    others = (name for name in data.coords if name not in data.dims)
+    numbers = [name for name in others if data[name].dtype.kind in NUMBERS]
+    return frame.dropna(how="all", subset=[*data.data_vars, *numbers]).reset_index(drop=True)
 
 
 def _values_everywhere(array: xr.DataArray, data: xr.Dataset) -> np.ndarray:

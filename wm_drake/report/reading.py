@@ -8,8 +8,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
-from wm_drake.parameters.units import Unit
+if TYPE_CHECKING:  # slow to import, and not needed for declarations of options
+    from wm_drake.parameters.units import Unit
 
 SI, US = "si", "us"
 
@@ -49,14 +51,14 @@ _CUSTOMARY = {
 """US units of units for reading; all others are the same in both: s, Hz, rpm, deg, W, %."""
 
 
-def reading_unit(unit: Unit) -> Unit:
+def reading_unit(unit: "Unit") -> "Unit":
     """Return a unit with the display unit in which results are read."""
     if READING.get() == SI:
         return unit
     return replace(unit, shown=_CUSTOMARY.get(unit.shown, unit.shown))
 
 
-def finer_decimals(unit: Unit, decimals: int) -> int:
+def finer_decimals(unit: "Unit", decimals: int) -> int:
     """Return the decimals of a number in the unit in which it is read, for the same digits.
 
     Args:

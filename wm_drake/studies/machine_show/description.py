@@ -53,7 +53,7 @@ from wm_drake.studies.machine_show.elements import (
     TelescopicDamper,
     Vector,
 )
-from wm_drake.studies.modes.natural import natural_modes
+from wm_drake.studies.modes.linearisation import MODES, Linearisation
 
 VERSION = "wm_drake machine description 3"
 """Name and version of the format. In version 2 springs could not go slack; version 1 had no key
@@ -268,7 +268,8 @@ def describe(machine: AnyMachine) -> dict[str, Any]:
 
 def description_of(machine: Machine) -> Description:
     """Return the description of a machine at rest as an object."""
-    setup, modes = machine.set_up(), natural_modes(machine)
+    setup = machine.set_up()
+    modes = Linearisation(machine.set_up(dampers=False)).spectrum().first(MODES)
     parameters, bodies = setup.parameters, _bodies(setup)
     cabinet, motor = parameters.cabinet, setup.motor
     return Description(
@@ -303,8 +304,8 @@ def description_of(machine: Machine) -> Description:
         equilibrium_residual=Residual(
             moment_Nm=setup.residual[:3].tolist(), force_N=setup.residual[3:].tolist()
         ),
-        natural_frequencies_hz=modes.frequency.values.tolist(),
-        mode_damping_ratios=modes.damping_ratio.values.tolist(),
+        natural_frequencies_hz=modes.frequency_hz.tolist(),
+        mode_damping_ratios=modes.damping_ratio.tolist(),
         elements={name: OtherElement.of(setup, name) for name in setup.elements.others},
     )
 
