@@ -19,6 +19,11 @@ from wm_drake.studio.machines import OpenMachine
 
 pytestmark = [pytest.mark.browser]
 
+MACHINES = [  # a minute or two each
+    pytest.param(name, marks=pytest.mark.slow if name == "reference" else pytest.mark.hours)
+    for name in sorted(shipped_machines())
+]
+
 DISPLACEMENT, AMPLITUDE, GAP = 1e-6, 1e-3, 1e-4
 """Accuracies: of displacements before the filter, relative to the largest; of amplitudes, relative;
 of the gap [m]."""
@@ -110,8 +115,7 @@ def check_equal(browser, data, machine, scene, load, changes=(), parameters=None
         assert abs(gap - smallest.distance) <= GAP
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", sorted(shipped_machines()))
+@pytest.mark.parametrize("name", MACHINES)
 def test_numbers_are_those_of_spin_after_each_slider_was_moved(browser, tmp_path, name):
     parameters = wm.load_machine(name)
     path = tmp_path / "machine.html"
