@@ -6,7 +6,7 @@ them; it declares no class of its own.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
@@ -187,6 +187,22 @@ class Answer(Result):
     def failures(self) -> tuple[str, ...]:
         """Return the lines for which the exit code is 1."""
         return self.diverged
+
+
+def pictures_first(parts: Sequence[Part]) -> tuple[Part, ...]:
+    """Return parts in which all pictures stand before all tables; one with both becomes two."""
+    pictures, others = list[Part](), list[Part]()
+    for part in parts:
+        plots = tuple(one for one in part.shown if isinstance(one, Plot))
+        tables = tuple(part.tables)
+        if plots:
+            pictures.append(replace(part, shown=plots))
+            if tables:
+                stem = part.heading.partition(":")[0]
+                others.append(Part(f"{stem} in numbers", tables))
+        else:
+            others.append(part)
+    return (*pictures, *others)
 
 
 def diverged_runs(runs: xr.Dataset) -> tuple[str, ...]:

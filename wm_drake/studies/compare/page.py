@@ -13,7 +13,7 @@ from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.quantity import SPEED, TIME, Quantity, quantity_of, shown, text_of
 from wm_drake.simulation.displacements import band_of
 from wm_drake.simulation.netcdf import netcdf_bytes
-from wm_drake.studies.answer import Answer, Part, Plot
+from wm_drake.studies.answer import Answer, Part, Plot, pictures_first
 from wm_drake.studies.compare.pairs import QUANTITIES, Pair, gravity_warnings
 from wm_drake.studies.compare.study import (
     CONFIDENCE,
@@ -68,7 +68,7 @@ def compare_answer(
         f"{parameters.name}: recorded and computed",
         summary(agreement, len(pairs)),
         parameters,
-        tuple(parts),
+        pictures_first(parts),
         (("Records", records), *details, ("Pass band", f"{low:g} to {high:.3g} Hz")),
         METHOD,
         files={"signals.nc": netcdf_bytes(_signals(pairs, sensors))},

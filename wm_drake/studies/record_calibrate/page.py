@@ -11,7 +11,7 @@ from wm_drake.report import figure as fig
 from wm_drake.report.formatting import listed
 from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.quantity import Quantity
-from wm_drake.studies.answer import Answer, Part, Plot
+from wm_drake.studies.answer import Answer, Part, Plot, pictures_first
 from wm_drake.studies.compare.pairs import QUANTITIES, Pair
 from wm_drake.studies.fitting.fit import Fit, verdict_of
 from wm_drake.studies.fitting.page import fit_parts, search_facts
@@ -39,7 +39,7 @@ def record_calibrate_answer(model: RecordModel, fit: Fit, data: xr.Dataset) -> A
         f"Machine {parameters.name} calibrated to records",
         summary(fit, data, model.pairs),
         parameters,
-        (*parts, _residuals(data), _errors(data), search, values, *others),
+        pictures_first([*parts, _residuals(data), _errors(data), search, values, *others]),
         (("Records", files), ("Load", model.case.name), ("Fitted", model.by), *search_facts(fit)),
         files={"calibrated.yaml": machine_yaml(machine)},
         warned=tuple(warnings_of(fit, data)),
