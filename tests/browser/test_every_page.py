@@ -17,7 +17,7 @@ A4 = 688
 """Width of A4 between its margins. [pixels]"""
 
 
-MOST_SHEETS = 13
+MOST_SHEETS = 12
 """Largest number of sheets of a page as it opens."""
 
 

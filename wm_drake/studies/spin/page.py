@@ -190,7 +190,7 @@ def _measure_parts(runs: SpinRuns, amplitudes: xr.Dataset) -> list[Part]:
         feet,
         drive,
         Part("Amplitudes", amplitude_tables(runs, amplitudes)),
-        Part("Sensors", (sensors_table(runs),)),
+        Part("Sensors", (sensors_table(runs),), is_folded=True),
         Part("Smallest gap", (gaps_table(gaps),)),
         Part("Detergent box and gasket", (largest_table(runs),)),
         Part("Mounts", (_mounts_table(runs),), is_folded=True),
