@@ -99,7 +99,7 @@ class StudyTarget(ResponseTarget):
 
     @property
     def of(self) -> str:
-        """What the value belongs to, for tables."""
+        """Return what the value belongs to, for tables."""
         if not self.factor:
             return "design"
         return f"{self.factor} at {self.level}" if self.level is not None else self.factor

@@ -79,7 +79,7 @@ def test_a_planted_friction_is_found(calibrate, by):
 
 
 def test_a_wrong_structure_is_called_wrong(calibrate):
-    """The springs are half as stiff again, and only the friction of the dampers may change."""
+    """Plant springs that are half as stiff again; free the friction of the dampers only."""
     springs = load_machine("reference").spring_types
     changes = {f"spring_types.{n}.stiffness": 1.5 * s.stiffness for n, s in springs.items()}
     result = calibrate(plant(changes), "--unknown", FRICTION)

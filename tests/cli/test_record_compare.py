@@ -105,7 +105,7 @@ def test_exact_signals_agree_in_every_region_through_every_format(compare, labor
 
 
 def test_without_gravity_in_the_model_the_slow_regions_are_wrong(compare, laboratory):
-    """The planted gravity is seen: without it in the model, errors are of some percent."""
+    """Leave the planted gravity out of the model: errors are of some percent."""
     time, channels, rpm = laboratory
     write_csv("run.csv", time, {**channels, "Drum": (rpm, "rpm")})
     write_test(gravity=("axis: x}", "axis: x, gravity: removed}"))
@@ -162,7 +162,7 @@ def test_repeats_have_a_scatter_and_the_difference_is_named(compare, laboratory)
 
 
 def test_the_recorded_speed_drives_the_model(compare, laboratory):
-    """The machine did not follow the named profile: refused, and right with its own speed."""
+    """Refuse a named profile that the machine did not follow; agree with its own speed."""
     time, channels, rpm = laboratory
     write_csv("run.csv", time, {**channels, "Drum": (rpm, "rpm")})
     Path("other.yaml").write_text("{time: '(0, 60) s', speed: '(0, 200) rpm'}")

@@ -64,7 +64,7 @@ class ResponseTarget:
 
     @property
     def of(self) -> str:
-        """What the value belongs to, for tables."""
+        """Return what the value belongs to, for tables."""
         return MACHINE
 
     @property

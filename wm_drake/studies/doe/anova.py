@@ -145,7 +145,7 @@ class SumCoding:
 
     @functools.cached_property
     def inverse(self) -> FloatArray:
-        """The pseudoinverse of the columns, which all responses share."""
+        """Return the pseudoinverse of the columns, which all responses share."""
         return np.asarray(np.linalg.pinv(self.matrix))
 
     @functools.cached_property
