@@ -118,6 +118,7 @@ class Descent:
         near: Distance from a bound, as a part of the range, within which an unknown has hit it.
         difference: Step of the central differences of the assessment, as a part of the range; None
             for those of the search.
+        most: Evaluations of the rows at most, without those of derivatives.
     """
 
     steps: tuple[float, ...]
@@ -128,6 +129,7 @@ class Descent:
     gradient: float
     near: float
     difference: float | None
+    most: int = 60
 
 
 SMOOTH = Descent((1e-5,), 0.5, 1e-4, 1e-9, 1e-9, 1e-14, 1e-3, 1e-3)
