@@ -208,14 +208,14 @@ class RecordModel:
         return [[self._computed(block, point) for block in self.blocks] for point in points]
 
     def _computed(self, block: Block, point: FloatArray) -> FloatArray:
-        gains = self._sensors_at(point)[:, 0]
+        runs = [self._runs[self._key(block.load, pair, point)] for pair in block.pairs]
+        if any(np.isnan(signals[0]).any() for signals in runs):
+            return np.full(block.measured.shape, np.nan)
         each = [
             np.stack([self._columns[key] for key in self._keys(block.load, pair, point)], axis=1)
             for pair in block.pairs
         ]
-        if not all(np.isfinite(of_pair[block.valid]).all() for of_pair in each[:1]):
-            return np.full(block.measured.shape, np.nan)
-        return mean_of(np.stack(each)) * gains
+        return mean_of(np.stack(each)) * self._sensors_at(point)[:, 0]
 
     def _sensors_at(self, point: FloatArray) -> FloatArray:
         """Return gain and both angles of each sensor at a point (k, 3)."""

@@ -68,7 +68,7 @@ def in_pieces(signals: FloatArray, change: Signals) -> FloatArray:
     groups: dict[bytes, list[int]] = {}
     for k, mask in enumerate(np.isfinite(signals).T):
         groups.setdefault(mask.tobytes(), []).append(k)
-    for columns in groups.values():
+    for columns in map(np.array, groups.values()):
         valid = np.flatnonzero(np.isfinite(signals[:, columns[0]]))
         for piece in np.split(valid, np.flatnonzero(np.diff(valid) > 1) + 1):
             if len(piece) >= LEAST_PIECE:
