@@ -143,17 +143,17 @@ class RecordModel:
     @cached_property
     def _of_recordings(self) -> tuple[Unknown, ...]:
         """Offset and rate of the clock of each recording, and the angle at its start."""
-        found, names = [], [pair.recording.path.name for pair in self.pairs]
+        unknowns, names = [], [pair.recording.path.name for pair in self.pairs]
         for number, pair in enumerate(self.pairs, 1):
             name, at = names[number - 1], pair.alignment
             name = name if names.count(name) == 1 else f"{name} ({number})"
             offset, rate = max(at.offset_sd, OFFSET_SD), max(at.rate_sd, RATE_SD)
-            found.append(_nuisance(f"clock of {name}", 0.0, offset, OFFSET.unit))
-            found.append(_nuisance(f"clock rate of {name}", 0.0, rate, RATE.unit))
+            unknowns.append(_nuisance(f"clock of {name}", 0.0, offset, OFFSET.unit))
+            unknowns.append(_nuisance(f"clock rate of {name}", 0.0, rate, RATE.unit))
             if self.by == "history":
                 start = float(order_one(pair).start)
-                found.append(_nuisance(f"drum angle of {name}", start, ANGLE_SD, PHASE.unit))
-        return tuple(found)
+                unknowns.append(_nuisance(f"drum angle of {name}", start, ANGLE_SD, PHASE.unit))
+        return tuple(unknowns)
 
     @cached_property
     def blocks(self) -> tuple[Block, ...]:
@@ -231,8 +231,8 @@ class RecordModel:
 
     def _reduce(self, load: RecordedLoad, pair: Pair, points: FloatArray) -> None:
         """Keep what is fitted of the signals of a recording at points, all new ones at once."""
-        wanted = dict.fromkeys(key for point in points for key in self._keys(load, pair, point))
-        new = [key for key in wanted if key not in self._columns]
+        needed = dict.fromkeys(key for point in points for key in self._keys(load, pair, point))
+        new = [key for key in needed if key not in self._columns]
         if not new:
             return
         time = pair.run.time.values
@@ -260,7 +260,7 @@ class RecordModel:
     def _run(self, points: FloatArray) -> None:
         """Run what is not kept of points, and keep the signals (n, k, 3), NaN of failed runs."""
         cases: dict[RunKey, Case] = {}
-        wanted = {
+        needed = {
             self._key(load, pair, point): (load, pair, point)
             for point in points
             for load in self.loads
@@ -269,7 +269,7 @@ class RecordModel:
         if len(self._runs) > KEPT_RUNS or len(self._columns) > KEPT_COLUMNS:
             self._runs.clear()
             self._columns.clear()
-        for key, (load, pair, point) in wanted.items():
+        for key, (load, pair, point) in needed.items():
             if key in self._runs:
                 continue
             self._runs[key] = np.full((len(pair.run.time), len(self.sensors), 3), np.nan)

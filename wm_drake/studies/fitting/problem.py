@@ -234,10 +234,10 @@ class FitProblem:
     def evaluated(self, coordinates: FloatArray) -> "Rows":
         """Return the rows at points (k, p)."""
         model = self.values(coordinates)
-        beside = [part for part in (model.wished, model.known) if part is not None]
-        beside.append(coordinates[:, self.has_prior])
+        others = [part for part in (model.wished, model.known) if part is not None]
+        others.append(coordinates[:, self.has_prior])
         exact, smooth = (
-            np.hstack([self._misfits(values), *beside])
+            np.hstack([self._misfits(values), *others])
             for values in (model.values, model.values if model.smooth is None else model.smooth)
         )
         failed = np.ones(exact.shape[1])
