@@ -41,6 +41,7 @@ from wm_drake.simulation.mount_histories import measure_mounts_lanes
 from wm_drake.simulation.mounts import mount_names, sums_size
 from wm_drake.simulation.records import Record, as_record
 from wm_drake.simulation.spring_tension import tensions_at
+from wm_drake.simulation.stops import approaches
 
 _NONE = np.empty(0, dtype=np.int64)
 """No indices."""
@@ -456,6 +457,10 @@ class LaneRun(Run):
     @property
     def smallest_elongations(self) -> FloatArray:
         return self._springs[1]
+
+    @property
+    def approaches(self) -> tuple[FloatArray, FloatArray]:
+        return approaches(self.item.numbers.setup, self._samples(slice(STATE_SIZE)))
 
     @property
     def diverged(self) -> str:

@@ -34,6 +34,7 @@ _VARIABLES: dict[Need, tuple[str, ...]] = {
     "mounts": ("mount_force", "cabinet_force", "cabinet_moment"),
     "feet": ("cabinet_force", "cabinet_moment"),
     "springs": ("spring_tension",),
+    "stops": ("stop_compression", "stop_closing_velocity"),
 }
 """Variables of a record that hold what a measure needs."""
 
@@ -205,7 +206,7 @@ class RecordedRun(Run):
     @functools.cached_property
     def labels(self) -> dict[str, list[str]]:
         """Return the labels along each dimension of a measure."""
-        dims = ("sensor", "spring", "mount", "accelerometer")
+        dims = ("sensor", "spring", "mount", "accelerometer", "stop")
         parts = speed_ranges(self.record, self.profile)
         return {
             "axis": list(AXES),
@@ -306,6 +307,10 @@ class RecordedRun(Run):
     @property
     def smallest_elongations(self) -> FloatArray:
         return np.full(self._values["spring_tension"].shape[1], np.nan)  # no record has lengths
+
+    @property
+    def approaches(self) -> tuple[FloatArray, FloatArray]:
+        return self._values["stop_compression"], self._values["stop_closing_velocity"]
 
 
 def wrenches_on_cabinet(record: Record) -> FloatArray:

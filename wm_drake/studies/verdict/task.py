@@ -10,6 +10,7 @@ from wm_drake.model.sdf_names import sdf_names
 from wm_drake.parameters import with_values
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.measures.responses import GAP, has_gap, known_responses, measures_of
+from wm_drake.simulation.measures.stops import STOPS
 from wm_drake.studies.answer import Answer
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.experiment import Experiment
@@ -56,6 +57,7 @@ class VerdictTask(Task):
         known = known_responses(full, profile_of(full, options.profile))
         self.responses = tuple(r for r in known if r.group in SHOWN_GROUPS or r.name == GAP)
         measures = {*measures_of(full, self.responses), CONTACTS}
+        measures |= {STOPS.name} if STOPS.applies(full) else set()
         self.measures = tuple(name for name in MEASURES if name in measures)
 
     @property
