@@ -122,6 +122,13 @@ def export_page(
         parameters = parameters.model_copy(update={"loads": chosen})
     if not parameters.loads:
         raise input_error("the machine has no load, so there is nothing to run", key="loads")
+    for name, load in parameters.loads.items():
+        if load.wet:
+            raise input_error(
+                "its water leaves during a run, which the functions of a page do not follow; name "
+                "other loads by --load, or leave water out",
+                key=f"loads.{name}",
+            )
     path = Path(out)
     _check_place(path)
     notice_jumping_friction(parameters)

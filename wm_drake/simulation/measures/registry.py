@@ -20,6 +20,7 @@ SHIPPED = (
     "springs:TENSIONS",
     "radial:RADIAL",
     "stops:STOPS",
+    "water:WATER",
 )
 """Measures of this package: module of this folder, and name. Files of results have their order."""
 

@@ -182,3 +182,8 @@ class Run(ABC):
 
         (n, stops) [m, m/s]
         """
+
+    @property
+    @abstractmethod
+    def mass_left(self) -> FloatArray:
+        """Return the mass of the load with the water left in it. (n,) [kg]"""
