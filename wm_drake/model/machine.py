@@ -130,10 +130,22 @@ class Setup:
         Args:
             ahead: Time for which to look ahead; half the time until the next call makes the error
                 of the masses of second order in that time. [s]
+
+        Raises:
+            InputError: the load has more wet masses than any load of the built machine.
         """
-        water = self.machine.water
-        if water is None or self.load is None or self.drum is None or not self.load.wet:
+        water, wet = self.machine.water, len(self.load.wet) if self.load else 0
+        if not wet:
             return
+        if water is None or wet > water.count:
+            raise input_error(
+                f"this load has {wet} masses with water; those of the built machine have at most "
+                f"{water.count if water else 0}: add the load to those of the machine, and build "
+                "it again, or use the compiled engine",
+                key="loads",
+            )
+        assert self.load is not None
+        assert self.drum is not None  # the systems have been set
         context = water.GetMyContextFromRoot(self.context)
         left = context.get_continuous_state_vector().CopyToVector()
         if ahead:
@@ -442,18 +454,7 @@ class MachineSystems:
             add_load(self.plant, plant_context, Load(unbalances=(imbalance,)))
 
     def _set_water(self, context: Context, load: Load | None) -> None:
-        """Set the wet masses of a load in a root Context, with all their water.
-
-        Raises:
-            InputError: it has more wet masses than any load of the machine.
-        """
-        count, wet = self.water.count if self.water else 0, load.wet if load else ()
-        if len(wet) > count:
-            raise input_error(
-                f"this load has {len(wet)} masses with water; those of the built machine have at "
-                f"most {count}: add the load to those of the machine, and build it again",
-                key="loads",
-            )
+        """Set the wet masses of a load in a root Context, with all their water."""
         if self.water is not None:
             packed = packed_water(load) if load else []
             self.water.set_load(self.water.GetMyContextFromRoot(context), packed)

@@ -324,6 +324,7 @@ class Study:
 SHIPPED = (
     "balancer.options:BALANCER",
     "calibrate.options:CALIBRATE",
+    "cycle.options:CYCLE",
     "design.options:DESIGN",
     "drive.options:DRIVE",
     "gasket.options:GASKET",

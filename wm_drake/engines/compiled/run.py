@@ -109,7 +109,7 @@ def integrate_runs(
     Yields:
         The fraction done, after each `PAUSE_STEPS` steps.
     """
-    advance = _advance(schedule, one_derivative, layout, lanes)
+    advance = advance_of(schedule, one_derivative, layout, lanes)
     by_sample = lanes.samples.reshape(len(schedule.time), -1, WIDTH)
     done, steps, last, diverged = 0, len(schedule.step), 0, False
     while done < steps and not diverged:
@@ -121,7 +121,7 @@ def integrate_runs(
     by_sample[last + 1 :] = float("nan")
 
 
-def _advance(
+def advance_of(
     schedule: Schedule, one_derivative: np.ndarray, layout: Layout, lanes: RunLanes
 ) -> Callable[[int, int], None]:
     """Return the function that integrates from one number of a step to another.
