@@ -27,9 +27,9 @@ def approaches(setup: Setup, states: FloatArray) -> tuple[FloatArray, FloatArray
         Compression of each stop, below 0 where the tub does not touch it, and its rate.
         (n, stops) [m, m/s]
     """
-    motion = generic(tub_motion)(states.T)
     names = stop_names(setup.parameters)
     answer = np.empty((2, len(states), len(names)))
+    motion = generic(tub_motion)(states.T) if names else None
     for column, name in enumerate(names):
         numbers = NUMBERS.unpack(setup.elements.others[name].packed_numbers)
         answer[:, :, column] = generic(stop_approach)(motion, numbers)[2:]

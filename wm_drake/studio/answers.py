@@ -59,10 +59,12 @@ MICRO, MILLI = 1e-6, 1e-3
 """Displacements are sent in whole micrometres, times in whole milliseconds."""
 
 
-def shown_measures() -> tuple[str, ...]:
-    """Return the names of the measures of which the page shows a variable."""
+def shown_measures(parameters: MachineParameters) -> tuple[str, ...]:
+    """Return the names of the measures of a machine of which the page shows a variable."""
     shown = [
-        one.name for one in MEASURES.values() if any(v.studio is not None for v in one.variables)
+        one.name
+        for one in MEASURES.values()
+        if one.applies(parameters) and any(v.studio is not None for v in one.variables)
     ]
     return (*FIRST, *(name for name in shown if name not in FIRST))
 
@@ -74,7 +76,7 @@ def picture_runner_of(machine: OpenMachine) -> Runner:
 
 def runner_of(machine: OpenMachine) -> Runner:
     """Return the runner of the numbers of a machine: the first run of a batch has a history."""
-    return Runner(machine.parameters, shown_measures(), histories={0})
+    return Runner(machine.parameters, shown_measures(machine.parameters), histories={0})
 
 
 def picture(machine: OpenMachine, runner: Runner, state: PageState) -> dict[str, Any]:
@@ -222,7 +224,7 @@ def _rows_of(machine: OpenMachine, run: RunResult) -> list[dict[str, Any]]:
     """Return the rows of the table of measures, in units for reading."""
     return [
         row
-        for name in shown_measures()
+        for name in shown_measures(machine.parameters)
         for variable in MEASURES[name].variables
         if variable.studio is not None
         for row in _rows(machine, run, variable)
