@@ -6,16 +6,16 @@ import xarray as xr
 from wm_drake.parameters import MachineParameters
 from wm_drake.report import figure as fig
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import TIME, Quantity, quantity_of, shown, text_of
+from wm_drake.report.quantity import STEP, TIME, Quantity, quantity_of, shown, text_of
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.answer import Answer, Part, Plot
 
 HOW = (
     "Each point stands for {window}: mean speed, extremes of the rest. Amplitude: half of the "
-    "distance from the smallest to the largest displacement at a sensor. Unbalance: mass times "
-    "distance from the drum axis, of all masses of the load with the water left in them and of the "
-    "empty drum. Loads of the feet: a rigid cabinet that stands fast on a rigid floor, with its "
-    "weight."
+    "distance from the smallest to the largest displacement at a sensor. Unbalance (static): mass "
+    "times distance from the drum axis, of all masses of the load with the water left in them and "
+    "of the empty drum. Loads of the feet: a rigid cabinet that stands fast on a rigid floor, with "
+    "its weight."
 )
 
 
@@ -41,12 +41,29 @@ def cycle_answer(
         summary(case, course),
         parameters,
         (
-            Part("The cycle", (course_plot(course), LabelledTable("course", course))),
+            Part("The cycle", (course_plot(course), _course_table(course))),
             Part("Parts of the cycle", (table,)),
         ),
-        (("Load", case.name), ("Duration of the cycle", TIME.text(case.profile.duration))),
+        (
+            ("Load", case.name),
+            ("Duration of the cycle", TIME.text(case.profile.duration)),
+            ("Integration", _integration(course)),
+        ),
         diverged=diverged,
     )
+
+
+def _integration(course: xr.Dataset) -> str:
+    """Return how the cycle was integrated."""
+    how = course.attrs
+    step, period = STEP.text(how["step"]), STEP.text(how["period"])
+    return f"{how['integrator']}, steps of {step}, samples every {period}"
+
+
+def _course_table(course: xr.Dataset) -> LabelledTable:
+    """Return the course for a file."""
+    words = {name: f"amplitude {name}" for name in course.sensor.values.tolist()}
+    return LabelledTable("course", course, across="sensor", words=words, is_in_json=False)
 
 
 def summary(case: Case, course: xr.Dataset) -> str:
@@ -55,7 +72,7 @@ def summary(case: Case, course: xr.Dataset) -> str:
     text = f"Load {case.name} has {text_of(first.mass)} at the start"
     if first.mass > last.mass:
         text += (
-            f" and {text_of(last.mass)} at the end; its static unbalance goes from "
+            f" and {text_of(last.mass)} at the end; its unbalance goes from "
             f"{text_of(first.unbalance)} to {text_of(last.unbalance)}"
         )
     largest = course.isel(course.amplitude.argmax(...))
@@ -87,6 +104,7 @@ def course_plot(course: xr.Dataset) -> Plot:
     time = shown(course.time)
     panels = [
         _panel(course, time, ("drum_speed",)),
+        _panel(course, time, ("mass",), from_zero=True),
         _panel(course, time, ("unbalance",), from_zero=True),
         _amplitudes(course, time),
     ]
@@ -119,7 +137,7 @@ def _panel(
         fig.Line(time, shown(course[name]), color=color, key=_key(course[name], names))
         for name, color in zip(names, fig.COLOURS, strict=False)
     )
-    y = fig.Axis(label=quantity.label, range=(0.0, None) if from_zero else None)
+    y = fig.Axis(label=quantity.label, range=(0.0 if from_zero else None, None))
     x = fig.Axis(label=TIME.label, range=(0.0, float(time[-1])))
     return fig.Panel(name=quantity.words, marks=marks, x=x, y=y)
 

@@ -36,7 +36,7 @@ WINDOWS_OF_PIECE = 20
 """Windows that are computed at a time: some MB of samples."""
 
 MASS = Quantity("mass of the load", Unit("kg", "kg"), 2)
-UNBALANCE = Quantity("static unbalance", Unit("kg*m", "g*m"), 0)
+UNBALANCE = Quantity("unbalance", Unit("kg*m", "g*m"), 0)
 AMPLITUDE = Quantity("amplitude", Unit("m", "mm"), 1)
 GAP = Quantity("smallest gap", Unit("m", "mm"), 1)
 FOOT = Quantity("load of a foot", Unit("N", "N"), 0)
@@ -145,7 +145,8 @@ def course_of(machine: Machine, case: Case, scene: Scene | None = None) -> xr.Da
         static `unbalance` at the end of the window, `amplitude` of each sensor, half of the
         distance from the smallest to the largest displacement, smallest `gap`; with a fixed
         cabinet smallest and largest load of a foot, `foot_smallest` and `foot_largest`, and largest
-        force along the floor, `sideways`. Attribute `diverged`: why it stopped early; "" if not.
+        force along the floor, `sideways`. Attributes `diverged`: why it stopped early, "" if it did
+        not; `integrator`; `step` and `period`, time between samples [s].
     """
     profile, parameters = case.profile, machine.parameters
     empty = machine.set_up(gasket=case.gasket)
@@ -161,7 +162,8 @@ def course_of(machine: Machine, case: Case, scene: Scene | None = None) -> xr.Da
             courses.append(measured(piece))
         diverged = piece.divergence.reason if piece.divergence else ""
     course = xr.concat(courses, "time", combine_attrs="override")
-    return course.assign_attrs(diverged=diverged)
+    how = {"integrator": stepping.integrator, "step": stepping.step, "period": period}
+    return course.assign_attrs(diverged=diverged, **how)
 
 
 def _ahead(pieces: Iterator[Trajectory]) -> Iterator[Trajectory]:
@@ -173,6 +175,19 @@ def _ahead(pieces: Iterator[Trajectory]) -> Iterator[Trajectory]:
             yield piece
 
 
+OF_PART = {
+    "drum_speed": (SPEED.named("highest speed"), lambda values: np.abs(values).max()),
+    "mass": (MASS.named("mass at the end"), lambda values: values[-1]),
+    "unbalance": (UNBALANCE.named("unbalance at the end"), lambda values: values[-1]),
+    "amplitude": (AMPLITUDE.named("largest amplitude"), np.max),
+    "gap": (GAP, np.min),
+    "foot_smallest": (FOOT.named("smallest load of a foot"), np.min),
+    "foot_largest": (FOOT.named("largest load of a foot"), np.max),
+    "sideways": (SLIDING, np.max),
+}
+"""What is shown of each part of a cycle: quantity, and function of the values in its windows."""
+
+
 def parts_of(course: xr.Dataset, case: Case) -> xr.Dataset:
     """Return the extremes in each region of the profile, over `part`; the whole cycle without any.
 
@@ -181,37 +196,11 @@ def parts_of(course: xr.Dataset, case: Case) -> xr.Dataset:
     """
     regions = [(r.name, r.begin, r.end) for r in case.profile.regions]
     regions = regions or [("whole cycle", 0.0, case.profile.duration)]
-    parts, names = list[xr.Dataset](), list[str]()
-    for name, begin, end in regions:
-        inside = course.sel(time=slice(begin, end))
-        if not inside.sizes["time"]:
-            continue
-        names.append(name)
-        parts.append(
-            xr.Dataset(
-                {
-                    "drum_speed": np.abs(inside.drum_speed).max(keep_attrs=True),
-                    "mass": inside.mass[-1],
-                    "unbalance": inside.unbalance[-1],
-                    "amplitude": inside.amplitude.max(keep_attrs=True),
-                    "gap": inside.gap.min(keep_attrs=True),
-                    **{
-                        key: getattr(inside[key], how)(keep_attrs=True)
-                        for key, how in FLOOR.items()
-                        if key in inside
-                    },
-                }
-            ).drop_vars("time", errors="ignore")
-        )
-    of_parts = xr.concat(parts, xr.Variable("part", names), combine_attrs="override")
-    words = {"drum_speed": "highest speed", "mass": "mass at the end", "unbalance": "at the end"}
-    words["amplitude"] = "largest amplitude"
-    for key, text in words.items():
-        quantity: Quantity = of_parts[key].attrs["quantity"]
-        of_parts[key].attrs = dict(quantity.named(text).attributes())
-    of_parts["unbalance"].attrs = dict(UNBALANCE.named("static unbalance at the end").attributes())
-    return of_parts
-
-
-FLOOR = {"foot_smallest": "min", "foot_largest": "max", "sideways": "max"}
-"""How the loads of the feet are summed up in a part of the cycle."""
+    inside = {name: course.sel(time=slice(begin, end)) for name, begin, end in regions}
+    inside = {name: part for name, part in inside.items() if part.sizes["time"]}
+    shown = {name: OF_PART[name] for name in OF_PART if name in course}
+    values = {
+        name: quantity.variable("part", [of(part[name].values) for part in inside.values()])
+        for name, (quantity, of) in shown.items()
+    }
+    return xr.Dataset(values, {"part": list(inside)})
