@@ -113,12 +113,12 @@ KINDS = {
             ("record", "compare", "recording", "--load", "middle", "--profile", "short_cycle.yaml"),
         ),
     ),
-    "record_calibrate": Kind(
+    "calibrate_records": Kind(
         "sections.html",
         (
             ("spin", "--load", "middle", "--profile", "short_cycle.yaml", "--out", "bench"),
             (
-                "record", "calibrate", "recording", "--load", "middle", "--profile", "short_cycle.yaml",
+                "calibrate", "recording", "--load", "middle", "--profile", "short_cycle.yaml",
                 "--unknown", "damper_types.friction.friction_force",
             ),
         ),

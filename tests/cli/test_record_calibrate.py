@@ -1,4 +1,4 @@
-"""`record calibrate`: planted numbers are recovered, wrong structures are called wrong."""
+"""`calibrate` with records: planted numbers are recovered, wrong structures are called wrong."""
 
 import json
 from pathlib import Path
@@ -57,7 +57,7 @@ def calibrate(wm_drake):
 
     def command(files, *words, code=0):
         ended = wm_drake(
-            "record", "calibrate", *files, "--test", "test.yaml", "--profile", "p.yaml", *words,
+            "calibrate", *files, "--test", "test.yaml", "--profile", "p.yaml", *words,
             "--out", "out", "--overwrite", "--json",
         )  # fmt: skip
         assert ended.code == code, ended.err
@@ -66,7 +66,7 @@ def calibrate(wm_drake):
     return command
 
 
-@pytest.mark.parametrize("by", ["envelope", "order", "rms"])
+@pytest.mark.parametrize("by", ["envelope", "order", "rms", "history"])
 def test_a_planted_friction_is_found(calibrate, by):
     truth = 1.2 * load_machine("reference").damper_types["friction"].friction_force
     result = calibrate(plant({FRICTION: truth}), "--unknown", FRICTION, "--by", by)

@@ -13,15 +13,14 @@ from wm_drake.errors import InputError
 from wm_drake.parameters import SpinProfile, load_machine, with_value
 from wm_drake.parameters.spin import Region
 from wm_drake.parameters.unbalance_cases import load_unbalance_cases
+from wm_drake.studies.fitting.sought import at_point, sought_of
 from wm_drake.studies.spin_cycle.study import labels_of
 from wm_drake.studies.spin_identify.page import warnings_of
 from wm_drake.studies.spin_identify.study import (
     SpinModel,
-    at_point,
     identified_machine,
     identify_from_spin,
     planted_values,
-    sought_of,
     virtual_experiment,
 )
 

@@ -5,7 +5,6 @@ corrected: the prediction has gravity, the axes of the sensors, and what the rec
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -72,13 +71,11 @@ def in_pieces(signals: FloatArray, change: Signals) -> FloatArray:
     return changed
 
 
-def band_passed(pair: Pair, sides: slice = slice(None)) -> FloatArray:
-    """Return measured and predicted signals within the pass band of the run. (2, n, k)
-
-    Args:
-        sides: Which of both.
-    """
-    return np.stack([in_pieces(s, partial(_passed, pair=pair)) for s in pair.both[sides]])
+def band_passed(signals: FloatArray, run: Record) -> FloatArray:
+    """Return signals (n, k) within the pass band of a run."""
+    period = sample_period(run)
+    band = pass_band(profile_of(run), period)
+    return in_pieces(signals, lambda part: filtered(part[:, None], period, band)[:, 0])
 
 
 def envelopes_of(signals: FloatArray, time: FloatArray) -> FloatArray:
@@ -158,7 +155,7 @@ def signals_of(pair: Pair, places: xr.DataArray) -> xr.Dataset:
     """
     run, period = pair.run, sample_period(pair.run)
     time, count = run.time.values, places.size
-    passed = band_passed(pair)
+    passed = np.stack([band_passed(signals, run) for signals in pair.both])
     envelopes = np.stack([envelopes_of(signals, time) for signals in passed])  # source, side
     numbers = _place_numbers(run, places)
     at_places = means_at(envelopes, numbers, count)
@@ -168,7 +165,7 @@ def signals_of(pair: Pair, places: xr.DataArray) -> xr.Dataset:
         in_pieces(s, lambda part: integrated_twice((part - part.mean())[:, None], period)[:, 0])
         for s in pair.both
     ]
-    twice = np.stack([in_pieces(s, partial(_passed, pair=pair)) for s in integrated])
+    twice = np.stack([band_passed(signals, run) for signals in integrated])
     one = order_one(pair)
     turned = one.measured.values * np.conj(one.predicted.values) * np.exp(-1j * one.start.item())
     window = np.searchsorted(time, one.time.values).clip(0, len(time) - 1)
@@ -200,12 +197,6 @@ def signals_of(pair: Pair, places: xr.DataArray) -> xr.Dataset:
     )
 
 
-def _passed(signal: FloatArray, pair: Pair) -> FloatArray:
-    """Return a signal without gaps within the pass band of a run."""
-    period = sample_period(pair.run)
-    return filtered(signal[:, None], period, pass_band(profile_of(pair.run), period))[:, 0]
-
-
 def rms_of(signals: FloatArray, masks: Sequence[np.ndarray]) -> FloatArray:
     """Return the RMS of signals (2, n, k) in regions; NaN if less than half is there. (2, r, k)"""
     rows = []
@@ -228,25 +219,18 @@ def _largest_orders(signals: FloatArray, run: Record) -> FloatArray:
     return np.where(largest >= 0.0, largest, np.nan)
 
 
-def envelope_sizes(passed: FloatArray, run: Record, places: xr.DataArray) -> FloatArray:
-    """Return half the distances between the envelopes of signals at places. (2, places, k)
-
-    Args:
-        passed: As of `band_passed`.
-    """
-    time = run.time.values
-    sides = np.stack([envelopes_of(signals, time) for signals in passed])
-    halves = 0.5 * (sides[:, 0] - sides[:, 1])
-    return means_at(halves, _place_numbers(run, places), places.size)
+def envelope_sizes(signals: FloatArray, run: Record, places: xr.DataArray) -> FloatArray:
+    """Return half the distances between the envelopes of signals (n, k) at places. (places, k)"""
+    upper, lower = envelopes_of(band_passed(signals, run), run.time.values)
+    return means_at(0.5 * (upper - lower), _place_numbers(run, places), places.size)
 
 
-def order_one_sizes(pair: Pair, places: xr.DataArray) -> FloatArray:
-    """Return the sizes of order 1, measured and predicted, at places. (2, places, k)"""
-    one = order_one(pair)
-    time = pair.run.time.values
-    window = np.searchsorted(time, one.time.values).clip(0, len(time) - 1)
-    sizes = np.stack([np.abs(one.measured.values), np.abs(one.predicted.values)])
-    return means_at(sizes, _place_numbers(pair.run, places)[window], places.size)
+def order_one_sizes(signals: FloatArray, run: Record, places: xr.DataArray) -> FloatArray:
+    """Return the sizes of order 1 of signals (n, k) at places. (places, k)"""
+    angle, time = run.drum_angle.values, run.time.values
+    vectors = order_vectors(signals, angle, time, np.array([1.0])).isel(order=0)
+    window = np.searchsorted(time, vectors.time.values).clip(0, len(time) - 1)
+    return means_at(np.abs(vectors.values), _place_numbers(run, places)[window], places.size)
 
 
 def repeats_of(pairs: Sequence[Pair], places: xr.DataArray) -> xr.Dataset:

@@ -11,8 +11,9 @@ from scipy.stats import t as student
 from wm_drake.errors import InputError, Problem
 from wm_drake.parameters.types import FloatArray
 from wm_drake.rigs.measured import MeasuredMotion
-from wm_drake.studies.fitting.assessment import correlation_time, evaluated, left_out_errors
+from wm_drake.studies.fitting.assessment import correlation_time, evaluated
 from wm_drake.studies.fitting.fit import Fit, TestError
+from wm_drake.studies.fitting.left_out import left_out_errors
 from wm_drake.studies.fitting.methods import identify, refined
 from wm_drake.studies.fitting.problem import FitProblem, Progress
 from wm_drake.studies.identify.judgement import LACK, Judgement, judge

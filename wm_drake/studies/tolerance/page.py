@@ -7,8 +7,8 @@ import xarray as xr
 
 from wm_drake.parameters import MachineParameters
 from wm_drake.report.formatting import MISSING, listed
-from wm_drake.report.labelled import LabelledTable, TurnedTable
-from wm_drake.report.quantity import quantity_of, text_of
+from wm_drake.report.labelled import LabelledTable
+from wm_drake.report.quantity import Quantity, quantity_of, text_of
 from wm_drake.studies.answer import Answer, Part, Plot
 from wm_drake.studies.tolerance.figures import distributions_figure, gap_figure, sobol_figure
 from wm_drake.studies.tolerance.study import (
@@ -398,26 +398,30 @@ def _contact(contact: xr.Dataset) -> Part:
     return Part("Contact", tables, rare_sentences(contact))
 
 
-def _statistics(measures: xr.Dataset) -> tuple[TurnedTable, ...]:
+def _statistics(measures: xr.Dataset) -> tuple[LabelledTable, ...]:
     """Return statistics of the measures, and the intervals of the percentiles."""
     statistics = statistics_of(measures)
+    each = {str(name): quantity_of(array) for name, array in statistics.items()}
+    dims = ("quantity", "statistic")
+    values = Quantity("").of_each("quantity", each, dims, list(statistics.values()))
+    lines = xr.Dataset({"value": values}, {"quantity": list(each), **statistics.coords})
     ends = [name for name in statistics["statistic"].values if name not in ("mean", "deviation")]
-    return (
-        TurnedTable(
-            "measures",
-            statistics.sel(statistic=[*STATISTICS]),
-            "Measures of the samples",
-            "Measures over all samples.",
-            words=WORDS,
-            is_in_terminal=True,
-        ),
-        TurnedTable(
-            "percentiles",
-            statistics.sel(statistic=ends),
-            "Percentiles",
-            "Percentiles with 95 % intervals of order statistics.",
-            words=WORDS,
-        ),
+    about = "Percentiles with 95 % intervals of order statistics."
+    texts = {
+        "measures": ([*STATISTICS], "Measures of the samples", "Measures over all samples."),
+        "percentiles": (ends, "Percentiles", about),
+    }
+    return tuple(
+        LabelledTable(
+            name,
+            lines.sel(statistic=chosen),
+            heading,
+            caption,
+            "statistic",
+            words=WORDS | {key: quantity.words for key, quantity in each.items()},
+            is_in_terminal=name == "measures",
+        )
+        for name, (chosen, heading, caption) in texts.items()
     )
 
 
