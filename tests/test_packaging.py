@@ -75,7 +75,7 @@ def test_wheel_holds_the_data_and_nothing_else(wheel):
         ("sdf", "*"),
         ("wm_drake", "data/**/*"),
         ("wm_drake", "export/c/*.c"),
-        ("wm_drake", "studio/static/*"),
+        ("wm_drake", "live/static/*"),
         ("wm_drake", "**/*.py"),
         ("wm_drake", "**/*.html"),
         ("wm_drake", "**/*.js"),

@@ -98,6 +98,9 @@ MEASURED: Any = option(
     "Repeatable. Default: those of the machine file, for its own numbers, loads and profile.",
     "CSV",
 )
+LIVE: Any = option(
+    False, "Let the page run the machine too: folded, with sliders, without a server."
+)
 SEED: Any = option(0, "Seed of all random numbers.", "N", ge=0, le=2**32 - 1)
 
 

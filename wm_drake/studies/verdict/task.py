@@ -1,5 +1,6 @@
 """Check the options of the verdict, and run it."""
 
+from dataclasses import replace
 from typing import Any
 
 from wm_drake.errors import input_error, problems_at
@@ -59,6 +60,14 @@ class VerdictTask(Task):
         measures = {*measures_of(full, self.responses), CONTACTS}
         measures |= {STOPS.name} if STOPS.applies(full) else set()
         self.measures = tuple(name for name in MEASURES if name in measures)
+        self.live = self._live(machine) if options.live else ""
+
+    def _live(self, machine: Machine) -> str:
+        """Return the page that runs the loads of the machine."""
+        from wm_drake.live.exported import page_of_cases  # most verdicts have none
+
+        options = self.options
+        return page_of_cases(machine.parameters, self.cases, options.machine, options.sets)
 
     @property
     def _command(self) -> str:
@@ -102,13 +111,14 @@ class VerdictTask(Task):
             self.laundry.tolerances.about,
             self._command,
         )
-        return verdict_answer(
+        answer = verdict_answer(
             question,
             states_of(base, changed),
             tried,
             laundry_of(samples, self.clearance),
             laundry_masses(samples[0]),
         )
+        return replace(answer, live=self.live)
 
 
 def _length(text: str) -> float:

@@ -9,8 +9,8 @@ from typer.testing import CliRunner
 import wm_drake as wm
 from wm_drake.cli import app
 from wm_drake.errors import InputError
-from wm_drake.studio import exported
-from wm_drake.studio.exported import bundled, export_page
+from wm_drake.live import exported
+from wm_drake.live.exported import bundled, export_page
 
 
 @pytest.mark.parametrize(
