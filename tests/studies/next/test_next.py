@@ -8,9 +8,9 @@ import pytest
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.measures.responses import Response
 from wm_drake.studies.next.measurements import Measurement
+from wm_drake.studies.next.question import Observed, Question
 from wm_drake.studies.next.study import (
     Model,
-    Question,
     model_of,
     pairs_of,
     sequence_of,
@@ -94,7 +94,7 @@ def test_sequence_never_widens_the_interval_and_repeats_nothing():
 def test_singles_are_ranked_and_have_gain_per_cost():
     model = linear_model([1.0], [[1.0], [3.0], [0.1]], costs=[1.0, 10.0, np.nan])
     singles = singles_of(model)
-    assert singles.candidate.values.tolist() == ["m1", "m0", "m2"]
+    assert singles["name"].values.tolist() == ["m1", "m0", "m2"]
     gains = singles.gain.sel(candidate=["m0", "m1"]).values
     widths = [1.0 - np.sqrt(1.0 / 2.0), 1.0 - np.sqrt(1.0 / 10.0)]
     assert gains == pytest.approx(widths, rel=0.02)
@@ -116,8 +116,6 @@ class Made(Question):
     """A question whose machines are functions of the scores."""
 
     def at(self, scores, what):  # noqa: ARG002
-        from wm_drake.studies.next.study import Observed
-
         u = np.asarray(scores)
         answers = np.stack([-(5.0 + u[:, 0] - 2.0 * u[:, 1]), -(6.0 + u[:, 1])], axis=1)
         numbers = np.stack([20.0 + 0.5 * u[:, 1], np.full(len(u), 7.0)], axis=1)
@@ -131,7 +129,9 @@ def test_model_of_made_up_machines_has_their_slopes():
         Measurement("both", "both", 1.0, lambda numbers: accuracy, None),
         Measurement("nothing", "nothing", 1.0, lambda numbers: accuracy[:1], None),
     )
-    question = Made(SimpleNamespace(names=("a", "b")), measurements, (GAP,), ("x", "y"), {})
+    question = Made(
+        SimpleNamespace(names=("a", "b")), measurements, (GAP,), ("x", "y"), {True: None}
+    )
     model = model_of(question, 512, 0)
     assert [m.name for m in model.question.measurements] == ["both"]
     np.testing.assert_allclose(model.slopes, [[-1.0, 2.0], [0.0, -1.0]], atol=1e-12)

@@ -1,12 +1,14 @@
 """Show what to measure next: the answer, its interval after each step, and the candidates."""
 
+from dataclasses import replace
+
 import numpy as np
 import xarray as xr
 
 from wm_drake.report import figure as fig
 from wm_drake.report.formatting import listed
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import Quantity, quantity_of
+from wm_drake.report.quantity import quantity_of
 from wm_drake.studies.answer import Answer, Part, Plot
 from wm_drake.studies.next.study import (
     LEAST_GAIN,
@@ -18,9 +20,13 @@ from wm_drake.studies.next.study import (
     singles_of,
     steps_of,
 )
+from wm_drake.studies.proposal_page import LINE
 
 MOST_NAMED = 4
 """Largest number of measurements that the answer names as not worth making."""
+
+BLOCK = "What to measure next"
+"""Heading of the block on the page of another study."""
 
 GREEDY = (
     "The sequence is greedy: each step takes what then helps most. Two measurements that help only "
@@ -64,39 +70,48 @@ def next_part(model: Model, budget: int, command: str) -> Part:
         command: Command of the whole study.
     """
     steps = steps_of(model, sequence_of(model, budget))
-    facts = [("To copy", command)]
-    return Part("What to measure next", (_steps(steps),), answer_text(steps), facts=facts)
+    table = replace(_steps(steps), name="next_steps", is_in_terminal=False)
+    return Part(BLOCK, (table,), answer_text(steps), facts=[(LINE, command)])
 
 
 def answer_text(steps: xr.Dataset) -> str:
-    """Return each answer before and after the sequence, in words."""
+    """Return each answer, the measurements, and each answer after them, in words."""
+    names = steps.answer.values.tolist()
     words = steps.words.values.tolist()[1:]
-    texts = []
-    for name in steps.answer.values.tolist():
-        one = steps.sel(answer=name)
-        quantity = quantity_of(one.value)
-        texts.append(
-            f"{quantity.words[:1].upper()}{quantity.words[1:]} of the worst load "
-            f"{quantity.text(one.value[0])}, 95 % {_interval(one, quantity, 0)}; then "
-            f"{_interval(one, quantity, -1)}."
-        )
+    now = " ".join(f"{_now(steps.sel(answer=name))}." for name in names)
+    if not words:
+        return f"{now} No measurement of the file tells anything about it."
     first, *others = words
-    then = f", then {listed(others)}" if others else ""
-    return f"{first[:1].upper()}{first[1:]}{then}. {' '.join(texts)}"
+    then = [_then(steps.sel(answer=name), len(names) > 1) for name in names]
+    taken = f"{first}, then {listed(others)}" if others else first
+    return f"{now} {taken[:1].upper()}{taken[1:]}: {listed(then)}."
 
 
-def _interval(one: xr.Dataset, quantity: Quantity, step: int) -> str:
+def _now(one: xr.Dataset) -> str:
+    quantity, value = quantity_of(one.value), one.value[0]
+    name = quantity.words[:1].upper() + quantity.words[1:]
+    return f"{name} {quantity.text(value)}, 95 % {_interval(one, 0)}"
+
+
+def _then(one: xr.Dataset, is_named: bool) -> str:
+    name = f"{quantity_of(one.value).words} " if is_named else ""
+    return f"{name}95 % {_interval(one, -1)}"
+
+
+def _interval(one: xr.Dataset, step: int) -> str:
+    quantity = quantity_of(one.value)
     return f"{quantity.number(one.low[step])} to {quantity.text(one.high[step])}"
 
 
 def worthless_text(singles: xr.Dataset) -> str:
     """Return which measurements are not worth making; "" if all are."""
-    useless = singles.words.values[(singles.gain < LEAST_GAIN).values].tolist()
+    useless = singles.candidate.values[(singles.gain < LEAST_GAIN).values].tolist()
+    useless = list(dict.fromkeys(text.partition(" (±")[0] for text in useless))
     if not useless:
         return ""
     more = len(useless) - MOST_NAMED
     named = useless if more <= 0 else [*useless[:MOST_NAMED], f"{more} more"]
-    return f"Not worth measuring alone: {listed(named)}."
+    return f"Not worth measuring: {', '.join(named)}."
 
 
 def _facts(model: Model) -> list[tuple[str, str]]:
@@ -164,7 +179,7 @@ def _plot(one: xr.Dataset) -> Plot:
     marks: list[fig.Mark] = [fig.segments((low, places), (high, places), width=5.0)]
     marks.append(fig.Points(value, places, size=9.0))
     for step, place in enumerate(places.tolist()):
-        text = f"{_interval(one, quantity, step)}"
+        text = f"{_interval(one, step)}"
         marks.append(fig.Text(float(high[step]), place, text, across="left", shift=(10.0, 0.0)))
     if quantity.words.startswith("smallest gap"):
         marks.append(fig.Rule(0.0, "y", color=fig.MARK))
@@ -175,7 +190,7 @@ def _plot(one: xr.Dataset) -> Plot:
     figure = fig.Figure(panels=(fig.Panel(marks=tuple(marks), x=x, y=y),), height=44.0 * len(names))
     return Plot(
         figure,
-        f"95 % interval of the {quantity.words}: {_interval(one, quantity, 0)} now, "
-        f"{_interval(one, quantity, -1)} at the end.",
+        f"95 % interval of the {quantity.words}: {_interval(one, 0)} now, "
+        f"{_interval(one, -1)} at the end.",
         "95 % interval after each measurement. Dot: the machine in the middle of what is known.",
     )

@@ -17,7 +17,7 @@ to machines that are drawn and run, and the variance is that of what it misses; 
 linear misses less. Derivation and limits: docs/theory/next.md.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
@@ -25,17 +25,12 @@ from itertools import combinations
 import numpy as np
 import xarray as xr
 
-from wm_drake.engines.compiled.step_check import check_step
-from wm_drake.errors import InputError, input_error
-from wm_drake.parameters import MachineParameters
+from wm_drake.errors import input_error
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Share
-from wm_drake.report.quantity import Quantity
-from wm_drake.simulation.measures.responses import Response
-from wm_drake.simulation.steps import checked_step
-from wm_drake.studies.experiment import Experiment, quantity_of, response_of
-from wm_drake.studies.next.knowledge import Knowledge
-from wm_drake.studies.next.measurements import Machines, Measurement
+from wm_drake.report.quantity import HIDDEN, Quantity
+from wm_drake.studies.next.measurements import Measurement
+from wm_drake.studies.next.question import Question, quantities_of
 
 STEP = 1.0
 """Step of the central differences, in standard deviations of what is known."""
@@ -66,97 +61,6 @@ SHARE = Quantity("share", Share(), 0)
 COST = Quantity("cost", form="{:g}".format)
 
 
-@dataclass(frozen=True)
-class Question:
-    """What shall become sure, and how it can be measured.
-
-    Attributes:
-        knowledge: What is known.
-        measurements: What could be measured.
-        answers: Responses, each of its worst load.
-        loads: Loads of the answers.
-        experiments: Runs with the gasket (True) and without it.
-    """
-
-    knowledge: Knowledge
-    measurements: tuple[Measurement, ...]
-    answers: tuple[Response, ...]
-    loads: tuple[str, ...]
-    experiments: Mapping[bool, Experiment]
-
-    def at(self, scores: FloatArray, what: str) -> "Observed":
-        """Run the machines at scores (k, p), and return their answers and what is measured."""
-        kept, machines = self._usable(scores)
-        runs = {
-            gasket: experiment.at(kept, machines, what)
-            for gasket, experiment in self.experiments.items()
-        }
-        found = Machines(self.knowledge.machine, machines, runs)
-        none = np.empty((len(machines), 0))
-        answers = [none, *(self._signed(runs[True], response) for response in self.answers)]
-        numbers = [m.numbers(found).reshape(len(machines), -1) for m in self.measurements]
-        return Observed(
-            _placed(np.hstack(answers), kept, len(scores)),
-            tuple(_placed(part, kept, len(scores)) for part in numbers),
-        )
-
-    def _usable(self, scores: FloatArray) -> tuple[list[int], list[MachineParameters]]:
-        """Return the places of scores with a machine that can be run, and these machines."""
-        machine, context = self.knowledge.machine, None
-        step = checked_step(machine.parameters, None)
-        kept, machines = list[int](), list[MachineParameters]()
-        for place, score in enumerate(scores):
-            try:
-                parameters = self.knowledge.at(score)
-                setup = machine.set_up(parameters=parameters, context=context)
-                check_step(setup, step)
-            except InputError:
-                continue
-            context = setup.context
-            kept.append(place)
-            machines.append(parameters)
-        return kept, machines
-
-    def _signed(self, runs: xr.Dataset, response: Response) -> FloatArray:
-        """Return a response of each load, signed so that less is better. (machines, loads)"""
-        values = response_of(runs, response).sel(load=list(self.loads))
-        return sign_of(response) * values.transpose("point", "load").values
-
-    def worst(self, answers: FloatArray) -> FloatArray:
-        """Return each answer of its worst load, with its own sign. (k, answers) [SI]
-
-        Args:
-            answers: As of `Observed.answers`.
-        """
-        of_loads = answers.reshape(len(answers), len(self.answers), len(self.loads))
-        return np.array([sign_of(r) for r in self.answers]) * of_loads.max(axis=2)
-
-
-@dataclass(frozen=True, eq=False)
-class Observed:
-    """Machines at points; NaN if there is no such machine, or a run failed.
-
-    Attributes:
-        answers: Each answer of each load, signed so that less is better. (k, answers loads) [SI]
-        numbers: Numbers of each measurement. (k, n)
-    """
-
-    answers: FloatArray
-    numbers: tuple[FloatArray, ...]
-
-
-def _placed(values: FloatArray, kept: Sequence[int], count: int) -> FloatArray:
-    """Return rows at their places among NaN."""
-    rows = np.full((count, values.shape[1]), np.nan)
-    rows[list(kept)] = values
-    return rows
-
-
-def sign_of(response: Response) -> float:
-    """Return the sign by which less of a response is better."""
-    return -1.0 if response.better == "larger" else 1.0
-
-
 @dataclass(frozen=True, eq=False)
 class Model:
     """Answers and measurements near the middle of what is known, and of machines drawn from it.
@@ -167,7 +71,8 @@ class Model:
         slopes: Their derivatives by the scores. (K, p) [SI]
         data_slopes: Derivatives of the numbers of each measurement, in deviations. (n, p)
         drawn: Answers of drawn machines. (N, K) [SI]
-        drawn_data: Distances of their numbers from the middle, with errors, in deviations. (N, n)
+        drawn_data: Distances of their numbers from the middle, with errors, in deviations (N, n);
+            empty if the answers are near linear.
         scores: Scores of the drawn machines. (N, p)
     """
 
@@ -248,38 +153,52 @@ def model_of(question: Question, samples: int, seed: int) -> Model:
     middle = near.answers[0]
     if not np.isfinite(middle).all():
         raise input_error("the machine in the middle of what is known cannot be run")
-    rng = np.random.default_rng(seed)
-    scores = rng.standard_normal((samples, size))
-    drawn = question.at(scores, "samples")
-    kept = np.isfinite(drawn.answers).all(axis=1)
+    slopes_of_answers = _slopes(near.answers)
+    if not np.isfinite(slopes_of_answers).all():
+        lost = np.flatnonzero(~np.isfinite(slopes_of_answers).all(axis=0)).tolist()
+        names = ", ".join(question.knowledge.names[k] for k in lost)
+        raise input_error(f"machines with more and with less of {names} cannot be run")
+    if not slopes_of_answers.any():
+        raise input_error("nothing that is uncertain changes the answer")
+    scores = np.random.default_rng(seed).standard_normal((samples, size))
+    plain = replace(question, measurements=(), experiments={True: question.experiments[True]})
+    drawn = plain.at(scores, "samples").answers
+    kept = np.isfinite(drawn).all(axis=1)
     if kept.mean() < LEAST_USABLE:
         raise input_error(
             f"only {kept.sum()} of {samples} machines drawn from what is known can be run; allowed "
             "are narrower priors or tolerances"
         )
+    model = Model(question, middle, slopes_of_answers, (), drawn[kept], (), scores[kept])
+    return _with_data(model, near.numbers, seed)
+
+
+def _with_data(model: Model, near: Sequence[FloatArray], seed: int) -> Model:
+    """Return a model with the measurements that say something about what is uncertain.
+
+    Only if the answer is not near linear, the drawn machines are measured too.
+
+    Args:
+        near: Numbers of each measurement in the middle and beside it, as of `_slopes`.
+    """
+    question, rng = model.question, np.random.default_rng([seed, 1])
+    drawn = None if model.is_linear else question.at(model.scores, "samples measured").numbers
     chosen, slopes, data = list[Measurement](), list[FloatArray](), list[FloatArray]()
-    for measurement, numbers, of_drawn in zip(
-        question.measurements, near.numbers, drawn.numbers, strict=True
-    ):
+    for number, (measurement, numbers) in enumerate(zip(question.measurements, near, strict=True)):
         deviation = measurement.deviations(numbers[0])
         slope = _slopes(numbers) / deviation[:, None]
-        is_known = np.isfinite(slope).all(axis=1) & np.isfinite(of_drawn[kept]).all(axis=0)
-        slope = slope[is_known]
-        if not np.any(np.abs(slope) > SEEN):
+        is_known = np.isfinite(slope).all(axis=1)
+        if drawn is not None:
+            is_known &= np.isfinite(drawn[number]).all(axis=0)
+        if not np.any(np.abs(slope[is_known]) > SEEN):
             continue
-        distance = ((of_drawn[kept] - numbers[0]) / deviation)[:, is_known]
         chosen.append(measurement)
-        slopes.append(slope)
-        data.append(distance + rng.standard_normal(distance.shape))
-    return Model(
-        replace(question, measurements=tuple(chosen)),
-        middle,
-        _slopes(near.answers),
-        tuple(slopes),
-        drawn.answers[kept],
-        tuple(data),
-        scores[kept],
-    )
+        slopes.append(slope[is_known])
+        if drawn is not None:
+            distance = ((drawn[number] - numbers[0]) / deviation)[:, is_known]
+            data.append(distance + rng.standard_normal(distance.shape))
+    measured = replace(question, measurements=tuple(chosen))
+    return replace(model, question=measured, data_slopes=tuple(slopes), drawn_data=tuple(data))
 
 
 def _slopes(values: FloatArray) -> FloatArray:
@@ -318,30 +237,31 @@ def singles_of(model: Model) -> xr.Dataset:
     """Return what each measurement alone does, the best first.
 
     Returns:
-        Over `candidate`: `words`, `remaining`, the part of the variance that remains, by the linear
-        model and by samples too, `cost`, and `gain_per_cost`, the part of the width of the first
-        answer that it takes per cost; over `answer` too `half_width` of the interval of 95 %.
+        Over `candidate`, in words: its `name` in the file; `gain`, the part by which the interval
+        of the first answer becomes narrower; `remaining`, the part of the variance that remains;
+        `cost`, and `gain_per_cost`. Over `answer` too `half_width` of the interval of 95 %.
     """
     measurements = model.question.measurements
     every = [[k] for k in range(len(measurements))]
     widths = np.array([half_widths(model.after(chosen)) for chosen in every])
+    widths = widths.reshape(len(every), len(model.question.answers))
     before = half_widths(model.after(()))
     remaining = np.array([model.remaining(chosen) for chosen in every])
     order = np.argsort(remaining, kind="stable")
     costs = np.array([m.cost for m in measurements])
     gain = 1.0 - widths[:, 0] / before[0]
-    of_answer = {r.name: quantity_of(r) for r in model.question.answers}
+    of_answer = quantities_of(model.question)
     width = Quantity("± after").of_each("answer", of_answer, ("candidate", "answer"), widths)
     data = xr.Dataset(
         {
-            "words": ("candidate", [m.words for m in measurements]),
+            "name": ("candidate", [m.name for m in measurements], {HIDDEN: True}),
             "half_width": width,
             "gain": SHARE.named("narrower by").variable("candidate", gain),
             "remaining": SHARE.named("variance that remains").variable("candidate", remaining),
             "cost": COST.variable("candidate", costs),
             "gain_per_cost": SHARE.named("narrower per cost").variable("candidate", gain / costs),
         },
-        {"candidate": [m.name for m in measurements], "answer": list(of_answer)},
+        {"candidate": [m.words for m in measurements], "answer": list(of_answer)},
     )
     return data.isel(candidate=order)
 
@@ -377,7 +297,7 @@ def steps_of(model: Model, taken: Sequence[int]) -> xr.Dataset:
         in the middle, and the ends `low` and `high` of its interval of 95 %.
     """
     question = model.question
-    of_answer = {r.name: quantity_of(r) for r in question.answers}
+    of_answer = quantities_of(question)
     draws = [model.after(taken[:count]) for count in range(len(taken) + 1)]
     low, high = np.array([np.percentile(d, ENDS, axis=0) for d in draws]).swapaxes(0, 1)
     value = np.tile(question.worst(model.middle[None])[0], (len(draws), 1))

@@ -1,10 +1,10 @@
 """Check the options of the study of what to measure next, and run it."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any
 
-from wm_drake.errors import input_error, problems_at
+from wm_drake.errors import InputError, input_error, problems_at
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters, with_values
@@ -12,8 +12,14 @@ from wm_drake.parameters.candidates import CANDIDATES, CandidateFile, load_candi
 from wm_drake.parameters.machine import FrameOverride, Sensor
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import MEASURES
-from wm_drake.simulation.measures.responses import Response, chosen_responses, measures_of
-from wm_drake.studies.answer import Answer
+from wm_drake.simulation.measures.responses import (
+    GAP,
+    Response,
+    chosen_responses,
+    has_gap,
+    measures_of,
+)
+from wm_drake.studies.answer import Answer, Part
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.inputs import problems_of_file, profile_of
@@ -25,12 +31,16 @@ from wm_drake.studies.next.knowledge import (
 )
 from wm_drake.studies.next.measurements import Measurement, measurements_of
 from wm_drake.studies.next.options import NextOptions
-from wm_drake.studies.next.page import next_answer
-from wm_drake.studies.next.study import Question, model_of
+from wm_drake.studies.next.page import BLOCK, next_answer, next_part
+from wm_drake.studies.next.question import Question
+from wm_drake.studies.next.study import model_of
 from wm_drake.studies.run import machine_text
 from wm_drake.studies.study import Task
 from wm_drake.studies.tolerance.options import ToleranceOptions
 from wm_drake.studies.tolerance.task import ToleranceTask
+
+FEW, BLOCK_BUDGET = 32, 2
+"""Drawn machines and measurements of the block for another page."""
 
 UNMEASURED = "unmeasured"
 """Shipped tolerance file of what is known of any machine."""
@@ -72,6 +82,35 @@ class NextTask(Task):
         )
         model = model_of(question, self.options.samples, self.options.seed)
         return next_answer(model, self.options.budget, self.file.about)
+
+
+def next_block(
+    executor: Executor,
+    knowledge: Callable[[], Knowledge],
+    command: str,
+    measured: Collection[tuple[str, bool]] = (),
+) -> Part:
+    """Return the block on what to measure next for the page of another study.
+
+    It has few samples, runs with the gasket only, and the usual candidates.
+
+    Args:
+        knowledge: Function that returns what is known of the machine.
+        command: Command of the whole study.
+        measured: Load and gasket of runs that are measured already.
+    """
+    try:
+        known = knowledge()
+        parameters = known.machine.parameters
+        usual = measurements_of(known.machine, load_candidates())
+        left = tuple(m for m in usual if m.run is None or (m.run[1] and m.run not in measured))
+        names = (GAP,) if has_gap(parameters) else ("amplitude",)
+        profile, loads = parameters.profile, tuple(parameters.loads)
+        answers = chosen_responses(parameters, profile, names)
+        question = question_of(executor, known, left, answers, loads, profile)
+        return next_part(model_of(question, FEW, 0), BLOCK_BUDGET, command)
+    except InputError as error:
+        return Part(BLOCK, text=f"Not computed: {error.problems[0]}. Try {command}.")
 
 
 def with_candidates(parameters: MachineParameters, file: CandidateFile) -> MachineParameters:

@@ -115,7 +115,7 @@ def matched(tolerances: Tolerances, machine: Machine) -> Tolerances:
     A quantity of which no pattern fits a number of the machine is left out.
     """
     keys = {
-        name: tuple(key for pattern in quantity.keys for key in keys_like(machine, pattern))
+        name: tuple(dict.fromkeys(k for key in quantity.keys for k in keys_like(machine, key)))
         for name, quantity in tolerances.quantities.items()
     }
     quantities = {
