@@ -96,7 +96,8 @@ def page_text(
         gasket: Whether the page begins with the gasket.
 
     Raises:
-        InputError: the machine has no load or one that dries, or the compiled engine does not represent it.
+        InputError: the machine has no load or one that dries, or the compiled engine does not
+            represent it.
     """
     if not parameters.loads:
         raise input_error("the machine has no load, so there is nothing to run", key="loads")

@@ -335,6 +335,7 @@ SHIPPED = (
     "gasket_damping.options:GASKET_DAMPING",
     "gasket_geometry.options:GASKET_GEOMETRY",
     "modes.options:MODES",
+    "next.options:NEXT",
     "response.options:RESPONSE",
     "spin.options:SPIN",
     "spin_cycle.options:SPIN_CYCLE",

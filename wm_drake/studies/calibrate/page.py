@@ -98,7 +98,7 @@ def calibrate_answer(
 
 
 def _details(calibration: Calibration) -> tuple[tuple[str, str], ...]:
-    counted = sum(end.evaluations for end in calibration.ended)
+    counted = sum(end.fit.log.evaluations for end in calibration.ended)
     searches = f"{len(calibration.ended)} starts, seed {calibration.plan.seed}"
     return (
         ("Method", f"least squares, {searches}"),

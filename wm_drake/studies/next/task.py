@@ -1,0 +1,183 @@
+"""Check the options of the study of what to measure next, and run it."""
+
+from collections.abc import Callable, Collection, Mapping
+from pathlib import Path
+from typing import Any
+
+from wm_drake.errors import InputError, input_error, problems_at
+from wm_drake.model.build import build_machine
+from wm_drake.model.machine import Machine
+from wm_drake.parameters import MachineParameters, with_values
+from wm_drake.parameters.candidates import CANDIDATES, CandidateFile, load_candidates
+from wm_drake.parameters.machine import FrameOverride, Sensor
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.measures import MEASURES
+from wm_drake.simulation.measures.responses import (
+    GAP,
+    Response,
+    chosen_responses,
+    has_gap,
+    measures_of,
+)
+from wm_drake.studies.answer import Answer, Part
+from wm_drake.studies.executor import Executor
+from wm_drake.studies.experiment import Experiment
+from wm_drake.studies.inputs import problems_of_file, profile_of
+from wm_drake.studies.next.knowledge import (
+    Knowledge,
+    of_calibration_folder,
+    of_free_file,
+    of_tolerances,
+)
+from wm_drake.studies.next.measurements import Measurement, measurements_of
+from wm_drake.studies.next.options import NextOptions
+from wm_drake.studies.next.page import BLOCK, next_answer, next_part
+from wm_drake.studies.next.question import Question
+from wm_drake.studies.next.study import model_of
+from wm_drake.studies.run import machine_text
+from wm_drake.studies.study import Task
+from wm_drake.studies.tolerance.options import ToleranceOptions
+from wm_drake.studies.tolerance.task import ToleranceTask
+
+FEW, BLOCK_BUDGET = 32, 2
+"""Drawn machines and measurements of the block for another page."""
+
+UNMEASURED = "unmeasured"
+"""Shipped tolerance file of what is known of any machine."""
+
+
+class NextTask(Task):
+    """The study with checked options."""
+
+    def __init__(self, options: NextOptions, machine: Machine) -> None:
+        """Read what is known and what could be measured."""
+        self.options = options
+        path = CANDIDATES.path(options.candidates)
+        self.file = load_candidates(options.candidates)
+        with problems_of_file(path):
+            extended = build_machine(with_candidates(machine.parameters, self.file))
+        self.knowledge = knowledge_of(options, extended)
+        with problems_of_file(path):
+            self.measurements = measurements_of(self.knowledge.machine, self.file)
+        parameters = self.knowledge.machine.parameters
+        self.profile = profile_of(parameters, options.profile)
+        with problems_at("--for", ""):
+            self.answers = chosen_responses(parameters, self.profile, options.answers)
+        self.loads = tuple(machine.parameters.loads)
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """Return what determines the runs."""
+        return {
+            "machine": machine_text(self.knowledge.machine.parameters),
+            "known": self.knowledge.about,
+            "profile": self.profile,
+            "seed": str(self.options.seed),
+        }
+
+    def run(self, executor: Executor) -> Answer:
+        """Run the machines near the middle and those drawn, and rank the measurements."""
+        question = question_of(
+            executor, self.knowledge, self.measurements, self.answers, self.loads, self.profile
+        )
+        model = model_of(question, self.options.samples, self.options.seed)
+        return next_answer(model, self.options.budget, self.file.about)
+
+
+def next_block(
+    executor: Executor,
+    knowledge: Callable[[], Knowledge],
+    command: str,
+    measured: Collection[tuple[str, bool]] = (),
+) -> Part:
+    """Return the block on what to measure next for the page of another study.
+
+    It has few samples, runs with the gasket only, and the usual candidates.
+
+    Args:
+        knowledge: Function that returns what is known of the machine.
+        command: Command of the whole study.
+        measured: Load and gasket of runs that are measured already.
+    """
+    try:
+        known = knowledge()
+        parameters = known.machine.parameters
+        usual = measurements_of(known.machine, load_candidates())
+        left = tuple(m for m in usual if m.run is None or (m.run[1] and m.run not in measured))
+        names = (GAP,) if has_gap(parameters) else ("amplitude",)
+        profile, loads = parameters.profile, tuple(parameters.loads)
+        answers = chosen_responses(parameters, profile, names)
+        question = question_of(executor, known, left, answers, loads, profile)
+        return next_part(model_of(question, FEW, 0), BLOCK_BUDGET, command)
+    except InputError as error:
+        return Part(BLOCK, text=f"Not computed: {error.problems[0]}. Try {command}.")
+
+
+def with_candidates(parameters: MachineParameters, file: CandidateFile) -> MachineParameters:
+    """Return a machine with the loads and the sensors of a file of candidates."""
+    changes: dict[str, Any] = {f"loads.{name}": load for name, load in file.loads.items()}
+    for name, sensor in file.sensors.items():
+        frame = f"sensor_{name}"
+        changes[f"frames.{frame}"] = FrameOverride(position=sensor.position, attached_to="tub")
+        changes[f"sensors.{name}"] = Sensor(frame=frame, axis=sensor.axis)
+    for key in changes:
+        group, name = key.split(".")
+        if name in getattr(parameters, group):
+            raise input_error("is in the machine already; choose another name", key=key)
+    bare = parameters.model_copy(update={"measured": ()}) if file.sensors else parameters
+    return with_values(bare, changes) if changes else parameters
+
+
+def knowledge_of(options: NextOptions, machine: Machine) -> Knowledge:
+    """Return what the options say is known.
+
+    Raises:
+        InputError: the options contradict each other, or a file is wrong.
+    """
+    if options.free is not None and options.tolerances is not None:
+        raise input_error("is given beside --free; allowed is one of them", where="--tolerances")
+    if options.calibrated is not None and options.free is None:
+        raise input_error(
+            "needs the free file of the calibration; add --free FILE", where="--calibrated"
+        )
+    if options.free is None:
+        return tolerances_of(options.tolerances or UNMEASURED, machine, options.profile)
+    if options.calibrated is None:
+        return of_free_file(machine, options.free)
+    return of_calibration_folder(machine, options.free, options.calibrated)
+
+
+def tolerances_of(file: str, machine: Machine, profile: Path | None) -> Knowledge:
+    """Return what a tolerance file says of a machine."""
+    few = ToleranceOptions(file=file, samples=16, sensitivity=0, subset=0, profile=profile)
+    task = ToleranceTask(few, machine)
+    return of_tolerances(task.machine, task.uncertain, f"tolerances {file}")
+
+
+def question_of(
+    executor: Executor,
+    knowledge: Knowledge,
+    measurements: tuple[Measurement, ...],
+    answers: tuple[Response, ...],
+    loads: tuple[str, ...],
+    profile: Any,
+) -> Question:
+    """Return the question with the runs that it needs."""
+    parameters = knowledge.machine.parameters
+    needed = {*measures_of(parameters, answers), "amplitudes"}
+    measures = tuple(name for name in MEASURES if name in needed)
+    runs: Mapping[bool, list[str]] = {True: list(loads), False: []}
+    for measurement in measurements:
+        if measurement.run is not None and measurement.run[0] not in runs[measurement.run[1]]:
+            runs[measurement.run[1]].append(measurement.run[0])
+    experiments = {
+        gasket: Experiment(
+            knowledge.machine,
+            measures,
+            executor.simulate,
+            tuple(Case(name, parameters.loads[name], profile, gasket) for name in names),
+        )
+        for gasket, names in runs.items()
+        if names
+    }
+    return Question(knowledge, measurements, answers, loads, experiments)
