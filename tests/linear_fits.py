@@ -18,7 +18,7 @@ def standard(count):
     return tuple(Unknown(f"x{k}", -9.0, 9.0, prior=(0.0, 1.0)) for k in range(count))
 
 
-def fit_at(coordinates, slopes, unknowns=None, count=None, wished=None, evaluations=0):
+def fit_at(coordinates, slopes, unknowns=None, count=None, wished=None):
     """Return the fit at coordinates of a model whose residuals are in standard deviations.
 
     Args:
@@ -38,5 +38,4 @@ def fit_at(coordinates, slopes, unknowns=None, count=None, wished=None, evaluati
 
     data = Measurement("m", np.zeros(count), errors="known")
     problem = FitProblem(tuple(unknowns), (data,), evaluate, KINKED)
-    log = SearchLog("by hand", evaluations=evaluations)
-    return assess(problem, np.asarray(coordinates, dtype=float), log)
+    return assess(problem, np.asarray(coordinates, dtype=float), SearchLog("by hand"))

@@ -346,7 +346,7 @@ SHIPPED = (
 """Studies of this package: module below `wm_drake.studies`, and name."""
 
 SI_ONLY = (
-    *("calibrate", "spin", "verdict"),
+    *("spin", "verdict"),
     *("study gasket-damping", "study gasket-geometry", "study response"),
     *("rig bushing", "rig damper", "rig gasket"),
     *("study design", "study gasket", "study spin-cycle", "study spin-identify", "study tolerance"),

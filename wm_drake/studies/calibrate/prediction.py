@@ -19,8 +19,6 @@ from wm_drake.studies.calibrate.solutions import Solution
 from wm_drake.studies.calibrate.study import Calibration, SearchPlan, calibrate
 from wm_drake.studies.calibrate.targets import AMPLITUDE, Targets
 from wm_drake.studies.experiment import Experiment
-from wm_drake.studies.fitting.problem import Progress
-from wm_drake.studies.fitting.search import silent
 
 FITS = ("calibrated", "predicted", "seen")
 """Errors of a kind of values in a prediction, by the names of its attributes."""
@@ -126,7 +124,6 @@ def predict(
     calibration: Calibration,
     held_out: Sequence[Sequence[str]],
     plan: SearchPlan | None = None,
-    progress: Progress = silent,
 ) -> list[Prediction]:
     """Repeat a calibration once for each group of held-out loads.
 
@@ -139,7 +136,6 @@ def predict(
         calibration: Calibration with all loads.
         held_out: Groups of names of loads.
         plan: Settings of these searches; None for those of the calibration.
-        progress: Called with the fraction done of the search of a group, and its least misfit.
 
     Returns:
         One prediction for each group.
@@ -151,7 +147,7 @@ def predict(
     targets, plan, predictions = calibration.targets, plan or calibration.plan, []
     for loads in map(tuple, held_out):
         seen = targets.without(*loads)
-        others = calibrate(experiment, free.without_starts(), seen, plan, progress)
+        others = calibrate(experiment, free.without_starts(), seen, plan)
         values = Evaluation(experiment, others.parameter_map, targets)
         predicted = _predicted(others, values)
         best = others.solutions[0]

@@ -7,7 +7,7 @@ signals over time the angle of the drum at the start.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Protocol, TypeAlias
 
@@ -40,6 +40,7 @@ from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.fitting.fit import Fit
 from wm_drake.studies.fitting.methods import identify
 from wm_drake.studies.fitting.problem import (
+    SMOOTH,
     FitProblem,
     Measurement,
     ModelValues,
@@ -47,6 +48,9 @@ from wm_drake.studies.fitting.problem import (
     Unknown,
 )
 from wm_drake.studies.fitting.search import silent
+
+RECORDED = replace(SMOOTH, cost=1e-5, point=1e-4, gradient=1e-9, most=25)
+"""Descent of a fit to records: noise of the amplitudes is larger than these tolerances."""
 
 MISFIT = Quantity("misfit in standard deviations", decimals=2)
 
@@ -66,7 +70,11 @@ REACH = 6.0
 RunKey: TypeAlias = tuple[bytes, str, SpinProfile, float]
 """What determines a run: numbers of the machine, load, profile, angle of the drum."""
 
-KEPT_RUNS, KEPT_COLUMNS = 40, 5000
+ColumnKey: TypeAlias = tuple[int, RunKey, int, float, float, float, float]
+"""What determines the signal of a sensor: recording, run, number of the sensor, offset and rate of
+the clock, and both angles of the axis."""
+
+KEPT_RUNS, KEPT_COLUMNS = 40, 1500
 """Numbers of runs and of amplitudes of a sensor beyond which none are kept for the next call."""
 
 
@@ -106,7 +114,7 @@ class RecordModel:
     points: Mapping[str, FloatArray]
     by: By
     _runs: dict[RunKey, FloatArray] = field(default_factory=dict, repr=False)
-    _columns: dict[object, FloatArray] = field(default_factory=dict, repr=False)
+    _columns: dict[ColumnKey, FloatArray] = field(default_factory=dict, repr=False)
 
     @cached_property
     def pairs(self) -> tuple[Pair, ...]:
@@ -135,17 +143,17 @@ class RecordModel:
     @cached_property
     def _of_recordings(self) -> tuple[Unknown, ...]:
         """Offset and rate of the clock of each recording, and the angle at its start."""
-        found, names = [], [pair.recording.path.name for pair in self.pairs]
+        unknowns, names = [], [pair.recording.path.name for pair in self.pairs]
         for number, pair in enumerate(self.pairs, 1):
             name, at = names[number - 1], pair.alignment
             name = name if names.count(name) == 1 else f"{name} ({number})"
             offset, rate = max(at.offset_sd, OFFSET_SD), max(at.rate_sd, RATE_SD)
-            found.append(_nuisance(f"clock of {name}", 0.0, offset, OFFSET.unit))
-            found.append(_nuisance(f"clock rate of {name}", 0.0, rate, RATE.unit))
+            unknowns.append(_nuisance(f"clock of {name}", 0.0, offset, OFFSET.unit))
+            unknowns.append(_nuisance(f"clock rate of {name}", 0.0, rate, RATE.unit))
             if self.by == "history":
                 start = float(order_one(pair).start)
-                found.append(_nuisance(f"drum angle of {name}", start, ANGLE_SD, PHASE.unit))
-        return tuple(found)
+                unknowns.append(_nuisance(f"drum angle of {name}", start, ANGLE_SD, PHASE.unit))
+        return tuple(unknowns)
 
     @cached_property
     def blocks(self) -> tuple[Block, ...]:
@@ -173,7 +181,7 @@ class RecordModel:
                     tests.append(Measurement(f"{name}{sensor}", values, base, errors=errors))
         if not tests:
             raise input_error("no sensor has an amplitude to fit; the records are too short")
-        return FitProblem(self.unknowns, tuple(tests), self._values)
+        return FitProblem(self.unknowns, tuple(tests), self._values, RECORDED)
 
     def _values(self, points: FloatArray) -> ModelValues:
         """Return the computed values of all measurements, in their deviations."""
@@ -194,51 +202,49 @@ class RecordModel:
     def computed(self, points: FloatArray) -> list[list[FloatArray]]:
         """Return what is predicted of each block (m, k) at each point; NaN where a run failed."""
         self._run(points)
+        for load in self.loads:
+            for pair in load.pairs:
+                self._reduce(load, pair, points)
         return [[self._computed(block, point) for block in self.blocks] for point in points]
 
     def _computed(self, block: Block, point: FloatArray) -> FloatArray:
-        count, sensors = len(self.free.unknowns), len(self.sensors)
-        gains, *tilts = point[count : count + 3 * sensors].reshape(sensors, 3).T
-        each = []
-        for pair in block.pairs:
-            at = self._key(block.load, pair, point)
-            signals = self._runs[at]
-            if not np.isfinite(signals).all():
-                return np.full(block.measured.shape, np.nan)
-            offset, rate = self._of(pair, point)[:2]
-            columns = [
-                self._column(block, pair, (at, k, float(offset), float(rate), *turn), signals)
-                for k, turn in enumerate(np.transpose(tilts).tolist())
-            ]
-            each.append(np.stack(columns, axis=1))
-        return mean_of(np.stack(each)) * gains
+        runs = [self._runs[self._key(block.load, pair, point)] for pair in block.pairs]
+        if any(np.isnan(signals[0]).any() for signals in runs):
+            return np.full(block.measured.shape, np.nan)
+        each = [
+            np.stack([self._columns[key] for key in self._keys(block.load, pair, point)], axis=1)
+            for pair in block.pairs
+        ]
+        return mean_of(np.stack(each)) * self._sensors_at(point)[:, 0]
 
-    def _column(
-        self, block: Block, pair: Pair, key: tuple[object, ...], signals: FloatArray
-    ) -> FloatArray:
-        """Return what is fitted of the signal of one sensor (m,), with its tilt and the clock.
+    def _sensors_at(self, point: FloatArray) -> FloatArray:
+        """Return gain and both angles of each sensor at a point (k, 3)."""
+        count = len(self.free.unknowns)
+        return point[count : count + 3 * len(self.sensors)].reshape(-1, 3)
 
-        Args:
-            key: Run, number of the sensor, offset, rate, and both angles.
-            signals: Signals of the sensors, and of sensors along two other axes. (n, k, 3)
-        """
-        known = self._columns.get((pair, key))
-        if known is not None:
-            return known
-        _, k, offset, rate, *turn = key
-        assert isinstance(k, int)
-        assert isinstance(offset, float)
-        assert isinstance(rate, float)
-        signal = signals[:, k] @ np.array([1.0, *turn])
-        if offset or rate:
-            time = pair.run.time.values
-            moved = time + offset + rate * (time - 0.5 * time[-1])
-            signal = CubicSpline(time, signal)(np.clip(moved, time[0], time[-1]))
-        gaps = np.where(np.isfinite(pair.measured[:, k]), 0.0, np.nan)
-        column = reduced(block.load, pair, (signal + gaps)[:, None], self.by)[:, 0]
-        if self.by != "history":
-            self._columns[pair, key] = column
-        return column
+    def _keys(self, load: RecordedLoad, pair: Pair, point: FloatArray) -> list[ColumnKey]:
+        """Return what determines the signal of each sensor of a recording at a point."""
+        run = self._key(load, pair, point)
+        offset, rate = self._of(pair, point)[:2].tolist()
+        tilts = self._sensors_at(point)[:, 1:].tolist()
+        return [(id(pair), run, k, offset, rate, *tilt) for k, tilt in enumerate(tilts)]
+
+    def _reduce(self, load: RecordedLoad, pair: Pair, points: FloatArray) -> None:
+        """Keep what is fitted of the signals of a recording at points, all new ones at once."""
+        needed = dict.fromkeys(key for point in points for key in self._keys(load, pair, point))
+        new = [key for key in needed if key not in self._columns]
+        if not new:
+            return
+        time = pair.run.time.values
+        columns = []
+        for _, run, k, offset, rate, *tilt in new:
+            signal = self._runs[run][:, k] @ np.array([1.0, *tilt])
+            if offset or rate:
+                moved = time + offset + rate * (time - 0.5 * time[-1])
+                signal = CubicSpline(time, signal)(np.clip(moved, time[0], time[-1]))
+            columns.append(np.where(np.isfinite(pair.measured[:, k]), signal, np.nan))
+        values = reduced(load, pair, np.stack(columns, axis=1), self.by)
+        self._columns.update(zip(new, values.T, strict=True))
 
     def _of(self, pair: Pair, point: FloatArray) -> FloatArray:
         """Return the unknowns of a recording at a point."""
@@ -254,7 +260,7 @@ class RecordModel:
     def _run(self, points: FloatArray) -> None:
         """Run what is not kept of points, and keep the signals (n, k, 3), NaN of failed runs."""
         cases: dict[RunKey, Case] = {}
-        wanted = {
+        needed = {
             self._key(load, pair, point): (load, pair, point)
             for point in points
             for load in self.loads
@@ -263,7 +269,7 @@ class RecordModel:
         if len(self._runs) > KEPT_RUNS or len(self._columns) > KEPT_COLUMNS:
             self._runs.clear()
             self._columns.clear()
-        for key, (load, pair, point) in wanted.items():
+        for key, (load, pair, point) in needed.items():
             if key in self._runs:
                 continue
             self._runs[key] = np.full((len(pair.run.time), len(self.sensors), 3), np.nan)

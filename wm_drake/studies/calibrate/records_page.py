@@ -19,6 +19,9 @@ from wm_drake.studies.fitting.page import fit_parts, search_facts
 
 ERROR = Quantity("error", Share(), 1)
 
+MOST_DRAWN = 1500
+"""Number of places of a picture from which on some are left out."""
+
 FITTED = {"history": "signals"}
 """Word for what is fitted, if it is not amplitudes."""
 
@@ -117,10 +120,11 @@ def _compared(data: xr.Dataset, quantity: str, by: By) -> Part:
         {name: unit.named(text).variable(dims, data[name]) for name, text in words.items()},
         {"place": data.place, "sensor": data.sensor, "block": data.block},
     )
-    at, x = _axis(data)
+    drawn = _thinned(shown)
+    at, x = _axis(drawn)
     panels = []
     for name in data.sensor.values.tolist():
-        one = shown.sel(sensor=name)
+        one = drawn.sel(sensor=name)
         low, high = (unit.values(one.measured + s * 2.0 * one.deviation) for s in (-1.0, 1.0))
         known = np.isfinite(low)
         marks = (
@@ -139,6 +143,11 @@ def _compared(data: xr.Dataset, quantity: str, by: By) -> Part:
     return Part(f"{quantity.capitalize()}: recorded and computed", (plot, table))
 
 
+def _thinned(data: xr.Dataset) -> xr.Dataset:
+    """Return some of many places for a picture, evenly chosen."""
+    return data.isel(place=slice(None, None, max(1, data.sizes["place"] // MOST_DRAWN)))
+
+
 def _axis(data: xr.Dataset) -> tuple[FloatArray, fig.Axis]:
     """Return the numbers of the places, and the axis that names some of them."""
     at = np.arange(data.sizes["place"], dtype=float)
@@ -148,10 +157,11 @@ def _axis(data: xr.Dataset) -> tuple[FloatArray, fig.Axis]:
 
 
 def _residuals(data: xr.Dataset) -> Part:
-    at, x = _axis(data)
+    drawn = _thinned(data)
+    at, x = _axis(drawn)
     colors = fig.COLOURS * (1 + data.sizes["sensor"] // len(fig.COLOURS))
     lines = [
-        fig.Line(at, MISFIT.values(data.misfit.sel(sensor=name)), color=color, key=name)
+        fig.Line(at, MISFIT.values(drawn.misfit.sel(sensor=name)), color=color, key=name)
         for name, color in zip(data.sensor.values.tolist(), colors, strict=False)
     ]
     panel = fig.Panel(

@@ -44,9 +44,6 @@ that a limit gives way only where no machine within the bounds keeps it.
 RESOLUTION = 1e-4
 """Resolution of the published amplitudes. [m]"""
 
-ITERATIONS = 60
-"""Default limit of iterations of a search."""
-
 
 @dataclass(frozen=True)
 class SearchPlan:
@@ -55,7 +52,7 @@ class SearchPlan:
     Attributes:
         starts: Number of starts. The first is the one in the free file; the others are drawn at
             random around it.
-        iterations: Limit of iterations from each start; 0 for `ITERATIONS`.
+        iterations: Limit of iterations from each start; 0 for that of `KINKED`.
         deviation: Relative standard deviation of an amplitude.
         resolution: Resolution of the measured amplitudes. Rounding adds the standard deviation
             resolution / sqrt(12). [m]
@@ -142,14 +139,8 @@ def calibrate(
     values = Evaluation(experiment, parameter_map, targets)
     values.check(parameter_map.start)
     search = Search(calibration_problem(values, plan))
-    ends = descents(
-        search,
-        starts_of(search, plan.seed, plan.starts, plan.start_draws),
-        plan.starts,
-        most=plan.iterations or ITERATIONS,
-        enough=plan.starts + 1,
-        progress=progress,
-    )
+    begins = starts_of(search, plan.seed, plan.starts, plan.start_draws)
+    ends = list(descents(search, begins, plan.starts, plan.iterations, progress))
     ended = [
         _solution(number, assess(search.problem, end.point, _log(plan, end)), values)
         for number, end in enumerate(ends)

@@ -102,14 +102,8 @@ class CalibrateTask(Task):
             )
         predictions = []
         for group in self.held_out:
-            with executor.fraction(f"without {', '.join(group)}") as report:
-                predictions += predict(
-                    experiment,
-                    self.free,
-                    calibration,
-                    [group],
-                    progress=lambda done, least, report=report: report(done),
-                )
+            with executor.fraction(f"without {', '.join(group)}"):
+                predictions += predict(experiment, self.free, calibration, [group])
         best = build_machine(solved_machine(calibration.solutions[0]))
         parameters, records = best.parameters, dict[int, Record]()
         cases = [case_of(parameters, name, gasket=gasket) for name, gasket in self.targets.loads]

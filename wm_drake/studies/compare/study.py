@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from scipy.sparse import csr_array
 from scipy.stats import t as student
 
 from wm_drake.parameters import SpinProfile
@@ -57,17 +58,21 @@ RATE = Quantity("clock slow by", Unit("", "ppm"), 0)
 INTEGRATED = Quantity("RMS displacement by integration", Unit("m", "mm"), 3)
 
 Signals = Callable[[FloatArray], FloatArray]
-"""Function of a signal without gaps (n,) that returns another one (n,)."""
+"""Function of signals without gaps (n, k) that returns others (n, k)."""
 
 
 def in_pieces(signals: FloatArray, change: Signals) -> FloatArray:
     """Return signals (n, k) whose pieces without gaps are changed by a function; NaN in gaps."""
     changed = np.full(signals.shape, np.nan)
-    for k, column in enumerate(signals.T):
-        valid = np.flatnonzero(np.isfinite(column))
+    # signals with the same gaps go together: filters take several at once
+    groups: dict[bytes, list[int]] = {}
+    for k, mask in enumerate(np.isfinite(signals).T):
+        groups.setdefault(mask.tobytes(), []).append(k)
+    for columns in map(np.array, groups.values()):
+        valid = np.flatnonzero(np.isfinite(signals[:, columns[0]]))
         for piece in np.split(valid, np.flatnonzero(np.diff(valid) > 1) + 1):
             if len(piece) >= LEAST_PIECE:
-                changed[piece, k] = change(column[piece])
+                changed[np.ix_(piece, columns)] = change(signals[np.ix_(piece, columns)])
     return changed
 
 
@@ -75,7 +80,7 @@ def band_passed(signals: FloatArray, run: Record) -> FloatArray:
     """Return signals (n, k) within the pass band of a run."""
     period = sample_period(run)
     band = pass_band(profile_of(run), period)
-    return in_pieces(signals, lambda part: filtered(part[:, None], period, band)[:, 0])
+    return in_pieces(signals, lambda part: filtered(part, period, band))
 
 
 def envelopes_of(signals: FloatArray, time: FloatArray) -> FloatArray:
@@ -86,11 +91,12 @@ def envelopes_of(signals: FloatArray, time: FloatArray) -> FloatArray:
     """
     step = float(time[1] - time[0])
 
-    def upper(signal: FloatArray) -> FloatArray:
-        return peak_line(np.asarray(step * np.arange(len(signal), dtype=float)), signal)
+    def upper(part: FloatArray) -> FloatArray:
+        at = np.asarray(step * np.arange(len(part), dtype=float))
+        return np.stack([peak_line(at, np.ascontiguousarray(signal)) for signal in part.T], axis=1)
 
-    def lower(signal: FloatArray) -> FloatArray:
-        return -upper(-signal)
+    def lower(part: FloatArray) -> FloatArray:
+        return -upper(-part)
 
     return np.stack([in_pieces(signals, upper), in_pieces(signals, lower)])
 
@@ -134,11 +140,14 @@ def means_at(values: FloatArray, numbers: np.ndarray, count: int) -> FloatArray:
     Args:
         numbers: Number of the place of each sample. (n,)
     """
-    belongs = (numbers == np.arange(count)[:, None]).astype(float)
-    valid = np.isfinite(values)
-    totals = belongs @ valid
-    sums = belongs @ np.where(valid, values, 0.0)
-    return np.where(totals > 0.0, sums / np.maximum(totals, 1.0), np.nan)
+    samples = np.arange(len(numbers))
+    belongs = csr_array((np.ones(len(numbers)), (numbers, samples)), (count, len(numbers)))
+    columns = np.moveaxis(values, -2, 0)
+    flat = columns.reshape(len(numbers), -1)
+    valid = np.isfinite(flat)
+    totals, sums = belongs @ valid.astype(float), belongs @ np.where(valid, flat, 0.0)
+    means = np.where(totals > 0.0, sums / np.maximum(totals, 1.0), np.nan)
+    return np.moveaxis(means.reshape(count, *columns.shape[1:]), 0, -2)
 
 
 def signals_of(pair: Pair, places: xr.DataArray) -> xr.Dataset:
@@ -162,7 +171,7 @@ def signals_of(pair: Pair, places: xr.DataArray) -> xr.Dataset:
     ranges = speed_ranges(run, profile_of(run))
     masks = [part.samples for part in ranges]
     integrated = [
-        in_pieces(s, lambda part: integrated_twice((part - part.mean())[:, None], period)[:, 0])
+        in_pieces(s, lambda part: integrated_twice(part - part.mean(axis=0), period))
         for s in pair.both
     ]
     twice = np.stack([band_passed(signals, run) for signals in integrated])

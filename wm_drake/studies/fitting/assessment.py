@@ -208,7 +208,7 @@ class _Spread:
         undetermined = []
         for row, deviation in zip(self.directions, self.deviations, strict=True):
             if deviation > WIDEST:
-                taking = np.flatnonzero(np.abs(row) > TAKES_PART)
+                taking = np.flatnonzero(np.abs(row) > TAKES_PART).tolist()
                 parts = row[taking] / row[taking][np.argmax(np.abs(row[taking]))]
                 if all(unknowns[k].prior for k in taking):
                     continue

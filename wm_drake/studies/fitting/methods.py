@@ -4,7 +4,7 @@ Each is a function that returns the optimum of a search. All evaluate the model 
 once and are repeated by their seed. `identify` assesses the optimum of any of them.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -51,8 +51,11 @@ def least_squares(
         screened: Points that are evaluated (a power of two), of which the best become starts.
         progress: Called after every step.
     """
-    begins = starts_of(search, seed, starts, screened)
-    ends = descents(search, begins, starts, progress=progress)
+    begins, ends = starts_of(search, seed, starts, screened), list[Optimum]()
+    for end in descents(search, begins, starts, progress=progress):
+        ends.append(end)
+        if agreeing(search.problem, ends) >= AGREEING:
+            break
     note = f"{agreeing(search.problem, ends)} of {len(ends)} starts came to the same least RMSE"
     return replace(min(ends, key=lambda end: end.cost), note=note)
 
@@ -61,33 +64,27 @@ def descents(
     search: Search,
     begins: Iterable[FloatArray],
     starts: int,
-    *,
-    most: int = 60,
-    enough: int = AGREEING,
+    most: int = 0,
     progress: Progress = silent,
-) -> list[Optimum]:
-    """Return where least squares from several starts end, until some of them agree.
+) -> Iterator[Optimum]:
+    """Yield where least squares from several starts end.
 
     Args:
         begins: The starts.
         starts: Their number.
-        most: Evaluations of the residuals of each at most, without those of derivatives.
-        enough: Number of ends that agree, of which no more are made.
+        most: Evaluations of the rows of each at most, as for `descended`.
         progress: Called after every step.
     """
-    ends: list[Optimum] = []
-    for begin in begins:
-        before = sum(end.evaluations for end in ends)
+    before = 0
+    for number, begin in enumerate(begins):
 
-        def step_done(fraction: float) -> None:
-            progress((len(ends) + fraction) / starts, search.least)
+        def step_done(fraction: float, number: int = number) -> None:
+            progress((number + fraction) / starts, search.least)
 
         end = descended(search, begin, most, step_done)
-        ends.append(replace(end, evaluations=search.evaluations - before))
         search.round_done()
-        if agreeing(search.problem, ends) >= enough:
-            break
-    return ends
+        yield replace(end, evaluations=search.evaluations - before)
+        before = search.evaluations
 
 
 def evolution(search: Search, *, seed: int = 0, progress: Progress = silent) -> Optimum:

@@ -118,6 +118,7 @@ class Descent:
         near: Distance from a bound, as a part of the range, within which an unknown has hit it.
         difference: Step of the central differences of the assessment, as a part of the range; None
             for those of the search.
+        most: Evaluations of the rows at most, without those of derivatives.
     """
 
     steps: tuple[float, ...]
@@ -128,6 +129,7 @@ class Descent:
     gradient: float
     near: float
     difference: float | None
+    most: int = 60
 
 
 SMOOTH = Descent((1e-5,), 0.5, 1e-4, 1e-9, 1e-9, 1e-14, 1e-3, 1e-3)
@@ -232,10 +234,10 @@ class FitProblem:
     def evaluated(self, coordinates: FloatArray) -> "Rows":
         """Return the rows at points (k, p)."""
         model = self.values(coordinates)
-        beside = [part for part in (model.wished, model.known) if part is not None]
-        beside.append(coordinates[:, self.has_prior])
+        others = [part for part in (model.wished, model.known) if part is not None]
+        others.append(coordinates[:, self.has_prior])
         exact, smooth = (
-            np.hstack([self._misfits(values), *beside])
+            np.hstack([self._misfits(values), *others])
             for values in (model.values, model.values if model.smooth is None else model.smooth)
         )
         failed = np.ones(exact.shape[1])

@@ -109,7 +109,7 @@ LEAST_GAIN = 0.01
 def descended(
     search: Search,
     begin: FloatArray,
-    most: int = 60,
+    most: int = 0,
     step_done: Callable[[float], None] = lambda fraction: None,
 ) -> Optimum:
     """Return where least squares from one point end.
@@ -118,12 +118,12 @@ def descended(
 
     Args:
         begin: First point (p,), moved a little into the bounds.
-        most: Evaluations of the residuals at most, without those of derivatives.
+        most: Evaluations of the rows at most, without those of derivatives; 0 for `Descent.most`.
         step_done: Called before every step with the fraction of a usual search.
     """
     before, problem, descent = search.evaluations, search.problem, search.problem.descent
     margin = descent.inside * problem.ranges
-    point, cost, remaining, failed = begin, np.inf, most, 0
+    point, cost, remaining, failed = begin, np.inf, most or descent.most, 0
     for step in itertools.cycle(descent.steps):
         point = np.clip(point, problem.lower + margin, problem.upper - margin)
         end = _gauss_newton(search, point, step, remaining, step_done)

@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from wm_drake.parameters import MachineParameters
+from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import MISSING, listed
 from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.quantity import Quantity, quantity_of, text_of
@@ -148,12 +149,12 @@ def rare_sentences(contact: xr.Dataset) -> str:
     """Return how the subset simulation went; nothing if there was none."""
     if "threshold" not in contact:
         return ""
-    steps = ", ".join(map(GAP_SIZE.number, contact.threshold.values))
+    steps = ", ".join(map(GAP_SIZE.text, contact.threshold.values))
     text = (
         f"Of {contact.attrs['samples']} samples {text_of(contact.touching)} touch, too few to "
         f"count. Subset simulation took {text_of(contact.rare_runs)} runs in "
         f"{contact.sizes['level'] + 1} levels. Each level holds the tenth of the runs with the "
-        f"smallest gaps of the level before: at most {steps} mm"
+        f"smallest gaps of the level before: at most {steps}"
     )
     if not np.isfinite(contact.rare_deviation):
         return (
@@ -257,6 +258,9 @@ def about_loads(trials: ToleranceTrials, samples: xr.Dataset, gaps: xr.DataArray
     )
 
 
+LAUNDRY = Quantity("mass of the laundry", Unit("kg", "kg"), form="{:.3g}".format)
+
+
 def masses_text(
     parameters: MachineParameters, loads: Sequence[str], masses: tuple[float, float]
 ) -> str:
@@ -267,8 +271,10 @@ def masses_text(
         masses: Smallest and largest mass of the laundry. [kg]
     """
     of_load = {name: parameters.loads[name].mass for name in loads}
-    ends = f"{masses[0]:.2g} to {masses[1]:.2g} kg"
-    heavier = [f"{load} ({mass:.3g} kg)" for load, mass in of_load.items() if mass > masses[1]]
+    ends = f"{LAUNDRY.text(masses[0])} to {LAUNDRY.text(masses[1])}"
+    heavier = [
+        f"{load} ({LAUNDRY.text(mass)})" for load, mass in of_load.items() if mass > masses[1]
+    ]
     if not heavier:
         return f"The laundry of the samples, {ends}, is as heavy as any of these loads."
     verb = "is" if len(heavier) == 1 else "are"
