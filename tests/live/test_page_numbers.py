@@ -2,3 +2,128 @@
 
 The page runs in node, bit for bit as in a browser (tests/browser/test_exported_page.py).
 """
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from exported_machine import NodePage, movable, moved_value
+
+import wm_drake as wm
+from wm_drake.batch import simulate_many
+from wm_drake.live.exported import export_page
+from wm_drake.live.machine import OpenMachine
+from wm_drake.parameters import SpinProfile, shipped_machines
+
+DISPLACEMENT, AMPLITUDE, GAP = 1e-6, 1e-3, 1e-4
+"""Accuracies: of displacements before the filter, relative to the largest; of amplitudes, relative;
+of the gap [m]."""
+
+
+def runs_of(machine, cases):
+    """Return the results of cases, side by side, with records."""
+    found = {}
+    simulate_many(
+        machine, cases, measures=("amplitudes", "gap"), histories=True, workers=1,
+        finished=lambda run: found.update({run.number: run}),
+    )  # fmt: skip
+    return [found[number] for number in range(len(cases))]
+
+
+def check_equal(page, run):
+    """Check a run of the page against one of the engine."""
+    expected = run.record.displacement.values
+    assert page.moved.shape == expected.shape
+    apart = np.abs(page.moved - expected).max(axis=0) / np.abs(expected).max(axis=0)
+    assert apart.max() <= DISPLACEMENT, apart
+    np.testing.assert_allclose(page.sizes, run.values["amplitude"], AMPLITUDE)
+    assert (page.gap is None) == (run.gap is None)
+    assert run.gap is None or abs(page.gap - run.gap.distance) <= GAP
+
+
+@pytest.fixture
+def opened(tmp_path):
+    """Return a function that exports a machine: its page in node, and the open machine."""
+    pages = []
+
+    def export(parameters):
+        path = tmp_path / f"{parameters.name}.html"
+        export_page(parameters, path)
+        pages.append(NodePage(path))
+        machine = wm.build_machine(parameters)
+        return pages[-1], OpenMachine(parameters, machine, wm.Scene(parameters))
+
+    yield export
+    for page in pages:
+        page.close()
+
+
+MACHINES = [
+    pytest.param(name, marks=pytest.mark.slow if name == "reference" else pytest.mark.hours)
+    for name in sorted(shipped_machines())
+]
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_each_load_runs_as_with_spin(opened, name):
+    parameters = wm.load_machine(name)
+    page, machine = opened(parameters)
+    cases = [wm.case_of(parameters, load) for load in parameters.loads]
+    for case, run in zip(cases, runs_of(machine.machine, cases), strict=True):
+        check_equal(page.run(case.name), run)
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_each_moved_number_is_as_with_spin(opened, name):
+    parameters = wm.load_machine(name)
+    top = parameters.profile.highest_speed
+    quick = SpinProfile(time=(0.0, 6.0, 8.0), speed=(0.0, top, top))
+    parameters = parameters.model_copy(update={"profile": quick})
+    page, machine = opened(parameters)
+    load = next(iter(parameters.loads))
+    numbers, cases = movable(page.data), []
+    for number in numbers:
+        nominal = float(machine.sliders[number["key"]].number.nominal or 0.0)
+        step = moved_value(number) - nominal
+        moved = machine.moved_by(parameters, number["key"], step)
+        cases.append(replace(wm.case_of(moved, load), parameters=moved))
+    assert len(numbers) > 10
+    for number, run in zip(numbers, runs_of(machine.machine, cases), strict=True):
+        change = [page.data["model"]["places"][number["key"]], moved_value(number)]
+        check_equal(page.run(load, [change]), run)
+
+
+def test_a_run_that_diverges_says_when(opened, reference):
+    page, _ = opened(reference)
+    key = "spring_types.suspension.stiffness"
+    place = page.data["model"]["places"][key]
+    run = page.run("middle", [[place, 1e9]])
+    assert 0.0 < run.diverged < reference.profile.duration
+    assert np.isnan(run.sizes).all()
+    assert page.run("middle").diverged is None
+
+
+STOP = """
+extends: reference
+name: with_stop
+elements:
+  buffer:
+    kind: stop
+    tub_frame: damper_left_tub
+    housing_frame: damper_left_housing
+    gap: 2 mm
+    stiffness: 40 N/mm
+    loss: 1 s/m
+    friction: 0.3
+"""
+
+
+@pytest.mark.slow
+def test_a_machine_with_a_stop_runs_as_with_spin(opened, tmp_path):
+    (tmp_path / "stop.yaml").write_text(STOP, encoding="utf-8")
+    parameters = wm.load_machine(tmp_path / "stop.yaml")
+    page, machine = opened(parameters)
+    assert "elements.buffer.gap" in page.data["model"]["places"]
+    (run,) = runs_of(machine.machine, [wm.case_of(parameters, "middle")])
+    assert float(run.record.stop_force.max()) > 10.0  # it is touched
+    check_equal(page.run("middle"), run)

@@ -15,8 +15,8 @@ from wm_drake.engines.compiled.mechanics import DRUM_RATE
 from wm_drake.export.kernel import (
     HARMONICS_BEGIN,
     HARMONICS_SIZE,
-    OPTIONS,
     POINTER,
+    RUN_HERE,
     load_adder,
     numbers_at,
     row_writer,
@@ -49,7 +49,7 @@ def _set_up(plan: Any) -> Any:
     add_bodies, place_struts, settle = body_changer(plan), strut_placer(plan), settler(plan)
     load_feet, stands = foot_loader(plan), settles and plan.elements.cabinet is not None
 
-    @cfunc(types.float64(POINTER, POINTER), **OPTIONS)
+    @cfunc(types.float64(POINTER, POINTER), **RUN_HERE)
     def wm_set_up(v, c):
         numbers, constants, p = numbers_at(v, 0), numbers_at(c, 0), numbers_at(v, at.packed)
         state, rest = numbers_at(v, at.state), numbers_at(v, at.rest)

@@ -131,11 +131,12 @@ const pool = new Pool(Math.max(1, Math.min(navigator.hardwareConcurrency || 2, O
 /* ---- answers, as the server gives them ---- */
 
 function gapOf({gap, diverged}, profile) {
-  if (!gap) return {gap: null, diverged: diverged === null ? '' : `the run diverged at ${diverged.toFixed(3)} s`};
+  const text = diverged === null ? '' : `the run diverged at ${diverged.toFixed(3)} s, with the steps of the exported machine`;
+  if (!gap) return {gap: null, diverged: text};
   const [moving, fixed] = data.pairs[gap.pair];
   return {
     gap: {distance: 1e3 * gap.distance, time: gap.time, rpm: RPM * speedAt(profile, gap.time), moving, fixed},
-    diverged: diverged === null ? '' : `the run diverged at ${diverged.toFixed(3)} s`,
+    diverged: text,
   };
 }
 
