@@ -14,6 +14,7 @@ from wm_drake.batch import simulate_many
 from wm_drake.live.exported import export_page
 from wm_drake.live.machine import OpenMachine
 from wm_drake.parameters import SpinProfile, shipped_machines
+from wm_drake.simulation.measures.record import foot_loads_of
 
 DISPLACEMENT, AMPLITUDE, GAP = 1e-6, 1e-3, 1e-4
 """Accuracies: of displacements before the filter, relative to the largest; of amplitudes, relative;
@@ -39,6 +40,18 @@ def check_equal(page, run):
     np.testing.assert_allclose(page.sizes, run.values["amplitude"], AMPLITUDE)
     assert (page.gap is None) == (run.gap is None)
     assert run.gap is None or abs(page.gap - run.gap.distance) <= GAP
+
+
+def check_feet(data, page, record):
+    """Check smallest and largest load of each foot; both ends of its bins follow those before."""
+    names = dict(data["forces"])
+    loads = foot_loads_of(record)
+    count = data["model"]["count"]
+    bins = np.array(page.bands).reshape(-1, 6 + count["mounts"] + count["feet"], 2)
+    at = [names[f"foot {name.replace('_', ' ')}"] for name in loads.feet]
+    found = bins[:, at, 0].min(axis=0), bins[:, at, 1].max(axis=0)
+    expected = loads.normal.min(axis=0), loads.normal.max(axis=0)
+    np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-2)
 
 
 @pytest.fixture
@@ -70,7 +83,10 @@ def test_each_load_runs_as_with_spin(opened, name):
     page, machine = opened(parameters)
     cases = [wm.case_of(parameters, load) for load in parameters.loads]
     for case, run in zip(cases, runs_of(machine.machine, cases), strict=True):
-        check_equal(page.run(case.name), run)
+        found = page.run(case.name)
+        check_equal(found, run)
+        if parameters.cabinet:
+            check_feet(page.data, found, run.record)
 
 
 @pytest.mark.parametrize("name", MACHINES)
