@@ -1,6 +1,10 @@
 """Numbers of a page are those of `wm-drake spin`: as exported, and after each slider was moved.
 
-The page runs in node, bit for bit as in a browser (tests/browser/test_exported_page.py).
+The page runs in node, bit for bit as in a browser (tests/browser/test_exported_page.py). Its
+rounding is not that of the engine, which fuses products and sums. Balls that hit each other make a
+motion chaotic: rounding grows to the size of the motion. So each run has a twin, the engine with an
+unbalance that differs by 1e-14. Displacements are compared as long as the twin stays near, and to
+amplitudes and gaps the distance of the twin is added.
 """
 
 from dataclasses import replace
@@ -19,27 +23,50 @@ from wm_drake.simulation.measures.record import foot_loads_of
 DISPLACEMENT, AMPLITUDE, GAP = 1e-6, 1e-3, 1e-4
 """Accuracies: of displacements before the filter, relative to the largest; of amplitudes, relative;
 of the gap [m]."""
+DISTURBANCE, NEAR = 1e-14, 1e-9
+"""Relative change of the unbalance of a twin, and how near its displacements then are."""
+
+
+def twin_of(case):
+    """Return a case with an unbalance that differs as rounding does."""
+    load = case.load
+    if load.unbalances:
+        first, *others = load.unbalances
+        changed = first.model_copy(update={"mass": first.mass * (1.0 + DISTURBANCE)})
+        return replace(case, load=load.model_copy(update={"unbalances": (changed, *others)}))
+    moment = load.static.moment * (1.0 + DISTURBANCE)
+    static = load.static.model_copy(update={"moment": moment})
+    return replace(case, load=load.model_copy(update={"static": static}))
 
 
 def runs_of(machine, cases):
-    """Return the results of cases, side by side, with records."""
+    """Return the results of cases and of their twins, side by side, with records."""
     found = {}
+    both = [one for case in cases for one in (case, twin_of(case))]
     simulate_many(
-        machine, cases, measures=("amplitudes", "gap"), histories=True, workers=1,
+        machine, both, measures=("amplitudes", "gap"), histories=True, workers=1,
         finished=lambda run: found.update({run.number: run}),
     )  # fmt: skip
-    return [found[number] for number in range(len(cases))]
+    return [(found[number], found[number + 1]) for number in range(0, len(both), 2)]
 
 
-def check_equal(page, run):
-    """Check a run of the page against one of the engine."""
-    expected = run.record.displacement.values
+def check_equal(page, run, twin):
+    """Check a run of the page against one of the engine, and its twin."""
+    expected, other = (one.record.displacement.values for one in (run, twin))
     assert page.moved.shape == expected.shape
-    apart = np.abs(page.moved - expected).max(axis=0) / np.abs(expected).max(axis=0)
-    assert apart.max() <= DISPLACEMENT, apart
-    np.testing.assert_allclose(page.sizes, run.values["amplitude"], AMPLITUDE)
+    largest = np.abs(expected).max(axis=0)
+    is_near = np.abs(other - expected).max(axis=1) <= NEAR * largest.max()
+    end = len(is_near) if is_near.all() else int(is_near.argmin())
+    apart = (np.abs(page.moved - expected)[:end] / largest).max()
+    assert end > 0.02 * len(is_near)
+    assert apart <= DISPLACEMENT, f"{apart:.2g} in {end} of {len(is_near)} samples"
+    sizes, sizes_of_twin = (one.values["amplitude"] for one in (run, twin))
+    allowed = AMPLITUDE * sizes + 2.0 * np.abs(sizes_of_twin - sizes)
+    assert (np.abs(page.sizes - sizes) <= allowed).all()
     assert (page.gap is None) == (run.gap is None)
-    assert run.gap is None or abs(page.gap - run.gap.distance) <= GAP
+    if run.gap is not None:
+        wide = 2.0 * abs(twin.gap.distance - run.gap.distance)
+        assert abs(page.gap - run.gap.distance) <= GAP + wide
 
 
 def check_feet(data, page, record):
@@ -82,9 +109,9 @@ def test_each_load_runs_as_with_spin(opened, name):
     parameters = wm.load_machine(name)
     page, machine = opened(parameters)
     cases = [wm.case_of(parameters, load) for load in parameters.loads]
-    for case, run in zip(cases, runs_of(machine.machine, cases), strict=True):
+    for case, (run, twin) in zip(cases, runs_of(machine.machine, cases), strict=True):
         found = page.run(case.name)
-        check_equal(found, run)
+        check_equal(found, run, twin)
         if parameters.cabinet:
             check_feet(page.data, found, run.record)
 
@@ -104,9 +131,9 @@ def test_each_moved_number_is_as_with_spin(opened, name):
         moved = machine.moved_by(parameters, number["key"], step)
         cases.append(replace(wm.case_of(moved, load), parameters=moved))
     assert len(numbers) > 10
-    for number, run in zip(numbers, runs_of(machine.machine, cases), strict=True):
+    for number, pair in zip(numbers, runs_of(machine.machine, cases), strict=True):
         change = [page.data["model"]["places"][number["key"]], moved_value(number)]
-        check_equal(page.run(load, [change]), run)
+        check_equal(page.run(load, [change]), *pair)
 
 
 def test_a_run_that_diverges_says_when(opened, reference):
@@ -140,6 +167,6 @@ def test_a_machine_with_a_stop_runs_as_with_spin(opened, tmp_path):
     parameters = wm.load_machine(tmp_path / "stop.yaml")
     page, machine = opened(parameters)
     assert "elements.buffer.gap" in page.data["model"]["places"]
-    (run,) = runs_of(machine.machine, [wm.case_of(parameters, "middle")])
+    ((run, twin),) = runs_of(machine.machine, [wm.case_of(parameters, "middle")])
     assert float(run.record.stop_force.max()) > 10.0  # it is touched
-    check_equal(page.run("middle"), run)
+    check_equal(page.run("middle"), run, twin)

@@ -22,7 +22,7 @@ from wm_drake.export.kernel import (
     row_writer,
 )
 from wm_drake.export.page_gap import gap_finder
-from wm_drake.export.page_run import force_binner, integrator, measurer, smoother
+from wm_drake.export.page_run import force_binner, integrator, measurer, mount_measurer, smoother
 from wm_drake.export.page_statics import body_changer, foot_loader, settler, strut_placer
 
 
@@ -32,6 +32,7 @@ def page_kernel(plan: Any) -> dict[str, Any]:
         "wm_set_up": _set_up(plan),
         "wm_integrate": integrator(plan),
         "wm_measure": measurer(plan),
+        "wm_measure_mounts": mount_measurer(plan),
         "wm_smooth": smoother(plan),
         "wm_find_gap": gap_finder(plan),
         "wm_bin_forces": force_binner(plan),
