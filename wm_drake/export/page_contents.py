@@ -64,7 +64,9 @@ class Contents:
         self.band = pass_band(profile, self.period)
         self.scene = Scene(parameters)
         self.derived = self._derived()
-        self.start = self.rows(self.setup)
+        # now: the Context is that of every set-up to come
+        self.packed_rows = self.full_rows(self.setup)
+        self.start = self._given(self.packed_rows)
 
     def set_up(
         self, values: Mapping[str, float], *, gasket: bool = True, load: Load | None = None
@@ -78,9 +80,13 @@ class Contents:
 
     def rows(self, setup: Setup) -> FloatArray:
         """Return `full_rows` without what the functions compute from the others."""
-        rows = self.full_rows(setup)
-        rows[self.derived] = 0.0
-        return rows
+        return self._given(self.full_rows(setup))
+
+    def _given(self, rows: FloatArray) -> FloatArray:
+        """Return rows with zeros in place of what the functions compute from the others."""
+        given = rows.copy()
+        given[self.derived] = 0.0
+        return given
 
     def full_rows(self, setup: Setup) -> FloatArray:
         """Return packed numbers, free length of each spring, measured points, numbers of feet."""

@@ -15,14 +15,14 @@ from wm_drake.engines.compiled.mechanics import DRUM_RATE
 from wm_drake.export.kernel import (
     HARMONICS_BEGIN,
     HARMONICS_SIZE,
-    OPTIONS,
     POINTER,
+    RUN_HERE,
     load_adder,
     numbers_at,
     row_writer,
 )
 from wm_drake.export.page_gap import gap_finder
-from wm_drake.export.page_run import force_binner, integrator, measurer, smoother
+from wm_drake.export.page_run import force_binner, integrator, measurer, mount_measurer, smoother
 from wm_drake.export.page_statics import body_changer, foot_loader, settler, strut_placer
 
 
@@ -32,6 +32,7 @@ def page_kernel(plan: Any) -> dict[str, Any]:
         "wm_set_up": _set_up(plan),
         "wm_integrate": integrator(plan),
         "wm_measure": measurer(plan),
+        "wm_measure_mounts": mount_measurer(plan),
         "wm_smooth": smoother(plan),
         "wm_find_gap": gap_finder(plan),
         "wm_bin_forces": force_binner(plan),
@@ -49,7 +50,7 @@ def _set_up(plan: Any) -> Any:
     add_bodies, place_struts, settle = body_changer(plan), strut_placer(plan), settler(plan)
     load_feet, stands = foot_loader(plan), settles and plan.elements.cabinet is not None
 
-    @cfunc(types.float64(POINTER, POINTER), **OPTIONS)
+    @cfunc(types.float64(POINTER, POINTER), **RUN_HERE)
     def wm_set_up(v, c):
         numbers, constants, p = numbers_at(v, 0), numbers_at(c, 0), numbers_at(v, at.packed)
         state, rest = numbers_at(v, at.state), numbers_at(v, at.rest)

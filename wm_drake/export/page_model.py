@@ -182,7 +182,7 @@ def _constants(contents: Contents, chosen: _Chosen) -> dict[str, Any]:
     sections, settled = band_pass(contents.period, contents.band)
     pairs, distances = pair_parts(contents.scene, contents.setup.rest_pose)
     return {
-        "packed": contents.full_rows(contents.setup),
+        "packed": contents.packed_rows,
         "start": [chosen.value_of(key) for key in chosen.slopes],
         "entries": entries_of(zip(rows, slopes, strict=True)),
         **drum_parts(contents.bodies),

@@ -110,33 +110,53 @@ def _midpoint(plan: Any) -> Any:
 
 
 def measurer(plan: Any) -> Any:
-    """Return the function that measures samples: displacements, largest values, forces of mounts.
+    """Return the function that measures samples: displacements, largest values, good samples.
 
     Arguments: v; samples and their number; displacements at each point, written.
     """
-    at, count, elements = plan.at, plan.count, plan.elements
+    at, count, elements, gasket = plan.at, plan.count, plan.elements, plan.gasket
     sample = elements.begins.size + elements.begins.rates
-    bounds, none, gasket = (LARGEST_ANGLE, LARGEST_DISPLACEMENT), np.empty(0, np.int64), plan.gasket
-    samples_of, mounts_of = for_one_run(measure_samples_lanes), for_one_run(measure_mounts_lanes)
-    sums, points = at.answer - at.sums, count.points
-    largest, first = VECTOR_SUMS.offsets["largest"], at.packed + count.numbers + count.springs
+    bounds, none = (LARGEST_ANGLE, LARGEST_DISPLACEMENT), np.empty(0, np.int64)
+    samples_of, points = for_one_run(measure_samples_lanes), count.points
+    first = at.packed + count.numbers + count.springs
 
     @cfunc(types.void(POINTER, POINTER, types.int32, POINTER), **OPTIONS)
     def wm_measure(v, history, rows, moved):
-        numbers, unused = numbers_at(v, 0), part(v, at.step, 0)
         samples, p = part(history, 0, rows * sample), part(v, at.packed, count.numbers)
-        extremes, total = part(v, at.extremes, points + 7), part(v, at.sums, sums)
+        extremes = part(v, at.extremes, points + 7)
         samples_of(
             samples, rows, sample, bounds, p, gasket, elements.mounts.branches,
             part(v, first, POINT_SIZE * points), points, none, part(moved, 0, rows * points),
-            extremes, unused
+            extremes, part(v, at.step, 0)
         )  # fmt: skip
+        numbers_at(v, 0)[at.answer + GAP_SIZE - 1] = extremes[points + 6]
+
+    return wm_measure
+
+
+def mount_measurer(plan: Any) -> Any:
+    """Return the function that finds the largest force of each mount.
+
+    Arguments: v; samples and their number.
+    """
+    at, count, elements = plan.at, plan.count, plan.elements
+    sample, bounds = (
+        elements.begins.size + elements.begins.rates,
+        (LARGEST_ANGLE, LARGEST_DISPLACEMENT),
+    )
+    mounts_of, sums = for_one_run(measure_mounts_lanes), at.answer - at.sums
+    largest = VECTOR_SUMS.offsets["largest"]
+
+    @cfunc(types.void(POINTER, POINTER, types.int32), **OPTIONS)
+    def wm_measure_mounts(v, history, rows):
+        samples, p = part(history, 0, rows * sample), part(v, at.packed, count.numbers)
+        numbers, total = numbers_at(v, 0), part(v, at.sums, sums)
+        unused = part(v, at.step, 0)
         mounts_of(samples, rows, sample, bounds, p, elements.mounts, count.mounts, unused, total)
         for i in range(count.mounts):
             numbers[at.answer + GAP_SIZE + i] = sqrt(total[VECTOR_SIZE * i + largest])
-        numbers[at.answer + GAP_SIZE - 1] = extremes[points + 6]
 
-    return wm_measure
+    return wm_measure_mounts
 
 
 def smoother(plan: Any) -> Any:

@@ -31,8 +31,8 @@ from wm_drake.simulation.steps import checked_integrator, checked_step
 LONGEST_RUN = 300.0
 """Longest spin profile that a page may run. [s]"""
 
-MOST_STEPS = 300_000
-"""Largest number of steps of a run of a page."""
+MOST_STEPS = 1_100_000
+"""Largest number of steps of a run of a page: some seconds, with bodies between tub and housing."""
 
 MOST_BUILT = 4
 """Largest number of machines that are built for one file."""

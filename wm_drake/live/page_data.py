@@ -10,6 +10,7 @@ from typing import Any
 from wm_drake.compiler.kept import kept
 from wm_drake.engines.compiled.multistep import STEPS_BEFORE
 from wm_drake.engines.compiled.stepping import LARGEST_TURN
+from wm_drake.errors import input_error
 from wm_drake.export.page_contents import Contents
 from wm_drake.export.page_kernel import page_kernel
 from wm_drake.export.page_model import (
@@ -20,8 +21,9 @@ from wm_drake.export.page_model import (
 )
 from wm_drake.export.tunable import LEAST
 from wm_drake.export.wasm import wasm_module
-from wm_drake.live.machine import OpenMachine, Slider
+from wm_drake.live.machine import MOST_STEPS, OpenMachine
 from wm_drake.live.measures import foot_title, heads_of, mount_title, shown_measures
+from wm_drake.live.sliders import Slider
 from wm_drake.live.state import PageState
 from wm_drake.model.build import build_machine
 from wm_drake.model.scene import REPLAY_RATE, Scene
@@ -83,6 +85,7 @@ def _page_data(parameters: MachineParameters) -> dict[str, Any]:
         return changed
 
     contents = Contents(opened.machine, move, profile, depths)
+    _check_length(profile.duration / contents.stepping.step)
     model = page_model(contents, candidates)
     functions = page_kernel(model.plan)
     model = without_wrong(model, functions["wm_set_up"].ctypes, contents, candidates)
@@ -101,6 +104,7 @@ def _page_data(parameters: MachineParameters) -> dict[str, Any]:
             "sample": elements.begins.size + elements.begins.rates,
             "padding": round(PADDING_PERIODS / contents.band[0] / contents.period),
             "leastPadding": LEAST_PADDING,
+            "mostSteps": MOST_STEPS,
             "fastest": (1.0 + 1e-9) * 2.0 * math.pi / (SAMPLES_OF_TURN * contents.period),
             "stepping": {
                 "integrator": model.stepping.integrator,
@@ -126,6 +130,16 @@ def _page_data(parameters: MachineParameters) -> dict[str, Any]:
             "replay": {"span": REPLAY_SPAN, "rate": REPLAY_RATE},
         },
     }
+
+
+def _check_length(steps: float) -> None:
+    """Raise an InputError for a run of too many steps."""
+    if steps > MOST_STEPS:
+        raise input_error(
+            f"a run of {steps:.0f} steps is too long for a page; allowed are {MOST_STEPS}: give "
+            "the machine a shorter profile",
+            key="profile.time",
+        )
 
 
 def _candidates(opened: OpenMachine) -> Candidates:

@@ -172,6 +172,12 @@ export class Machine {
     };
   }
 
+  /** Return the largest force of each mount. */
+  mounts() {
+    this.call('wm_measure_mounts', this.v, this.samples, this.rows);
+    return this.answer().slice(10);
+  }
+
   /** Return the smallest and largest forces in parts of the run: [part][signal][least, largest], flat. */
   forces(parts) {
     const {mounts, feet} = this.model.count;

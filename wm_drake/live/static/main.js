@@ -378,7 +378,7 @@ function showForces() {
     const now = band(answer, name);
     const was = band(ghost, name);
     const limit = roundUp(sizeOf([now, was]));
-    const isSize = name.startsWith('mount');
+    const isSize = /^(mount|foot)/.test(name);
     panels.forces.get(name).show({now, ghost: was, low: isSize ? 0 : -limit, high: limit, rpm: [answer.profile.time, answer.profile.rpm]});
   }
 }

@@ -9,7 +9,6 @@ const NOT_AT_REST = {
 };
 const UNBALANCE = ['mass', 'phase', 'y', 'radius']; // in the order of the packed numbers
 const RPM = 30 / Math.PI;
-const MOST_STEPS = 300000;
 
 /** An answer with problems: what is wrong, each with the key of its value. */
 export class Problems extends Error {
@@ -57,7 +56,7 @@ function chosen(state) {
   }
   if (problems.length) throw new Problems(problems);
   if (profile.time.some((t, k) => k > 0 && !(t > profile.time[k - 1]))) throw wrong('profile.time', 'the times must rise');
-  if (profile.time.at(-1) / model.stepping.step > MOST_STEPS) throw wrong('profile.time', `the run is too long for this page; allowed are ${MOST_STEPS} steps`);
+  if (profile.time.at(-1) / model.stepping.step > model.mostSteps) throw wrong('profile.time', `the run is too long for this page; allowed are ${model.mostSteps} steps`);
   const fastest = Math.max(...profile.speed.map(Math.abs));
   if (fastest > model.fastest) throw wrong('profile.speed', `samples and filter of this page are for up to ${Math.floor(RPM * model.fastest)} rpm; export the machine with a faster profile`);
   if (!state.gasket && 'gasket' in model.places) changes.push([model.places.gasket, 0]);
@@ -131,11 +130,12 @@ const pool = new Pool(Math.max(1, Math.min(navigator.hardwareConcurrency || 2, O
 /* ---- answers, as the server gives them ---- */
 
 function gapOf({gap, diverged}, profile) {
-  if (!gap) return {gap: null, diverged: diverged === null ? '' : `the run diverged at ${diverged.toFixed(3)} s`};
+  const text = diverged === null ? '' : `the run diverged at ${diverged.toFixed(3)} s, with the steps of the exported machine`;
+  if (!gap) return {gap: null, diverged: text};
   const [moving, fixed] = data.pairs[gap.pair];
   return {
     gap: {distance: 1e3 * gap.distance, time: gap.time, rpm: RPM * speedAt(profile, gap.time), moving, fixed},
-    diverged: diverged === null ? '' : `the run diverged at ${diverged.toFixed(3)} s`,
+    diverged: text,
   };
 }
 

@@ -3,9 +3,9 @@
 import {digits, draw} from './dom.js';
 import {roundUp, ticks} from './curves.js';
 
-const WIDTH = 800;
-const HEIGHT = 170;
-const LEFT = 52;
+const WIDTH = 500;
+const HEIGHT = 150;
+const LEFT = 46;
 const RIGHT = 12;
 const TOP = 18;
 const BOTTOM = 24;
@@ -86,12 +86,12 @@ export class ProfilePanel {
   redraw() {
     const path = (points) => points.map(([t, rpm], k) => `${k ? 'L' : 'M'}${this.x(t).toFixed(1)} ${this.y(rpm).toFixed(1)}`).join('');
     const parts = [];
-    for (const rpm of ticks(0, this.top, 4)) {
+    for (const rpm of ticks(0, this.top, 3)) {
       const y = this.y(rpm).toFixed(1);
       parts.push(draw('path', {class: 'grid', d: `M${LEFT} ${y}H${WIDTH - RIGHT}`}));
       parts.push(draw('text', {x: String(LEFT - 6), y: String(Number(y) + 5), 'text-anchor': 'end'}, digits(rpm, 4)));
     }
-    ticks(0, this.end, 8).forEach((t, k, all) => parts.push(draw('text', {x: this.x(t).toFixed(1), y: String(HEIGHT - 6), 'text-anchor': k === all.length - 1 ? 'end' : 'middle'}, `${digits(t, 3)}${k === all.length - 1 ? ' s' : ''}`)));
+    ticks(0, this.end, 6).forEach((t, k, all) => parts.push(draw('text', {x: this.x(t).toFixed(1), y: String(HEIGHT - 6), 'text-anchor': k === all.length - 1 ? 'end' : 'middle'}, `${digits(t, 3)}${k === all.length - 1 ? ' s' : ''}`)));
     parts.push(draw('path', {class: 'ghost-line', fill: 'none', d: path(this.corners.map(({time, speed}) => [time.value, speed.value]))}));
     parts.push(draw('path', {class: 'now-line', d: path(this.corners.map(({t, rpm}) => [t, rpm]))}));
     for (const {t, rpm} of this.corners) parts.push(draw('circle', {class: 'corner', cx: this.x(t).toFixed(1), cy: this.y(rpm).toFixed(1), r: '6'}));

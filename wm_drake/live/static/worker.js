@@ -66,7 +66,7 @@ function measures() {
   return {
     sizes: machine.amplitudes().sizes,
     extremes: machine.view(machine.v + 8 * at.extremes, count.points + 6).slice(),
-    mounts: machine.answer().slice(10),
+    mounts: machine.mounts(),
   };
 }
 
