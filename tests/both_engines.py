@@ -60,7 +60,7 @@ class BothEngines:
         tube_sponges = places(self.context, machine.telescopes.values())
         stretches = places(self.context, machine.bushings.values())
         own = places(self.context, machine.others.values())
-        water = places(self.context, [machine.water] if machine.water else [])
+        self._water = water = places(self.context, [machine.water] if machine.water else [])
         count = self.context.num_continuous_states()
         known = np.concatenate([*self._trees, feet, sponges, tube_sponges, stretches, own, water])
         self._motor = np.setdiff1d(np.arange(count), known)
@@ -144,6 +144,7 @@ class BothEngines:
         ]
         for _ in range(count):
             state = rng.uniform(-1.0, 1.0, len(self.sizes)) * self.sizes
+            state[self._water] = np.abs(state[self._water])  # shares
             drake, compiled = self.rates(state, rng.uniform(-20.0, 20.0), rng.uniform(-60.0, 60.0))
             visit()
             for group, smallest in groups:

@@ -10,6 +10,7 @@ from side_by_side import check_runs_alone
 
 import wm_drake as wm
 from wm_drake.engines.compiled.derivative import StateDerivative
+from wm_drake.errors import InputError
 from wm_drake.laws.water import draining_rate
 from wm_drake.parameters import Load, SpinProfile, load_machine
 from wm_drake.simulation.cases import Case
@@ -74,7 +75,8 @@ def test_rates_are_those_of_a_load_with_what_is_left(machine):
     left = np.array([0.55, 0.25])
     dry = TOWELS.with_masses(TOWELS.masses(left))
     assert dry.mass == pytest.approx(0.8 * (0.4 + 0.6 * 0.55) + 0.3 + 0.5 * (0.4 + 0.6 * 0.25))
-    state = np.append(0.1 * both.sizes[: both.states.size - 2], left)
+    state = both.compiled_order(0.1 * both.sizes)
+    state[-2:] = left
     of_dry = StateDerivative(machine.set_up(dry))(state[:-2], 3.0)
     np.testing.assert_allclose(both.derivative(state, 3.0)[:-2], of_dry, rtol=1e-10, atol=1e-10)
 
@@ -133,6 +135,7 @@ def test_energy_leaves_with_the_water():
     assert work - change - (energy[-1] - energy[0]) - dissipated == pytest.approx(gone, rel=5e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["motor", "free_stroke"])
 def test_other_drives_and_dampers_dry_too(name):
     parameters = with_towels(name)
@@ -159,18 +162,18 @@ def test_numbers_of_the_water_can_vary(machine):
     faster = wm.with_value(machine.parameters, key, 0.5)
     cases = [Case("towels", p.loads["towels"], RAMP) for p in (machine.parameters, faster)]
     table = wm.simulate_many(machine, cases, measures=["water"])
-    assert table.mass_left[1] < table.mass_left[0] - 0.05
+    assert table.mass_left[1] < table.mass_left[0] - 0.03
 
 
 def test_more_wet_masses_than_were_built_are_refused():
-    with pytest.raises(wm.InputError, match="loads: this load has 2 masses with water"):
+    with pytest.raises(InputError, match="loads: this load has 2 masses with water"):
         wm.build_machine("reference").set_up(TOWELS).follow_water()
 
 
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("share: 0.6", "share: 1.2", "water.share: .* out of range"),
+        ("share: 0.6", "share: 1.2", "water.share: input should be less than 1"),
         ("(1, 0.7, 0.3)", "(1, 0.7)", "needs as many values of left as of speed"),
         ("(1, 0.7, 0.3)", "(0.5, 0.7, 0.3)", "left must be between 0 and 1 and never rise"),
         ("(0, 400, 1400) rpm", "(100, 400, 1400) rpm", "speed must rise .* begin at 0"),
@@ -189,6 +192,6 @@ def test_errors_of_a_machine_file_name_the_key(old, new, message, tmp_path, wm_d
 def test_a_page_refuses_a_load_that_dries(tmp_path, wm_drake):
     path = tmp_path / "mine.yaml"
     path.write_text(FILE, encoding="utf-8")
-    result = wm_drake("export", "page", path, "--out", tmp_path / "page.html")
+    result = wm_drake("export", "page", "--machine", path, "--out", tmp_path / "page.html")
     assert result.code == 2
     assert "loads.towels" in result.err

@@ -193,8 +193,9 @@ class _Samples:
                 [element.GetOutputPort("state").Eval(context) for element, context in self._others]
             )
         self._motor_torque[row] = self._torque.Eval(self._torque_context)[0]
-        if self._water is not None:
-            context = self._machine.water.GetMyContextFromRoot(self._setup.context)
+        water = self._machine.water
+        if self._water is not None and water is not None:
+            context = water.GetMyContextFromRoot(self._setup.context)
             left = context.get_continuous_state_vector().CopyToVector()
             self._water[row] = left[: self._water.shape[1]]
         feet = self._machine.feet

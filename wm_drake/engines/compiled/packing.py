@@ -3,6 +3,7 @@
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
@@ -114,7 +115,8 @@ def drawn_bodies(setup: Setup) -> "DrawnBodies":
 
 def pack_elements(setup: Setup) -> tuple[FloatArray, Layout]:
     """Return the packed numbers behind the bodies, which no load changes, and the layout of all."""
-    on_tub, indices = setup.elements.packed_on_tub(BODIES_SIZE)
+    on_tub, begins = setup.elements.packed_on_tub(BODIES_SIZE)
+    indices: dict[str, Any] = dict(begins)
     parts, structure = [on_tub], list(setup.elements.structure_on_tub)
     size = BODIES_SIZE + len(on_tub)
 

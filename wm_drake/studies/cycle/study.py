@@ -4,7 +4,7 @@ A cycle of a quarter of an hour at up to 1400 rpm has 720,000 samples. They are 
 piece, and each piece is measured while the next one is integrated.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -91,7 +91,8 @@ class Measured:
     def _gaps(self, piece: Trajectory) -> FloatArray:
         """Return the smallest gap in each window, NaN without shapes. (windows,) [m]"""
         poses, rest = self._windows(piece.state[:, :6]), self.setup.rest_pose
-        gaps = [self.scene.smallest_gap(np.arange(self.rows), each, rest) for each in poses]
+        time = piece.time[: self.rows]  # which of them is not used
+        gaps = [self.scene.smallest_gap(time, each, rest) for each in poses]
         return np.array([np.nan if gap is None else gap.distance for gap in gaps])
 
     def _floor(self, piece: Trajectory) -> dict[str, xr.Variable]:
@@ -175,7 +176,7 @@ def _ahead(pieces: Iterator[Trajectory]) -> Iterator[Trajectory]:
             yield piece
 
 
-OF_PART = {
+OF_PART: dict[str, tuple[Quantity, Callable[[FloatArray], float]]] = {
     "drum_speed": (SPEED.named("highest speed"), lambda values: np.abs(values).max()),
     "mass": (MASS.named("mass at the end"), lambda values: values[-1]),
     "unbalance": (UNBALANCE.named("unbalance at the end"), lambda values: values[-1]),
