@@ -96,7 +96,7 @@ def measurements_of(machine: Machine, file: CandidateFile) -> tuple[CandidateMea
             allowed += _MAKERS[candidate.kind](machine, name, candidate, file)
     if not allowed:
         raise input_error("no candidate fits the machine; allowed are patterns of its parts")
-    return tuple(found)
+    return tuple(allowed)
 
 
 def _of_numbers(

@@ -106,7 +106,8 @@ class Model:
         """Return the matrix K of the estimate, and G J'. (K, n)"""
         rows = np.vstack([self.data_slopes[k] for k in chosen])
         both = self.slopes @ rows.T
-        return np.linalg.solve(rows @ rows.T + np.eye(len(rows)), both.T).T, both
+        gain = np.linalg.solve(rows @ rows.T + np.eye(len(rows)), both.T).T
+        return np.asarray(gain, dtype=float), both
 
     def linear(self, chosen: Sequence[int]) -> FloatArray:
         """Return draws of the answers after measurements that come out as expected. (DRAWS, a)"""
