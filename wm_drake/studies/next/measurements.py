@@ -110,10 +110,10 @@ def _of_numbers(
         part = ".".join(key.split(".")[:2]) if is_pattern else ""
         groups.setdefault(part, []).append(key)
     for part, keys in groups.items():
-        with_sdf_values(machine.plant, machine.parameters, keys)  # names are checked
+        full = with_sdf_values(machine.plant, machine.parameters, keys)  # checks their names
+        deviation = _deviations_of_numbers(full, candidate.accuracy, keys)
         if any(value_at(machine.parameters, key) is None for key in keys):
             continue  # only the SDF has it: nothing about it is in doubt
-        deviation = _deviations_of_numbers(machine.parameters, candidate.accuracy, keys)
         label = part.partition(".")[2] or part
         full = f"{name}.{label}" if label else name
         yield _measurement(full, candidate, label, deviation, _Numbers(tuple(keys)).numbers)

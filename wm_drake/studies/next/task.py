@@ -52,18 +52,18 @@ class NextTask(Task):
     def __init__(self, options: NextOptions, machine: Machine) -> None:
         """Read what is known and what could be measured."""
         self.options = options
+        check_sources(options)
         path = CANDIDATES.path(options.candidates)
         self.file = load_candidates(options.candidates)
         with problems_of_file(path):
             extended = build_machine(with_candidates(machine.parameters, self.file))
+        self.profile = profile_of(extended.parameters, options.profile)
+        with problems_at("--for", ""):
+            self.answers = chosen_responses(extended.parameters, self.profile, options.answers)
+        self.cases = cases_of(machine.parameters, self.profile)
         self.knowledge = knowledge_of(options, extended)
         with problems_of_file(path):
             self.measurements = measurements_of(self.knowledge.machine, self.file)
-        parameters = self.knowledge.machine.parameters
-        self.profile = profile_of(parameters, options.profile)
-        with problems_at("--for", ""):
-            self.answers = chosen_responses(parameters, self.profile, options.answers)
-        self.cases = cases_of(machine.parameters, self.profile)
 
     @property
     def identity(self) -> dict[str, Any]:
@@ -130,18 +130,21 @@ def with_candidates(parameters: MachineParameters, file: CandidateFile) -> Machi
     return with_values(bare, changes) if changes else parameters
 
 
-def knowledge_of(options: NextOptions, machine: Machine) -> Knowledge:
-    """Return what the options say is known.
+def check_sources(options: NextOptions) -> None:
+    """Check that the options say in one way what is known.
 
     Raises:
-        InputError: the options contradict each other, or a file is wrong.
+        InputError: they contradict each other, or one is missing.
     """
     if options.free is not None and options.tolerances is not None:
         raise input_error("is given beside --free; allowed is one of them", where="--tolerances")
     if options.calibrated is not None and options.free is None:
-        raise input_error(
-            "needs the free file of the calibration; add --free FILE", where="--calibrated"
-        )
+        message = "needs the free file of the calibration; add --free FILE"
+        raise input_error(message, where="--calibrated")
+
+
+def knowledge_of(options: NextOptions, machine: Machine) -> Knowledge:
+    """Return what the options say is known."""
     if options.free is None:
         return tolerances_of(options.tolerances or UNMEASURED, machine, options.profile)
     if options.calibrated is None:
