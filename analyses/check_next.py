@@ -36,7 +36,7 @@ FARTHEST = 4.0
 """Bound of the scores of a fit, in deviations of what is known."""
 
 DRAWS = 32
-"""Machines drawn from a posterior, whose gaps give mean and deviation."""
+"""TriedMachines drawn from a posterior, whose gaps give mean and deviation."""
 
 ITERATIONS = 8
 
@@ -97,9 +97,7 @@ def _model(machine: str, tolerances: str, samples: int) -> Model:
     """Return the model of the study."""
     options = NextOptions(machine=machine, tolerances=tolerances)
     task = NextTask(options, build_machine(load_machine(machine)))
-    question = question_of(
-        Here(), task.knowledge, task.measurements, task.answers, task.loads, task.profile
-    )
+    question = question_of(Here(), task.knowledge, task.measurements, task.answers, task.cases)
     return model_of(question, samples, options.seed)
 
 

@@ -8,7 +8,7 @@ from pydantic import Field
 from wm_drake.parameters import units as u
 from wm_drake.parameters.elements import Frozen
 from wm_drake.parameters.files import read_model
-from wm_drake.parameters.machine import Load
+from wm_drake.parameters.spin import Load
 from wm_drake.parameters.text_files import DATA, ShippedFiles
 from wm_drake.parameters.types import Name
 

@@ -232,8 +232,8 @@ def _takes_machine(study: str) -> bool:
 def _answer_of(report: Path) -> str:
     """Return the answer of a report, which is the first paragraph of its page; "" without one."""
     text = report.read_text(encoding="utf-8", errors="replace")
-    found = re.search(r'<p class="summary">(.*?)</p>', text, re.DOTALL)
-    return html.unescape(found[1]) if found else ""
+    summary = re.search(r'<p class="summary">(.*?)</p>', text, re.DOTALL)
+    return html.unescape(summary[1]) if summary else ""
 
 
 def _state(runs: bool, place: int | None, has_report: bool) -> str:

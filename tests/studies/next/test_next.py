@@ -7,7 +7,7 @@ import pytest
 
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.measures.responses import Response
-from wm_drake.studies.next.measurements import Measurement
+from wm_drake.studies.next.measurements import CandidateMeasurement
 from wm_drake.studies.next.question import Observed, Question
 from wm_drake.studies.next.study import (
     Model,
@@ -29,7 +29,9 @@ def linear_model(slopes, data, samples=4000, costs=None, bend=0.0):
     data = [np.atleast_2d(np.asarray(rows, dtype=float)) for rows in data]
     costs = costs or [np.nan] * len(data)
     measurements = tuple(
-        Measurement(f"m{k}", f"m{k}", cost, lambda numbers: numbers, lambda machines: machines)
+        CandidateMeasurement(
+            f"m{k}", f"m{k}", cost, lambda numbers: numbers, lambda machines: machines
+        )
         for k, cost in enumerate(costs)
     )
     loads = tuple(f"load{k}" for k in range(len(slopes)))
@@ -126,8 +128,8 @@ class Made(Question):
 def test_model_of_made_up_machines_has_their_slopes():
     accuracy = np.array([0.1, 0.1])
     measurements = (
-        Measurement("both", "both", 1.0, lambda numbers: accuracy, None),
-        Measurement("nothing", "nothing", 1.0, lambda numbers: accuracy[:1], None),
+        CandidateMeasurement("both", "both", 1.0, lambda numbers: accuracy, None),
+        CandidateMeasurement("nothing", "nothing", 1.0, lambda numbers: accuracy[:1], None),
     )
     question = Made(
         SimpleNamespace(names=("a", "b")), measurements, (GAP,), ("x", "y"), {True: None}

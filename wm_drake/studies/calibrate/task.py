@@ -126,7 +126,8 @@ class CalibrateTask(Task):
             covariance = best.fit.covariance
             return of_calibration(self.machine, calibration.parameter_map, best.point, covariance)
 
-        return next_block(executor, known, " ".join(words), self.targets.loads)
+        profile = self.machine.parameters.profile
+        return next_block(executor, known, " ".join(words), profile, self.targets.loads)
 
 
 def _targets(parameters: MachineParameters, deviations: Mapping[str, float]) -> Targets:

@@ -39,8 +39,8 @@ FREQUENCY, LENGTH, ANGLE = Unit("Hz", "Hz"), Unit("m", "mm"), Unit("rad", "deg")
 
 
 @dataclass(frozen=True)
-class Machines:
-    """Machines, and runs of each.
+class TriedMachines:
+    """TriedMachines, and runs of each.
 
     Attributes:
         machine: Built machine with their elements.
@@ -54,7 +54,7 @@ class Machines:
 
 
 @dataclass(frozen=True)
-class Measurement:
+class CandidateMeasurement:
     """A measurement that could be made.
 
     Attributes:
@@ -71,17 +71,17 @@ class Measurement:
     words: str
     cost: float
     deviations: Callable[[FloatArray], FloatArray]
-    numbers: Callable[[Machines], FloatArray]
+    numbers: Callable[[TriedMachines], FloatArray]
     run: tuple[str, bool] | None = None
     sensors: tuple[str, ...] = ()
 
-    def repeats(self, other: "Measurement") -> bool:
+    def repeats(self, other: "CandidateMeasurement") -> bool:
         """Return whether both read a sensor in the same run, whose error is one and the same."""
         is_same = self.run is not None and self.run == other.run
         return is_same and bool({*self.sensors} & {*other.sensors})
 
 
-def measurements_of(machine: Machine, file: CandidateFile) -> tuple[Measurement, ...]:
+def measurements_of(machine: Machine, file: CandidateFile) -> tuple[CandidateMeasurement, ...]:
     """Return the measurements of a file that a machine allows.
 
     Args:
@@ -90,18 +90,18 @@ def measurements_of(machine: Machine, file: CandidateFile) -> tuple[Measurement,
     Raises:
         InputError: a candidate names an unknown part, or its accuracy is not above 0.
     """
-    found = list[Measurement]()
+    allowed = list[CandidateMeasurement]()
     for name, candidate in file.candidates.items():
         with problems_inside(f"candidates.{name}"):
-            found += _MAKERS[candidate.kind](machine, name, candidate, file)
-    if not found:
+            allowed += _MAKERS[candidate.kind](machine, name, candidate, file)
+    if not allowed:
         raise input_error("no candidate fits the machine; allowed are patterns of its parts")
-    return tuple(found)
+    return tuple(allowed)
 
 
 def _of_numbers(
     machine: Machine, name: str, candidate: NumberCandidate, _: CandidateFile
-) -> Iterator[Measurement]:
+) -> Iterator[CandidateMeasurement]:
     """Yield a measurement of each match of a pattern, or of all keys together."""
     is_pattern = any(ANY in key for key in candidate.keys)
     matches = [keys_like(machine, key) for key in candidate.keys]
@@ -110,10 +110,10 @@ def _of_numbers(
         part = ".".join(key.split(".")[:2]) if is_pattern else ""
         groups.setdefault(part, []).append(key)
     for part, keys in groups.items():
-        with_sdf_values(machine.plant, machine.parameters, keys)  # names are checked
+        full = with_sdf_values(machine.plant, machine.parameters, keys)  # checks their names
+        deviation = _deviations_of_numbers(full, candidate.accuracy, keys)
         if any(value_at(machine.parameters, key) is None for key in keys):
             continue  # only the SDF has it: nothing about it is in doubt
-        deviation = _deviations_of_numbers(machine.parameters, candidate.accuracy, keys)
         label = part.partition(".")[2] or part
         full = f"{name}.{label}" if label else name
         yield _measurement(full, candidate, label, deviation, _Numbers(tuple(keys)).numbers)
@@ -125,7 +125,7 @@ class _Numbers:
 
     keys: tuple[str, ...]
 
-    def numbers(self, machines: Machines) -> FloatArray:
+    def numbers(self, machines: TriedMachines) -> FloatArray:
         """Return the numbers of machines. (machines, n)"""
         rows = [np.concatenate([*_values(p, self.keys)]) for p in machines.parameters]
         return np.array(rows)
@@ -163,7 +163,7 @@ def _deviations_of_numbers(
 
 def _of_bench(
     machine: Machine, name: str, candidate: BenchCandidate, _: CandidateFile
-) -> Iterator[Measurement]:
+) -> Iterator[CandidateMeasurement]:
     """Yield a measurement of each component and axis on the bench."""
     parameters = machine.parameters
     known = [f"damper_types.{kind}" for kind in parameters.damper_types]
@@ -207,7 +207,7 @@ class _Loops:
         component = value_at(parameters, self.component)
         return bushing_bench(component, self.axis) if self.axis else damper_bench(component)
 
-    def numbers(self, machines: Machines) -> FloatArray:
+    def numbers(self, machines: TriedMachines) -> FloatArray:
         """Return the moduli of machines. (machines, 2 loops)"""
         rows = []
         for parameters in machines.parameters:
@@ -229,7 +229,7 @@ def _of_moduli(share: float) -> Callable[[FloatArray], FloatArray]:
 
 def _of_run(
     machine: Machine, name: str, candidate: RunCandidate, file: CandidateFile
-) -> Iterator[Measurement]:
+) -> Iterator[CandidateMeasurement]:
     """Yield a measurement of each load, and of each sensor if they are apart."""
     parameters, deviation = machine.parameters, _constant(_share(candidate.accuracy))
     if not candidate.gasket and parameters.gasket is None:
@@ -255,7 +255,7 @@ class _Reading:
     run: tuple[str, bool]
     sensors: tuple[str, ...]
 
-    def numbers(self, machines: Machines) -> FloatArray:
+    def numbers(self, machines: TriedMachines) -> FloatArray:
         """Return the logarithms of machines. (machines, sensors)"""
         load, gasket = self.run
         read = machines.runs[gasket].amplitude.sel(load=load, sensor=list(self.sensors))
@@ -270,7 +270,7 @@ def _sensor_groups(candidate: RunCandidate, every: Sequence[str]) -> list[tuple[
 
 def _of_modes(
     machine: Machine, name: str, candidate: ModesCandidate, _: CandidateFile
-) -> Iterator[Measurement]:
+) -> Iterator[CandidateMeasurement]:
     """Yield the measurement of natural frequencies."""
     if candidate.gasket or machine.parameters.gasket is not None:
         deviation = _constant(_share(candidate.accuracy))
@@ -283,17 +283,17 @@ class _Frequencies:
 
     candidate: ModesCandidate
 
-    def numbers(self, machines: Machines) -> FloatArray:
+    def numbers(self, machines: TriedMachines) -> FloatArray:
         """Return the logarithms of machines, NaN for a mode that is missing. (machines, n)"""
         rows = np.full((len(machines.parameters), self.candidate.count), np.nan)
         for row, parameters in zip(rows, machines.parameters, strict=True):
             modes = natural_modes(machines.machine, parameters, gasket=self.candidate.gasket)
-            found = modes.frequency.values[: self.candidate.count]
-            row[: len(found)] = np.log(found)
+            frequencies = modes.frequency.values[: self.candidate.count]
+            row[: len(frequencies)] = np.log(frequencies)
         return rows
 
 
-_MAKERS: Mapping[str, Callable[..., Iterator[Measurement]]] = {
+_MAKERS: Mapping[str, Callable[..., Iterator[CandidateMeasurement]]] = {
     "number": _of_numbers,
     "bench": _of_bench,
     "run": _of_run,
@@ -307,11 +307,13 @@ def _measurement(
     candidate: AnyCandidate,
     label: str,
     deviations: Callable[[FloatArray], FloatArray],
-    numbers: Callable[[Machines], FloatArray],
-) -> Measurement:
+    numbers: Callable[[TriedMachines], FloatArray],
+) -> CandidateMeasurement:
     words = (candidate.words or f"{shape_name(name)} {{}}").replace("{}", shape_name(label))
     cost = np.nan if candidate.cost is None else candidate.cost
-    return Measurement(name, f"{words.strip()} (±{candidate.accuracy})", cost, deviations, numbers)
+    return CandidateMeasurement(
+        name, f"{words.strip()} (±{candidate.accuracy})", cost, deviations, numbers
+    )
 
 
 def _constant(share: float) -> Callable[[FloatArray], FloatArray]:

@@ -17,7 +17,7 @@ from wm_drake.simulation.measures.responses import Response
 from wm_drake.simulation.steps import checked_step
 from wm_drake.studies.experiment import Experiment, quantity_of, response_of
 from wm_drake.studies.next.knowledge import Knowledge
-from wm_drake.studies.next.measurements import Machines, Measurement
+from wm_drake.studies.next.measurements import CandidateMeasurement, TriedMachines
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Question:
     """
 
     knowledge: Knowledge
-    measurements: tuple[Measurement, ...]
+    measurements: tuple[CandidateMeasurement, ...]
     answers: tuple[Response, ...]
     loads: tuple[str, ...]
     experiments: Mapping[bool, Experiment]
@@ -42,20 +42,20 @@ class Question:
         """Run the machines at scores (k, p), and return their answers and what is measured."""
         machines = self._machines(scores)
         try:
-            found = self._run(machines, what)
+            tried = self._run(machines, what)
         except InputError:  # only a set-up shows that a machine cannot be run
             machines = self._that_run(machines)
-            found = self._run(machines, what)
+            tried = self._run(machines, what)
         kept = list(machines)
         none = np.empty((len(kept), 0))
-        answers = [none, *(self._signed(found.runs[True], response) for response in self.answers)]
-        numbers = [m.numbers(found).reshape(len(kept), -1) for m in self.measurements]
+        answers = [none, *(self._signed(tried.runs[True], response) for response in self.answers)]
+        numbers = [m.numbers(tried).reshape(len(kept), -1) for m in self.measurements]
         return Observed(
             _placed(np.hstack(answers), kept, len(scores)),
             tuple(_placed(part, kept, len(scores)) for part in numbers),
         )
 
-    def _run(self, machines: Mapping[int, MachineParameters], what: str) -> Machines:
+    def _run(self, machines: Mapping[int, MachineParameters], what: str) -> TriedMachines:
         """Return machines with their runs.
 
         Raises:
@@ -65,7 +65,7 @@ class Question:
             gasket: experiment.at(list(machines), machines.values(), what)
             for gasket, experiment in self.experiments.items()
         }
-        return Machines(self.knowledge.machine, list(machines.values()), runs)
+        return TriedMachines(self.knowledge.machine, list(machines.values()), runs)
 
     def _machines(self, scores: FloatArray) -> dict[int, MachineParameters]:
         """Return the machines at scores by their places, without those that do not exist."""
@@ -103,7 +103,7 @@ class Question:
 
 @dataclass(frozen=True, eq=False)
 class Observed:
-    """Machines at points; NaN if there is no such machine, or a run failed.
+    """TriedMachines at points; NaN if there is no such machine, or a run failed.
 
     Attributes:
         answers: Each answer of each load, signed so that less is better. (k, answers loads) [SI]

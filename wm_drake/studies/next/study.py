@@ -29,7 +29,7 @@ from wm_drake.errors import input_error
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Share
 from wm_drake.report.quantity import HIDDEN, Quantity
-from wm_drake.studies.next.measurements import Measurement
+from wm_drake.studies.next.measurements import CandidateMeasurement
 from wm_drake.studies.next.question import Question, quantities_of
 
 STEP = 1.0
@@ -106,7 +106,8 @@ class Model:
         """Return the matrix K of the estimate, and G J'. (K, n)"""
         rows = np.vstack([self.data_slopes[k] for k in chosen])
         both = self.slopes @ rows.T
-        return np.linalg.solve(rows @ rows.T + np.eye(len(rows)), both.T).T, both
+        gain = np.linalg.solve(rows @ rows.T + np.eye(len(rows)), both.T).T
+        return np.asarray(gain, dtype=float), both
 
     def linear(self, chosen: Sequence[int]) -> FloatArray:
         """Return draws of the answers after measurements that come out as expected. (DRAWS, a)"""
@@ -183,7 +184,7 @@ def _with_data(model: Model, near: Sequence[FloatArray], seed: int) -> Model:
     """
     question, rng = model.question, np.random.default_rng([seed, 1])
     drawn = None if model.is_linear else question.at(model.scores, "samples measured").numbers
-    chosen, slopes, data = list[Measurement](), list[FloatArray](), list[FloatArray]()
+    chosen, slopes, data = list[CandidateMeasurement](), list[FloatArray](), list[FloatArray]()
     for number, (measurement, numbers) in enumerate(zip(question.measurements, near, strict=True)):
         deviation = measurement.deviations(numbers[0])
         slope = _slopes(numbers) / deviation[:, None]

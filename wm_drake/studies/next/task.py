@@ -1,13 +1,13 @@
 """Check the options of the study of what to measure next, and run it."""
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import Any
 
 from wm_drake.errors import InputError, input_error, problems_at
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
-from wm_drake.parameters import MachineParameters, with_values
+from wm_drake.parameters import MachineParameters, SpinProfile, with_values
 from wm_drake.parameters.candidates import CANDIDATES, CandidateFile, load_candidates
 from wm_drake.parameters.machine import FrameOverride, Sensor
 from wm_drake.simulation.cases import Case
@@ -29,7 +29,7 @@ from wm_drake.studies.next.knowledge import (
     of_free_file,
     of_tolerances,
 )
-from wm_drake.studies.next.measurements import Measurement, measurements_of
+from wm_drake.studies.next.measurements import CandidateMeasurement, measurements_of
 from wm_drake.studies.next.options import NextOptions
 from wm_drake.studies.next.page import BLOCK, next_answer, next_part
 from wm_drake.studies.next.question import Question
@@ -52,18 +52,18 @@ class NextTask(Task):
     def __init__(self, options: NextOptions, machine: Machine) -> None:
         """Read what is known and what could be measured."""
         self.options = options
+        check_sources(options)
         path = CANDIDATES.path(options.candidates)
         self.file = load_candidates(options.candidates)
         with problems_of_file(path):
             extended = build_machine(with_candidates(machine.parameters, self.file))
+        self.profile = profile_of(extended.parameters, options.profile)
+        with problems_at("--for", ""):
+            self.answers = chosen_responses(extended.parameters, self.profile, options.answers)
+        self.cases = cases_of(machine.parameters, self.profile)
         self.knowledge = knowledge_of(options, extended)
         with problems_of_file(path):
             self.measurements = measurements_of(self.knowledge.machine, self.file)
-        parameters = self.knowledge.machine.parameters
-        self.profile = profile_of(parameters, options.profile)
-        with problems_at("--for", ""):
-            self.answers = chosen_responses(parameters, self.profile, options.answers)
-        self.loads = tuple(machine.parameters.loads)
 
     @property
     def identity(self) -> dict[str, Any]:
@@ -78,7 +78,7 @@ class NextTask(Task):
     def run(self, executor: Executor) -> Answer:
         """Run the machines near the middle and those drawn, and rank the measurements."""
         question = question_of(
-            executor, self.knowledge, self.measurements, self.answers, self.loads, self.profile
+            executor, self.knowledge, self.measurements, self.answers, self.cases
         )
         model = model_of(question, self.options.samples, self.options.seed)
         return next_answer(model, self.options.budget, self.file.about)
@@ -88,6 +88,7 @@ def next_block(
     executor: Executor,
     knowledge: Callable[[], Knowledge],
     command: str,
+    profile: SpinProfile,
     measured: Collection[tuple[str, bool]] = (),
 ) -> Part:
     """Return the block on what to measure next for the page of another study.
@@ -97,6 +98,7 @@ def next_block(
     Args:
         knowledge: Function that returns what is known of the machine.
         command: Command of the whole study.
+        profile: Spin profile of all runs.
         measured: Load and gasket of runs that are measured already.
     """
     try:
@@ -105,9 +107,9 @@ def next_block(
         usual = measurements_of(known.machine, load_candidates())
         left = tuple(m for m in usual if m.run is None or (m.run[1] and m.run not in measured))
         names = (GAP,) if has_gap(parameters) else ("amplitude",)
-        profile, loads = parameters.profile, tuple(parameters.loads)
+        cases = cases_of(parameters, profile)
         answers = chosen_responses(parameters, profile, names)
-        question = question_of(executor, known, left, answers, loads, profile)
+        question = question_of(executor, known, left, answers, cases)
         return next_part(model_of(question, FEW, 0), BLOCK_BUDGET, command)
     except InputError as error:
         return Part(BLOCK, text=f"Not computed: {error.problems[0]}. Try {command}.")
@@ -128,18 +130,21 @@ def with_candidates(parameters: MachineParameters, file: CandidateFile) -> Machi
     return with_values(bare, changes) if changes else parameters
 
 
-def knowledge_of(options: NextOptions, machine: Machine) -> Knowledge:
-    """Return what the options say is known.
+def check_sources(options: NextOptions) -> None:
+    """Check that the options say in one way what is known.
 
     Raises:
-        InputError: the options contradict each other, or a file is wrong.
+        InputError: they contradict each other, or one is missing.
     """
     if options.free is not None and options.tolerances is not None:
         raise input_error("is given beside --free; allowed is one of them", where="--tolerances")
     if options.calibrated is not None and options.free is None:
-        raise input_error(
-            "needs the free file of the calibration; add --free FILE", where="--calibrated"
-        )
+        message = "needs the free file of the calibration; add --free FILE"
+        raise input_error(message, where="--calibrated")
+
+
+def knowledge_of(options: NextOptions, machine: Machine) -> Knowledge:
+    """Return what the options say is known."""
     if options.free is None:
         return tolerances_of(options.tolerances or UNMEASURED, machine, options.profile)
     if options.calibrated is None:
@@ -154,30 +159,40 @@ def tolerances_of(file: str, machine: Machine, profile: Path | None) -> Knowledg
     return of_tolerances(task.machine, task.uncertain, f"tolerances {file}")
 
 
+def cases_of(parameters: MachineParameters, profile: SpinProfile) -> tuple[Case, ...]:
+    """Return a case of each load of a machine."""
+    return tuple(Case(name, load, profile) for name, load in parameters.loads.items())
+
+
 def question_of(
     executor: Executor,
     knowledge: Knowledge,
-    measurements: tuple[Measurement, ...],
+    measurements: tuple[CandidateMeasurement, ...],
     answers: tuple[Response, ...],
-    loads: tuple[str, ...],
-    profile: Any,
+    cases: Sequence[Case],
 ) -> Question:
-    """Return the question with the runs that it needs."""
+    """Return the question with the runs that it needs.
+
+    Args:
+        cases: Case of each load of the answers; their profile is that of all runs.
+    """
     parameters = knowledge.machine.parameters
     needed = {*measures_of(parameters, answers), "amplitudes"}
     measures = tuple(name for name in MEASURES if name in needed)
-    runs: Mapping[bool, list[str]] = {True: list(loads), False: []}
-    for measurement in measurements:
-        if measurement.run is not None and measurement.run[0] not in runs[measurement.run[1]]:
-            runs[measurement.run[1]].append(measurement.run[0])
+    loads = tuple(case.name for case in cases)
+    runs = dict.fromkeys([*((load, True) for load in loads), *(m.run for m in measurements)])
     experiments = {
         gasket: Experiment(
             knowledge.machine,
             measures,
             executor.simulate,
-            tuple(Case(name, parameters.loads[name], profile, gasket) for name in names),
+            tuple(
+                Case(run[0], parameters.loads[run[0]], cases[0].profile, gasket)
+                for run in runs
+                if run is not None and run[1] is gasket
+            ),
         )
-        for gasket, names in runs.items()
-        if names
+        for gasket in (True, False)
+        if any(run is not None and run[1] is gasket for run in runs)
     }
     return Question(knowledge, measurements, answers, loads, experiments)

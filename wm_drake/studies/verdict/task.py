@@ -129,7 +129,7 @@ class VerdictTask(Task):
         def known() -> Knowledge:
             return tolerances_of(UNMEASURED, self.machine, profile)
 
-        return next_block(executor, known, _study_next(self.options))
+        return next_block(executor, known, _study_next(self.options), self.cases[0].profile)
 
 
 def _study_next(options: VerdictOptions) -> str:
