@@ -129,8 +129,13 @@ KINDS = {
         "--profile", "short_cycle.yaml",
     ),
     "verdict": _one("sections.html", "verdict", "short.yaml", "--samples", "16", "--profile", "short_cycle.yaml"),
+    "next": _one(
+        "sections.html", "study", "next", "--free", "free.yaml", "--samples", "32", "--budget", "2",
+        "--profile", "short_cycle.yaml",
+    ),
     "design": _one("sections.html", "study", "design", "gasket", "--evaluations", "48", "--population", "16", "--profile", "short_cycle.yaml"),
     "balancer": _one("sections.html", "study", "balancer", "--quick"),
+    "cycle": _one("sections.html", "study", "cycle", "--profile", "short_cycle.yaml"),
     "drive": _one("sections.html", "study", "drive", "--load", "middle", "--torques", "3", "--unbalances", "2", "--loads", "4"),
 }  # fmt: skip
 

@@ -75,7 +75,7 @@ def test_wheel_holds_the_data_and_nothing_else(wheel):
         ("sdf", "*"),
         ("wm_drake", "data/**/*"),
         ("wm_drake", "export/c/*.c"),
-        ("wm_drake", "studio/static/*"),
+        ("wm_drake", "live/static/*"),
         ("wm_drake", "**/*.py"),
         ("wm_drake", "**/*.html"),
         ("wm_drake", "**/*.js"),
@@ -133,6 +133,7 @@ wm-drake study gasket --quick --response D --profile short_cycle.yaml --out gask
 wm-drake study gasket-damping --mesh 20 --record middle=spin/record_middle.nc --out gasket_damping
 wm-drake study gasket-geometry --quick --profile short_cycle.yaml --out gasket_geometry
 wm-drake study modes --quick --out modes
+wm-drake study next short.yaml --quick --free free.yaml --out next
 wm-drake study response --quick --load middle --out response
 wm-drake study spin-cycle --quick --profile eight_regions.yaml --out spin_cycle
 wm-drake study spin-identify --quick --case 2 --unknown 'gasket.stiffness_y=(1, 4) N/mm' --profile short_cycle.yaml --out spin_identify

@@ -15,7 +15,7 @@ from wm_drake.parameters.measured import measured_amplitudes, measured_responses
 from wm_drake.parameters.units import plain_number
 from wm_drake.simulation.cases import case_of
 from wm_drake.simulation.records import Record
-from wm_drake.studies.answer import Answer
+from wm_drake.studies.answer import Answer, Part
 from wm_drake.studies.calibrate.options import CalibrateOptions
 from wm_drake.studies.calibrate.page import calibrate_answer
 from wm_drake.studies.calibrate.parameter_map import parameter_map_of
@@ -23,12 +23,19 @@ from wm_drake.studies.calibrate.prediction import check_held_out, predict
 from wm_drake.studies.calibrate.records_task import CalibrateRecordsTask
 from wm_drake.studies.calibrate.response_targets import with_deviations
 from wm_drake.studies.calibrate.solutions import DIFFERENCE, solved_machine
-from wm_drake.studies.calibrate.study import RELATIVE_DEVIATION, SearchPlan, calibrate
+from wm_drake.studies.calibrate.study import (
+    RELATIVE_DEVIATION,
+    Calibration,
+    SearchPlan,
+    calibrate,
+)
 from wm_drake.studies.calibrate.targets import AMPLITUDE, MEASURED, Targets, targets_of
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.inputs import existing_file, pairs_of, with_measured
 from wm_drake.studies.modes.natural import natural_modes
+from wm_drake.studies.next.knowledge import Knowledge, of_calibration
+from wm_drake.studies.next.task import next_block
 from wm_drake.studies.study import Task
 
 OF_RECORDS = ("unknown", "by", "test", "load", "profile", "speed", "unit", "channels")
@@ -56,7 +63,7 @@ class CalibrateTask(Task):
                 raise input_error("is about records, and none is given", where=f"--{name}")
         if options.free is None:
             raise input_error("is missing; name a file of free quantities", where="--free")
-        self.held_out = _groups(options.leave_out)
+        self.options, self.held_out = options, _groups(options.leave_out)
         measured = with_measured(machine.parameters, options.targets, "--targets")
         deviations = _fractions(options.deviation, "--deviation")
         amplitude = deviations.pop(AMPLITUDE, RELATIVE_DEVIATION)
@@ -105,7 +112,22 @@ class CalibrateTask(Task):
         states = titles if parameters.gasket else {False: "modes"}
         modes = {title: natural_modes(best, gasket=gasket) for gasket, title in states.items()}
         runs = [records[number] for number in range(len(cases))]
-        return calibrate_answer(calibration, predictions, parameters, runs, modes)
+        answer = calibrate_answer(calibration, predictions, parameters, runs, modes)
+        part = self._next(executor, calibration)
+        return replace(answer, parts=(*answer.parts, part))
+
+    def _next(self, executor: Executor, calibration: Calibration) -> Part:
+        """Return what to measure next, given the best solution of a calibration."""
+        best, options = calibration.solutions[0], self.options
+        words = ["wm-drake study next", options.machine, f"--free {options.free}"]
+        words += [f"--calibrated {executor.out or 'FOLDER'}"]
+
+        def known() -> Knowledge:
+            covariance = best.fit.covariance
+            return of_calibration(self.machine, calibration.parameter_map, best.point, covariance)
+
+        profile = self.machine.parameters.profile
+        return next_block(executor, known, " ".join(words), profile, self.targets.loads)
 
 
 def _targets(parameters: MachineParameters, deviations: Mapping[str, float]) -> Targets:

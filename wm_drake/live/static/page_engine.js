@@ -9,7 +9,6 @@ const NOT_AT_REST = {
 };
 const UNBALANCE = ['mass', 'phase', 'y', 'radius']; // in the order of the packed numbers
 const RPM = 30 / Math.PI;
-const MOST_STEPS = 300000;
 
 /** An answer with problems: what is wrong, each with the key of its value. */
 export class Problems extends Error {
@@ -57,7 +56,7 @@ function chosen(state) {
   }
   if (problems.length) throw new Problems(problems);
   if (profile.time.some((t, k) => k > 0 && !(t > profile.time[k - 1]))) throw wrong('profile.time', 'the times must rise');
-  if (profile.time.at(-1) / model.stepping.step > MOST_STEPS) throw wrong('profile.time', `the run is too long for this page; allowed are ${MOST_STEPS} steps`);
+  if (profile.time.at(-1) / model.stepping.step > model.mostSteps) throw wrong('profile.time', `the run is too long for this page; allowed are ${model.mostSteps} steps`);
   const fastest = Math.max(...profile.speed.map(Math.abs));
   if (fastest > model.fastest) throw wrong('profile.speed', `samples and filter of this page are for up to ${Math.floor(RPM * model.fastest)} rpm; export the machine with a faster profile`);
   if (!state.gasket && 'gasket' in model.places) changes.push([model.places.gasket, 0]);
@@ -84,6 +83,8 @@ class Pool {
   constructor(size) {
     this.idle = [];
     this.jobs = [];
+    this.later = [];   // jobs of the background: one at a time, when nothing else runs or waits
+    this.urgent = 0;   // how many others run
     const url = URL.createObjectURL(new Blob([data.worker], {type: 'text/javascript'}));
     const bytes = Uint8Array.from(atob(data.wasm), (letter) => letter.charCodeAt(0));
     this.ready = WebAssembly.compile(bytes).then((module) => {
@@ -96,17 +97,27 @@ class Pool {
     });
   }
 
-  run(job) {
-    return new Promise((resolve, reject) => { this.jobs.push({job, resolve, reject}); this.start(); });
+  run(job, isUrgent = true) {
+    return new Promise((resolve, reject) => { (isUrgent ? this.jobs : this.later).push({job, resolve, reject}); this.start(); });
   }
 
   start() {
-    while (this.idle.length && this.jobs.length) {
-      const {job, resolve, reject} = this.jobs.shift();
-      const kept = this.idle.findIndex((one) => one.load === job.load);
-      const [worker] = this.idle.splice(Math.max(0, kept), 1);
-      worker.load = job.load;
-      const done = (act) => (event) => { this.idle.push(worker); act(event); this.start(); };
+    while (this.idle.length) {
+      const isUrgent = this.jobs.length > 0;
+      if (!isUrgent && (this.urgent || this.isBusy || !this.later.length)) return;
+      const {job, resolve, reject} = (isUrgent ? this.jobs : this.later).shift();
+      // a worker keeps the samples of its last run; the background takes the one that it had
+      const load = isUrgent ? job.load : 'in the background';
+      const kept = this.idle.findIndex((one) => one.load === load);
+      const [worker] = this.idle.splice(kept < 0 && isUrgent ? 0 : kept, 1);
+      worker.load = load;
+      if (isUrgent) this.urgent += 1; else this.isBusy = true;
+      const done = (act) => (event) => {
+        this.idle.push(worker);
+        if (isUrgent) this.urgent -= 1; else this.isBusy = false;
+        act(event);
+        this.start();
+      };
       worker.onmessage = done(({data: found}) => resolve(found));
       worker.onerror = done((event) => { event.preventDefault(); reject(new Error(`the run failed: ${event.message}`)); });
       worker.postMessage(job);
@@ -119,11 +130,12 @@ const pool = new Pool(Math.max(1, Math.min(navigator.hardwareConcurrency || 2, O
 /* ---- answers, as the server gives them ---- */
 
 function gapOf({gap, diverged}, profile) {
-  if (!gap) return {gap: null, diverged: diverged === null ? '' : `the run diverged at ${diverged.toFixed(3)} s`};
+  const text = diverged === null ? '' : `the run diverged at ${diverged.toFixed(3)} s, with the steps of the exported machine`;
+  if (!gap) return {gap: null, diverged: text};
   const [moving, fixed] = data.pairs[gap.pair];
   return {
     gap: {distance: 1e3 * gap.distance, time: gap.time, rpm: RPM * speedAt(profile, gap.time), moving, fixed},
-    diverged: diverged === null ? '' : `the run diverged at ${diverged.toFixed(3)} s`,
+    diverged: text,
   };
 }
 
@@ -180,22 +192,54 @@ async function run({state}) {
   };
 }
 
-async function numbers({state}) {
+/** Return the job that measures the run of a state. */
+function measuringJob(state, kind) {
   const {changes, loads, profile} = chosen(state);
   const own = described(state);
   const load = own ? 'described' : state.load;
-  const found = await pool.run({load, profile, changes: [...changes, ...ofLoad(own ?? loads[load])], kind: 'numbers'});
+  return {load, profile, changes: [...changes, ...ofLoad(own ?? loads[load])], kind};
+}
+
+/** Return the rows of the table of measures. */
+function rowsOf(found) {
   const value = ({from: [name, index], factor}) => {
     const number = name === 'gap' ? found.gap?.distance : found[name]?.[index];
     return Number.isFinite(number) ? factor * number : null;
   };
   const rows = data.rows.map((row) => ({...row, value: value(row)}));
   for (const row of rows) row.alarm = row.touches && row.value !== null && row.value <= 0;
-  return {rows, forces: found.bands ? forces(found) : null, arrows: []};
+  return rows;
+}
+
+async function numbers({state}) {
+  const found = await pool.run(measuringJob(state, 'numbers'));
+  return {rows: rowsOf(found), forces: found.bands ? forces(found) : null, arrows: null};
+}
+
+/** Return what each number does when it is moved by a hundredth of its slider, up if it can be. */
+async function arrows({state, keys}, isOvertaken) {
+  const job = measuringJob(state, 'measures');
+  const {values} = chosen(state);
+  const before = rowsOf(await pool.run(job, false));
+  const found = [];
+  for (const key of keys.filter((one) => one in model.places)) {
+    const {low, high, value, units, unit} = numberOf.get(key);
+    const step = (high - low) / 100;
+    for (const sign of [1, -1]) {
+      if (isOvertaken()) return {overtaken: true};
+      const moved = [model.places[key], ((values[key] ?? value) + sign * step) * units[unit]];
+      const answer = await pool.run({...job, changes: [...job.changes, moved]}, false);
+      if (answer.status < 0) continue;
+      const changes = rowsOf(answer).map((row, k) => (row.value === null || before[k].value === null ? null : sign * (row.value - before[k].value)));
+      found.push({key, step, changes});
+      break;
+    }
+  }
+  return {arrows: found};
 }
 
 function forces({bands, good, time}) {
-  const signals = 6 + model.count.mounts;
+  const signals = 6 + model.count.mounts + model.count.feet;
   const parts = bands.length / (2 * signals);
   const at = (k) => Math.ceil((k * good) / parts);
   return {
@@ -215,7 +259,7 @@ function inTurn(page, calculate) {
     if (turn.running || !turn.waiting) return;
     const {work, resolve, reject} = turn.waiting;
     [turn.running, turn.waiting] = [true, null];
-    try { resolve(await work()); } catch (error) { reject(error); }
+    try { resolve(await work(() => Boolean(turn.waiting))); } catch (error) { reject(error); }
     turn.running = false;
     next();
   };
@@ -228,15 +272,15 @@ function inTurn(page, calculate) {
 
 export async function get(path) {
   if (path.startsWith('machine?')) return machine;
-  if (path === 'machines') return {machines: [{id: machine.name, kind: 'exported'}], first: machine.name, folder: '', program: data.program};
+  if (path === 'machines') return {machines: [{id: machine.name, kind: 'exported'}], first: machine.name, begin: data.begin, folder: '', program: data.program};
   throw new Error(`this page has no server: ${path}`);
 }
 
 export async function post(path, body) {
   await pool.ready;
-  const answer = {run, numbers}[path];
+  const answer = {run, numbers, arrows, ranking: arrows}[path];
   if (!answer) throw new Error(`this page has no server: ${path}`);
-  return inTurn(`${path} ${body.page}`, () => answer(body));
+  return inTurn(`${path} ${body.page}`, (isOvertaken) => answer(body, isOvertaken));
 }
 
 /* ---- back to the command line ---- */

@@ -20,7 +20,9 @@ export function fromLink() {
 
 export function intoLink(state, variants) {
   const kept = variants.map(({name, state: of}) => ({name, state: of}));
-  history.replaceState(null, '', `#${encodeURIComponent(JSON.stringify({state, variants: kept}))}`);
+  try {
+    history.replaceState(null, '', `#${encodeURIComponent(JSON.stringify({state, variants: kept}))}`);
+  } catch { /* a page in a frame may have no address of its own */ }
 }
 
 export class History {

@@ -17,9 +17,11 @@ export function scheduleOf({time: corners, speed}, {step, period, control, steps
   rates.forEach((_, k) => angles.push(angles[k] + 0.5 * (speed[k + 1] + speed[k]) * (corners[k + 1] - corners[k])));
   const schedule = {
     count, time: multiples(period),
-    length: new Float64Array(count), rate: new Float64Array(count), drum: new Float64Array(4 * (2 * count + 1)),
-    row: new Int32Array(count).fill(-1), controls: new Uint8Array(count), one: new Uint8Array(count),
+    motion: new Float64Array(2 * count + 4 * (2 * count + 1)), marks: new Int32Array(3 * count),
   };
+  const [lengths, accelerations, drum] = [schedule.motion.subarray(0, count), schedule.motion.subarray(count, 2 * count), schedule.motion.subarray(2 * count)];
+  const [row, controls, one] = [0, 1, 2].map((k) => schedule.marks.subarray(k * count, (k + 1) * count));
+  row.fill(-1);
   const nearest = (t, of) => (Math.abs(t - of * Math.round(t / of)) < 1e-9 * of ? Math.round(t / of) : -1);
   let piece = 0;
   const pieceAt = (t) => {
@@ -31,24 +33,24 @@ export function scheduleOf({time: corners, speed}, {step, period, control, steps
     const k = pieceAt(t);
     const since = t - corners[k];
     const angle = angles[k] + (speed[k] + 0.5 * rates[k] * since) * since;
-    schedule.drum.set([speed[k] + rates[k] * since, Math.cos(angle), Math.sin(angle), angle], 4 * node);
+    drum.set([speed[k] + rates[k] * since, Math.cos(angle), Math.sin(angle), angle], 4 * node);
   };
   let at = 0;
   let alike = 0;
   marks.forEach((mark, k) => {
     const length = ((k + 1 < marks.length ? marks[k + 1] : mark) - mark) / pieces[k];
-    schedule.row[at] = nearest(mark, period);
-    schedule.controls[at] = control && nearest(mark, control) >= 0 ? 1 : 0;
+    row[at] = nearest(mark, period);
+    controls[at] = control && nearest(mark, control) >= 0 ? 1 : 0;
     for (let j = 0; j < pieces[k]; j += 1, at += 1) {
       const begin = mark + j * length;
       const middle = begin + 0.5 * length;
-      schedule.length[at] = length;
-      schedule.rate[at] = Math.min(middle, end) > end ? 0 : rates[pieceAt(Math.min(middle, end))];
+      lengths[at] = length;
+      accelerations[at] = Math.min(middle, end) > end ? 0 : rates[pieceAt(Math.min(middle, end))];
       putDrum(2 * at, begin);
       putDrum(2 * at + 1, middle);
-      const goesOn = at > 0 && Math.abs(length - schedule.length[at - 1]) <= 1e-9 * schedule.length[at - 1] && schedule.rate[at] === schedule.rate[at - 1];
+      const goesOn = at > 0 && Math.abs(length - lengths[at - 1]) <= 1e-9 * lengths[at - 1] && accelerations[at] === accelerations[at - 1];
       alike = goesOn ? alike + 1 : 0;
-      schedule.one[at] = stepsBefore >= 0 && alike >= stepsBefore ? 1 : 0;
+      one[at] = stepsBefore >= 0 && alike >= stepsBefore ? 1 : 0;
     }
   });
   putDrum(2 * count, end);
@@ -135,10 +137,10 @@ export class Machine {
     }
     const s = this.schedule;
     const rows = s.time.length;
-    const steps = [s.length, s.rate, s.drum, s.row, s.controls, s.one].map((part) => this.put(part));
+    const [motion, marks] = [this.put(s.motion), this.put(s.marks)];
     this.rows = rows;
     this.samples = this.floats(rows * model.sample);
-    this.call('wm_integrate', this.v, this.c, ...steps, s.count, this.samples, rows);
+    this.call('wm_integrate', this.v, this.c, motion, marks, s.count, this.samples, rows);
     this.moved = this.floats(rows * model.count.points);
     this.call('wm_measure', this.v, this.samples, rows, this.moved);
     this.good = this.answer()[9];
@@ -163,16 +165,23 @@ export class Machine {
     const places = this.allocate(8 * sensors);
     const isComplete = this.good === rows && padding > 0;
     if (!isComplete) this.view(filtered, rows * sensors).fill(NaN);
-    this.call('wm_smooth', this.c, this.moved, rows, sensors, isComplete ? padding : 0, this.floats(rows + 2 * padding), filtered, sizes, places);
+    this.call('wm_smooth', this.c, this.moved, rows, isComplete ? padding : 0, this.floats(rows + 2 * padding), filtered, sizes, places);
     return {
       filtered: this.view(filtered, rows * sensors).slice(), sizes: this.view(sizes, sensors).slice(),
       places: Array.from(new BigInt64Array(this.memory.buffer, places, sensors), Number),
     };
   }
 
+  /** Return the largest force of each mount. */
+  mounts() {
+    this.call('wm_measure_mounts', this.v, this.samples, this.rows);
+    return this.answer().slice(10);
+  }
+
   /** Return the smallest and largest forces in parts of the run: [part][signal][least, largest], flat. */
   forces(parts) {
-    const size = 2 * parts * (6 + this.model.count.mounts);
+    const {mounts, feet} = this.model.count;
+    const size = 2 * parts * (6 + mounts + feet);
     const bands = this.floats(size);
     this.call('wm_bin_forces', this.v, this.samples, this.good, parts, bands);
     return this.view(bands, size).slice();

@@ -61,17 +61,16 @@ function picture({orbits, replay}) {
   return {filtered, paths, largest, motion: motionAround(largest, replay), rest: poseAt(0)};
 }
 
-function numbers() {
+function measures() {
   const {model: {at, count}} = machine;
   return {
     sizes: machine.amplitudes().sizes,
     extremes: machine.view(machine.v + 8 * at.extremes, count.points + 6).slice(),
-    mounts: machine.answer().slice(10),
-    bands: machine.forces(Math.min(BINS, machine.good)),
+    mounts: machine.mounts(),
   };
 }
 
-/** Return what a job asks for: the gap, and "picture", "numbers" or "samples" of the run. */
+/** Return what a job asks for: the gap, and "picture", "measures", "numbers" (with forces) or "samples". */
 export function answer(job) {
   prepare(job);
   if (status < 0) return {status};
@@ -82,7 +81,8 @@ export function answer(job) {
     status, good, time: job.kind === 'gap' ? [] : Array.from(time.slice(0, good)), rows,
     diverged: good < rows ? time[good] : null,
     gap: gap && {...gap, time: time[gap.row], pose: poseAt(gap.row)},
-    ...more, ...(good > 1 && job.kind === 'numbers' ? numbers() : {}),
+    ...more, ...(good > 1 && ['numbers', 'measures'].includes(job.kind) ? measures() : {}),
+    ...(good > 1 && job.kind === 'numbers' ? {bands: machine.forces(Math.min(BINS, good))} : {}),
     ...(job.kind === 'samples' ? {moved: machine.view(machine.moved, rows * machine.model.count.points).slice()} : {}),
   };
 }

@@ -1,34 +1,30 @@
-"""Write a machine as one file that runs it in a browser: `wm-drake export page`.
-
-The page is that of the studio. Its engine is the compiled machine (`wm_drake.export.page_kernel`)
-in place of the server.
-"""
+"""What a page without a server knows of its machine: compiled code, numbers, words."""
 
 import base64
-import hashlib
-import html
 import json
 import math
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Mapping
 from typing import Any
 
 from wm_drake.compiler.kept import kept
 from wm_drake.engines.compiled.multistep import STEPS_BEFORE
 from wm_drake.engines.compiled.stepping import LARGEST_TURN
-from wm_drake.errors import check_known, input_error, reason_of
+from wm_drake.errors import input_error
+from wm_drake.export.page_contents import Contents
 from wm_drake.export.page_kernel import page_kernel
 from wm_drake.export.page_model import (
     UNBALANCE_FIELDS,
     Candidates,
-    Contents,
     page_model,
     without_wrong,
 )
 from wm_drake.export.tunable import LEAST
 from wm_drake.export.wasm import wasm_module
+from wm_drake.live.machine import MOST_STEPS, OpenMachine
+from wm_drake.live.measures import foot_title, heads_of, mount_title, shown_measures
+from wm_drake.live.sliders import Slider
+from wm_drake.live.state import PageState
 from wm_drake.model.build import build_machine
 from wm_drake.model.scene import REPLAY_RATE, Scene
 from wm_drake.parameters import MachineParameters
@@ -38,22 +34,16 @@ from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import shape_name
 from wm_drake.report.provenance import program
 from wm_drake.simulation.band import PADDING_PERIODS
-from wm_drake.simulation.cases import notice_jumping_friction
-from wm_drake.simulation.displacements import LEAST_PADDING, REPLAY_SPAN
+from wm_drake.simulation.displacements import (
+    LEAST_PADDING,
+    LONGEST_ORBIT,
+    ORBIT_REVOLUTIONS,
+    REPLAY_SPAN,
+    have_one_orbit,
+)
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.mounts import mount_names
-from wm_drake.studies.spin.figures import LONGEST_ORBIT, ORBIT_REVOLUTIONS, have_one_orbit
-from wm_drake.studio.answers import heads_of, shown_measures
-from wm_drake.studio.machines import OpenMachine, Slider
-from wm_drake.studio.parts import words_of
-from wm_drake.studio.state import PageState
 
-STATIC = Path(__file__).parent / "static"
-POLICY = (
-    "default-src 'none'; img-src data:; style-src 'unsafe-inline'; worker-src blob:; "
-    "script-src 'wasm-unsafe-eval' '{hash}'; base-uri 'none'; form-action 'none'"
-)
-"""What the page may do: run its own script and the machine, nothing else; it reaches nothing."""
 SOURCES = {
     "amplitude": ("sizes", 0),
     "smallest_gap": ("gap", 0),
@@ -69,68 +59,6 @@ NOT_HERE = ("loads.", "profile.", "step", "output_period")
 AS_EXPORTED = "it is that of the exported file"
 LARGEST = 1e300
 """In place of an infinite number, which JSON does not have."""
-WORKER = """
-onmessage = ({data: first}) => {
-  modules.worker.begin(first);
-  onmessage = ({data: job}) => postMessage(modules.worker.answer(job));
-};
-"""
-_IMPORT = re.compile(r"^import \{(.*?)\} from '\./(\w+)\.js';$", re.MULTILINE)
-_EXPORT = re.compile(r"^export (?=(?:async function|function|class|const) (\w+))", re.MULTILINE)
-
-
-@dataclass(frozen=True)
-class ExportedPage:
-    """A page that was written.
-
-    Attributes:
-        size: Size of the file. [byte]
-        movable, fixed: How many numbers can be moved on it, and how many are shown only.
-    """
-
-    path: Path
-    size: int
-    movable: int
-    fixed: int
-
-
-def export_page(
-    parameters: MachineParameters,
-    out: str | Path,
-    loads: Sequence[str] = (),
-    given: str = "",
-    sets: Sequence[str] = (),
-) -> ExportedPage:
-    """Write a machine as one HTML file that runs it.
-
-    Args:
-        given: Name or path of the machine at the command line, for the commands that the page
-            writes; its name if empty.
-        sets: Changes of that machine in these parameters, as `--set` has them.
-        out: File to write; it is replaced if it exists.
-        loads: Names of the loads that run; all if empty.
-
-    Raises:
-        InputError: a load is unknown, the compiled engine does not represent the machine, or the
-            file cannot be written. Nothing is written then.
-    """
-    for name in loads:
-        message = f"no load '{name}' in machine '{parameters.name}'"
-        check_known(name, parameters.loads, message, key="loads")
-    if loads:
-        chosen = {name: parameters.loads[name] for name in loads}
-        parameters = parameters.model_copy(update={"loads": chosen})
-    if not parameters.loads:
-        raise input_error("the machine has no load, so there is nothing to run", key="loads")
-    path = Path(out)
-    _check_place(path)
-    notice_jumping_friction(parameters)
-    data = page_data(parameters) | {"given": given or parameters.name, "sets": [*sets]}
-    text = _page(data)
-    _write(path, text)
-    numbers = data["machine"]["numbers"]
-    fixed = sum(1 for number in numbers if number["needs"])
-    return ExportedPage(path, len(text.encode()), len(numbers) - fixed, fixed)
 
 
 def page_data(parameters: MachineParameters) -> dict[str, Any]:
@@ -157,6 +85,7 @@ def _page_data(parameters: MachineParameters) -> dict[str, Any]:
         return changed
 
     contents = Contents(opened.machine, move, profile, depths)
+    _check_length(profile.duration / contents.stepping.step)
     model = page_model(contents, candidates)
     functions = page_kernel(model.plan)
     model = without_wrong(model, functions["wm_set_up"].ctypes, contents, candidates)
@@ -175,6 +104,7 @@ def _page_data(parameters: MachineParameters) -> dict[str, Any]:
             "sample": elements.begins.size + elements.begins.rates,
             "padding": round(PADDING_PERIODS / contents.band[0] / contents.period),
             "leastPadding": LEAST_PADDING,
+            "mostSteps": MOST_STEPS,
             "fastest": (1.0 + 1e-9) * 2.0 * math.pi / (SAMPLES_OF_TURN * contents.period),
             "stepping": {
                 "integrator": model.stepping.integrator,
@@ -192,7 +122,7 @@ def _page_data(parameters: MachineParameters) -> dict[str, Any]:
         "depths": depths,
         "pairs": [[shape_name(n) for n in pair.split("|")] for pair in model.pair_names],
         "measured": _measured(opened),
-        "rows": [row for name in shown_measures() for row in _rows(opened, name, count)],
+        "rows": [row for name in shown_measures(parameters) for row in _rows(opened, name, count)],
         "forces": _forces(parameters, model.plan.gasket >= 0),
         "masses": _masses(),
         "drawing": {
@@ -200,6 +130,16 @@ def _page_data(parameters: MachineParameters) -> dict[str, Any]:
             "replay": {"span": REPLAY_SPAN, "rate": REPLAY_RATE},
         },
     }
+
+
+def _check_length(steps: float) -> None:
+    """Raise an InputError for a run of too many steps."""
+    if steps > MOST_STEPS:
+        raise input_error(
+            f"a run of {steps:.0f} steps is too long for a page; allowed are {MOST_STEPS}: give "
+            "the machine a shorter profile",
+            key="profile.time",
+        )
 
 
 def _candidates(opened: OpenMachine) -> Candidates:
@@ -310,75 +250,7 @@ def _rows(opened: OpenMachine, measure: str, count: Any) -> list[dict[str, Any]]
 def _forces(parameters: MachineParameters, has_gasket: bool) -> list[tuple[str, int]]:
     """Return name and number of each force that is drawn over time."""
     gasket = [f"gasket {letter}{axis}" for letter in "FM" for axis in "xyz"] if has_gasket else []
-    mounts = [f"mount {words_of(name.split('.'))}" for name in mount_names(parameters)]
-    return [*((n, k) for k, n in enumerate(gasket)), *((n, 6 + k) for k, n in enumerate(mounts))]
-
-
-def bundled(first: str, replaced: Mapping[str, str]) -> str:
-    """Return a module of the page and all that it imports as one script.
-
-    Args:
-        first: Name of the module.
-        replaced: Names of modules in whose place others are taken.
-    """
-    order: dict[str, str] = {}
-
-    def add(name: str) -> None:
-        if name in order:
-            return
-        text = (STATIC / f"{replaced.get(name, name)}.js").read_text(encoding="utf-8")
-        for _, imported in _IMPORT.findall(text):
-            add(imported)
-        names = _EXPORT.findall(text)
-        text = _IMPORT.sub(
-            lambda m: f"const {{{m[1].replace(' as ', ': ')}}} = modules.{m[2]};", text
-        )
-        order[name] = f"{{\n{_EXPORT.sub('', text)}\nmodules.{name} = {{{', '.join(names)}}};\n}}\n"
-
-    add(first)
-    return "const modules = {};\n" + "".join(order.values())
-
-
-def _page(data: Mapping[str, Any]) -> str:
-    """Return the text of the page."""
-    template = (STATIC / "index.html").read_text(encoding="utf-8")
-    style = (STATIC / "studio.css").read_text(encoding="utf-8")
-    worker = f"'use strict';\n{bundled('worker', {})}{WORKER}"
-    content = json.dumps({**data, "worker": worker}, allow_nan=False)
-    script = "\n" + bundled("main", {"server": "page_engine"})
-    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
-    policy = html.escape(POLICY.format(hash=f"sha256-{digest}"))
-    head = f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n<style>{style}</style>'
-    text = re.sub(r'<link rel="stylesheet".*?>', lambda _: head, template)
-    text = text.replace("<h1>wm-drake studio</h1>", "<h1>wm-drake</h1>")
-    text = re.sub(r"<script type=\"module\".*?</script>\n", "", text)
-    body = (
-        f'<script type="application/json" id="machine-data">{_in_html(content)}</script>\n'
-        f'<script type="module">{script}</script>\n</body>'
-    )
-    return text.replace("</body>", body).replace("<html ", '<html data-engine="page" ')
-
-
-def _in_html(text: str) -> str:
-    """Return JSON that may stand in a script element: it cannot end it."""
-    return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
-
-
-def _check_place(path: Path) -> None:
-    """Check before the work that a file can be written there."""
-    if path.suffix not in (".html", ".htm"):
-        raise input_error(f"'{path.name}' must end with .html", where="out")
-    if not path.parent.is_dir():
-        raise input_error(f"there is no folder '{path.parent}'", where="out")
-
-
-def _write(path: Path, text: str) -> None:
-    """Write the page as a whole or not at all."""
-    part = path.with_name(f".{path.name}.part")
-    try:
-        part.write_text(text, encoding="utf-8")
-        part.replace(path)
-    except OSError as error:
-        raise input_error(f"cannot be written to: {reason_of(error)}", where=str(path)) from None
-    finally:
-        part.unlink(missing_ok=True)
+    others = [mount_title(name) for name in mount_names(parameters)]
+    if parameters.cabinet:
+        others += map(foot_title, parameters.cabinet.corners)
+    return [*((n, k) for k, n in enumerate(gasket)), *((n, 6 + k) for k, n in enumerate(others))]

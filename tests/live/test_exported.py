@@ -1,5 +1,8 @@
 """The page of an exported machine: what it has, what it refuses, and that no name is markup."""
 
+import base64
+import gzip
+import hashlib
 import json
 import re
 
@@ -9,8 +12,13 @@ from typer.testing import CliRunner
 import wm_drake as wm
 from wm_drake.cli import app
 from wm_drake.errors import InputError
-from wm_drake.studio import exported
-from wm_drake.studio.exported import bundled, export_page
+from wm_drake.live import exported
+from wm_drake.live.exported import bundled, export_page
+from wm_drake.parameters import SpinProfile
+from wm_drake.report.scripts import Scripts
+from wm_drake.simulation.cases import Case
+from wm_drake.studies.spin.options import SpinOptions
+from wm_drake.studies.spin.task import SpinTask
 
 
 @pytest.mark.parametrize(
@@ -67,3 +75,35 @@ def test_the_page_reaches_nothing(tmp_path, monkeypatch):
     text = (tmp_path / "machine.html").read_text(encoding="utf-8")
     assert not re.search(r'(?:src|href)="(?!data:)', text)
     assert "default-src &#x27;none&#x27;" in text
+
+
+def test_a_report_allows_the_page_in_its_frame_and_nothing_of_its_texts(monkeypatch, reference):
+    bad = "sha256-bad' https://elsewhere"
+    monkeypatch.setattr(exported, "page_data", lambda parameters: SMALLEST | {"name": bad})
+    page, _ = exported.page_text(reference)
+    scripts = Scripts()
+    packed = scripts.framed(page)
+    assert gzip.decompress(base64.b64decode(packed)).decode() == page
+    script = re.search(r'<script type="module">(.*?)</script>', page, re.DOTALL)[1]
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    assert f"'sha256-{digest}'" in scripts.policy()
+    assert "bad" not in scripts.policy()
+    assert "frame-src blob:" in scripts.policy()
+    assert "frame-src" not in Scripts().policy()
+
+
+def test_live_needs_one_variant(machine):
+    with pytest.raises(InputError, match="--live"):
+        SpinTask(SpinOptions(compare_gasket=True, live=True), machine)
+
+
+def test_the_profile_of_a_command_is_that_of_its_page(monkeypatch, reference):
+    monkeypatch.setattr(exported, "page_data", lambda parameters: {"of": parameters})
+    monkeypatch.setattr(exported, "_page", lambda data: data)
+    slow = SpinProfile(time=(0.0, 10.0), speed=(0.0, 10.0))
+    case = Case("mine", reference.loads["middle"], slow, gasket=False)
+    data = exported.page_of_cases(reference, [case], "reference", ["step='1 ms'"])
+    assert data["of"].profile == slow
+    assert data["of"].loads == {"mine": reference.loads["middle"]}
+    assert data["of"].measured == ()
+    assert data["begin"] == {"gasket": False}

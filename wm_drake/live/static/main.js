@@ -6,6 +6,7 @@ import {History, copyOf, fromLink, intoLink} from './history.js';
 import {showMeasures} from './measures.js';
 import {NumberList} from './numbers.js';
 import {SceneView} from './scene.js';
+import {ProfilePanel} from './profile.js';
 import {Problems, get, post, take} from './server.js';
 import {Studies} from './studies.js';
 import {showVerdict, smallestGap, worstFirst} from './verdict.js';
@@ -19,6 +20,7 @@ const QUIET = 80;      // ms without a move after which the numbers to a picture
 const history_ = new History();
 const list = new NumberList(byId('numbers'), move);
 const scene = new SceneView(byId('scene'));
+const profile = new ProfilePanel(byId('profile'), moveProfile);
 const times = {envelopes: new TimeRange(), forces: new TimeRange()};
 const panels = {envelopes: new Map(), forces: new Map(), orbits: []};
 
@@ -44,6 +46,12 @@ function move(key, text, final) {
   if (text === null) delete state.values[key];
   else state.values[key] = text;
   changed(final ? (text === null ? `${list.nameOf(key)} as it was` : `${list.nameOf(key)} ${text}`) : null);
+}
+
+/** Move corners of the spin profile, which are numbers of the list too: [key, text] of each. */
+function moveProfile(corners, final) {
+  for (const [key, text] of corners) state.values[key] = text;
+  changed(final ? 'spin profile' : null);
 }
 
 /** Run the new state; `what` names it in the history, null while a slider moves. */
@@ -178,9 +186,18 @@ async function runNumbers(number) {
     const found = await post('numbers', {page: PAGE, state, keys: turned});
     if (found.overtaken || number !== asked) return;
     numbered = number;
-    answer = {...answer, ...found};
+    answer = {...answer, ...found, arrows: found.arrows ?? []};
     showNumbers();
+    if (!found.arrows && turned.length) await runArrows(number);
   } catch { /* what is wrong is shown by the run itself */ }
+}
+
+/** Ask for the arrows of the seven numbers, which an engine may answer behind the numbers. */
+async function runArrows(number) {
+  const found = await post('arrows', {page: PAGE, state, keys: turned});
+  if (found.overtaken || number !== asked) return;
+  answer.arrows = found.arrows;
+  showNumbers();
 }
 
 /** Tell readers of the page, also those of a screen reader, whether an answer is under way. */
@@ -226,7 +243,8 @@ async function rank() {
   const as = copyOf(state);
   byId('rank').disabled = true;
   try {
-    const found = await post('ranking', {page: PAGE, state: as});
+    const found = await post('ranking', {page: PAGE, state: as, keys: machine.numbers.filter((of) => isDesigned(of, as)).map(({key}) => key)});
+    if (found.overtaken) return;
     if (as.machine === state.machine) ranking = found.arrows;
     chooseTurned();
   } catch { /* a wrong number is shown by the run itself */ }
@@ -234,14 +252,16 @@ async function rank() {
 }
 
 /** Keys of numbers that a design does not choose: no influence is ranked for them. */
-const NOT_DESIGNED = /^(loads|profile|sensors|imperfections|measured|step|output_period)\b|^bodies\.(?!\w*counterweight)|^frames\.\w*_(child|parent)\./;
+const NOT_DESIGNED = /^(loads|profile|sensors|imperfections|measured|step|output_period|cabinet)\b|^bodies\.(?!\w*counterweight)|^frames\.\w*_(child|parent)\./;
+
+const isDesigned = ({key, needs}, {gasket}) => !needs && !NOT_DESIGNED.test(key) && (gasket || !key.startsWith('gasket.'));
 
 /** Take the seven numbers of the design that change the chosen measure most. */
 function chooseTurned() {
   if (!answer?.rows) return;
   const kind = byId('rank-by').value;
   const size = (of) => Math.max(0, ...of.changes.map((value, place) => (answer.rows[place]?.kind === kind ? Math.abs(value ?? 0) : 0)));
-  const influences = ranking.filter(({key}) => !NOT_DESIGNED.test(key)).map((of) => ({key: of.key, size: size(of)})).filter((of) => of.size > 0);
+  const influences = ranking.map((of) => ({key: of.key, size: size(of)})).filter((of) => of.size > 0);
   influences.sort((a, b) => b.size - a.size);
   turned = influences.slice(0, 7).map((of) => of.key);
   busyWith(() => runNumbers(asked));
@@ -287,6 +307,7 @@ function showAnswer() {
 function showPicture() {
   verdict();
   list.show(state.values, answer.values);
+  profile.show(machine.numbers, {...state.values}, answer.values);
   showEnvelopes();
   showOrbits();
   showMotion();
@@ -357,7 +378,7 @@ function showForces() {
     const now = band(answer, name);
     const was = band(ghost, name);
     const limit = roundUp(sizeOf([now, was]));
-    const isSize = name.startsWith('mount');
+    const isSize = /^(mount|foot)/.test(name);
     panels.forces.get(name).show({now, ghost: was, low: isSize ? 0 : -limit, high: limit, rpm: [answer.profile.time, answer.profile.rpm]});
   }
 }
@@ -623,7 +644,7 @@ async function begin() {
   listen();
   const found = await listMachines();
   const linked = fromLink();
-  const fresh = {machine: found.first, values: {}, load: '', masses: [], gasket: true};
+  const fresh = {machine: found.first, values: {}, load: '', masses: [], gasket: true, ...found.begin};
   variants = linked?.variants ?? [];
   const wanted = {...fresh, ...linked?.state};
   if (!found.machines.some(({id}) => id === wanted.machine)) {
