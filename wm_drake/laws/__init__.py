@@ -25,7 +25,8 @@ maxwell_rate, test in test_rubber. Own derivations: normal loads of four feet, m
 turning and tilting in `feet`, test in test_feet; a foot that slides and lifts in `foot_contact`,
 test in test_foot_contact; a shaft with play in its bearing in `clearance`, test in
 test_clearance. Contact with a rubber buffer (Hunt and Crossley 1975) in `stop`, test in
-tests/elements/test_stop. Torque limit, speed controller and bearing friction of a drive in `motor`,
+tests/elements/test_stop; water that leaves laundry in `water`, test in tests/elements/test_water.
+Torque limit, speed controller and bearing friction of a drive in `motor`,
 test in test_motor.
 
 Dampers without a sponge (damper.coulomb_damper, stv_damper, havsin_damper) add a dashpot to a
