@@ -101,7 +101,13 @@ def load_of_record(record: Record) -> Load:
 
 def profile_of(record: Record) -> SpinProfile:
     """Return the spin profile of the run of a record."""
-    return SpinProfile.model_validate_json(record.attrs["profile"])
+    return _profile_in(record.attrs["profile"])
+
+
+@functools.lru_cache(maxsize=64)
+def _profile_in(text: str) -> SpinProfile:
+    """Return the profile of its JSON text."""
+    return SpinProfile.model_validate_json(text)
 
 
 def cabinet_in(record: Record) -> tuple[Cabinet, float] | None:

@@ -17,6 +17,7 @@ from wm_drake.report.page import versions_of
 from wm_drake.report.quantity import SPEED, Quantity
 from wm_drake.report.table import readable
 from wm_drake.simulation.balance import rings_of
+from wm_drake.simulation.displacements import have_one_orbit
 from wm_drake.simulation.measures.registry import tabulated
 from wm_drake.simulation.records import save_record
 from wm_drake.simulation.spring_tension import slack_springs
@@ -525,7 +526,7 @@ def _orbits_plot(case: CaseResult) -> Plot | None:
         return None
     depths = case.record.sensor_point.sel(axis="y")
     ends = float(depths.min()), float(depths.max())
-    is_one = figures.have_one_orbit(*ends)
+    is_one = have_one_orbit(*ends)
     planes = "plane of the sensors" if is_one else "planes of the foremost and the rearmost sensor"
     caption = (
         f"Path of the drum axis in the {planes}, seen from the front of the machine. Dot and dark "
