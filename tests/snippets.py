@@ -64,6 +64,7 @@ FILES = {  # what a block with a file is called in the commands of its page
     "docs/how-to/bench-to-machine.md": ["mine.yaml"],
     "docs/how-to/calibrate.md": ["free.yaml", "responses.csv", "relation.yaml"],
     "docs/how-to/compliant-bearing.md": ["whirling.yaml", "loose.yaml"],
+    "docs/how-to/cycle.md": ["towels.yaml"],
     "docs/how-to/designs.md": ["mine.yaml"],
     "docs/how-to/drive.md": ["drive.yaml"],
     "docs/how-to/floor.md": ["on_my_floor.yaml", "on_soft_feet.yaml"],
