@@ -65,7 +65,7 @@ def page_run(data, found):
     """Return the answer of a worker; displacements are base64."""
     points, sensors = data["model"]["count"]["points"], data["model"]["count"]["sensors"]
     moved = np.frombuffer(base64.b64decode(found["moved"])).reshape(points, -1)[:sensors].T
-    gap = found["gap"] and found["gap"]["distance"]
+    gap = found.get("gap") and found["gap"]["distance"]
     sizes = np.array(found["sizes"], dtype=float)
     return PageRun(moved, sizes, gap, found["status"], found.get("diverged"), found.get("bands"))
 

@@ -1,6 +1,6 @@
 """Arrays of an exported machine: where their parts begin, and parts that FMU and page share."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -34,7 +34,7 @@ def joined(names: Any, parts: Mapping[str, Any]) -> tuple[Any, FloatArray]:
     )
 
 
-def entries_of(numbers: Iterable[tuple[Sequence[int], Sequence[float]]]) -> FloatArray:
+def entries_of(numbers: Iterable[tuple[np.ndarray, FloatArray]]) -> FloatArray:
     """Return row, number, slope of each packed number that depends on one of the file. (n, 3)
 
     Args:

@@ -4,6 +4,17 @@
 const PAGE = 65536;
 const TOP = 2 << 20;      // where the stack begins, downwards to the constants of the module
 
+/** Return cosine and sine, as `wm_drake.compiler.elementary`: with the same bits in each browser. */
+function cosineSine(x) {
+  const turns = Math.floor(x * (2 / Math.PI) + 0.5);
+  const r = ((x - turns * 1.57079625129699707031) - turns * 7.54978941586159635336e-8) - turns * 5.39030285815811905290e-15;
+  const z = r * r;
+  const inS = ((((1.58962301576546568060e-10 * z - 2.50507477628578072866e-8) * z + 2.75573136213857245213e-6) * z - 1.98412698295895385996e-4) * z + 8.33333333332211858878e-3) * z - 1.66666666666666307295e-1;
+  const inC = ((((-1.13585365213876817300e-11 * z + 2.08757008419747316778e-9) * z - 2.75573141792967388112e-7) * z + 2.48015872888517045348e-5) * z - 1.38888888888730564116e-3) * z + 4.16666666666665929218e-2;
+  const [s, c] = [r + r * z * inS, 1 - 0.5 * z + z * z * inC];
+  return [[c, s], [-s, c], [-c, -s], [s, -c]][turns - 4 * Math.floor(0.25 * turns)];
+}
+
 /** Return lengths, accelerations and drum motion of the steps through a profile, and their samples. */
 export function scheduleOf({time: corners, speed}, {step, period, control, stepsBefore}) {
   const end = corners[corners.length - 1];
@@ -33,7 +44,7 @@ export function scheduleOf({time: corners, speed}, {step, period, control, steps
     const k = pieceAt(t);
     const since = t - corners[k];
     const angle = angles[k] + (speed[k] + 0.5 * rates[k] * since) * since;
-    drum.set([speed[k] + rates[k] * since, Math.cos(angle), Math.sin(angle), angle], 4 * node);
+    drum.set([speed[k] + rates[k] * since, ...cosineSine(angle), angle], 4 * node);
   };
   let at = 0;
   let alike = 0;

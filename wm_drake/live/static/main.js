@@ -11,7 +11,7 @@ import {Problems, get, post, take} from './server.js';
 import {Studies} from './studies.js';
 import {showVerdict, smallestGap, worstFirst} from './verdict.js';
 
-const PAGE = crypto.randomUUID();
+const PAGE = crypto.randomUUID?.() ?? `page ${Math.random()}`; // a frame from a file has no UUIDs
 const MASS = {mass: '0.5 kg', radius: '235 mm', y: '0 mm', phase: '0 deg'};
 const MOST_VARIANTS = 4;
 const DESCRIBED = '— described —';
@@ -580,6 +580,7 @@ async function listMachines() {
 /* ---- beginning ---- */
 
 function listen() {
+  byId('copy').hidden = location.protocol === 'blob:'; // in a report: no address leads there
   byId('machine').addEventListener('change', (event) => {
     notice = '';
     const next = {machine: event.target.value, values: {}, load: '', masses: state.masses, gasket: true};
