@@ -15,15 +15,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from scipy.stats import beta
+from scipy.stats import beta, norm
 
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import load_machine
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.experiment import run_here
-from wm_drake.studies.fitting.posterior import NORMAL_95, Posterior
-from wm_drake.studies.fitting.problem import PriorProblem, Residuals, Unknown
-from wm_drake.studies.fitting.search import Search, descended, smooth_slopes
+from wm_drake.studies.fitting.assessment import assess
+from wm_drake.studies.fitting.problem import KINKED, FitProblem, Measurement, Unknown
+from wm_drake.studies.fitting.search import Search, descended
 from wm_drake.studies.next.options import NextOptions
 from wm_drake.studies.next.question import Question
 from wm_drake.studies.next.study import Model, half_widths, model_of, singles_of
@@ -113,22 +113,20 @@ def _refitted(model: Model, place: int, seed: int) -> tuple[float, bool]:
     deviation = measurement.deviations(middle)
     data = exact + deviation * rng.standard_normal(len(exact))
 
-    def residuals(points: FloatArray) -> Residuals:
-        rows = (of_data.at(points, "fit").numbers[0] - data) / deviation
-        return Residuals(rows, rows)
+    def evaluate(points: FloatArray) -> FloatArray:
+        return np.asarray(of_data.at(points, "fit").numbers[0] / deviation)
 
     unknowns = tuple(
         Unknown(name, -FARTHEST, FARTHEST, prior=(0.0, 1.0)) for name in question.knowledge.names
     )
-    problem = PriorProblem(unknowns, residuals)
+    measured = Measurement(measurement.name, data / deviation, errors="known")
+    problem = FitProblem(unknowns, (measured,), evaluate, KINKED)
     search = Search(problem)
     end = descended(search, np.zeros(size), ITERATIONS)
-    here = search.evaluated(end.point[None]).smooth
-    slopes = smooth_slopes(search, end.point, here, problem.descent.steps[0])[: len(data)]
-    posterior = Posterior(end.point, slopes, len(data), unknowns)
-    drawn = rng.multivariate_normal(end.point, posterior.spread_matrix(), DRAWS)
+    fit = assess(problem, end.point, search.log("least squares", seed))
+    drawn = rng.multivariate_normal(fit.values, fit.covariance, DRAWS)
     gaps = question.worst(of_answer.at(np.vstack([truth, drawn]), "gaps").answers)[:, 0]
-    half = NORMAL_95 * float(np.nanstd(gaps[1:], ddof=1))
+    half = norm.ppf(0.975) * float(np.nanstd(gaps[1:], ddof=1))
     return half, bool(abs(gaps[0] - np.nanmean(gaps[1:])) <= half)
 
 

@@ -10,10 +10,10 @@ from functools import partial
 import pytest
 
 from wm_drake.errors import InputError
+from wm_drake.live.state import PageState
 from wm_drake.studio import jobs as jobs_module
 from wm_drake.studio.jobs import Jobs
 from wm_drake.studio.machines import Machines
-from wm_drake.studio.state import PageState
 
 STATE = PageState(machine="reference", load="middle", values={"gasket.stiffness_x": "4 N/mm"})
 PAGE = '<p class="summary">Gap 3 &lt; 4 mm.</p>'

@@ -17,12 +17,13 @@ from pathlib import Path
 from typing import Any
 
 from wm_drake.errors import input_error, reason_of
+from wm_drake.live.machine import OpenMachine
+from wm_drake.live.state import PageState
 from wm_drake.report.provenance import now
 from wm_drake.studies.study import STUDIES
 from wm_drake.studio.forms import arguments
-from wm_drake.studio.machines import Machines, OpenMachine
+from wm_drake.studio.machines import Machines
 from wm_drake.studio.saving import chosen, write_machine
-from wm_drake.studio.state import PageState
 
 MOST_RUNNING = 4
 """Largest number of studies that run at a time."""

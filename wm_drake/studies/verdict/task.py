@@ -11,6 +11,7 @@ from wm_drake.model.sdf_names import sdf_names
 from wm_drake.parameters import with_values
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.measures.responses import GAP, has_gap, known_responses, measures_of
+from wm_drake.simulation.measures.stops import STOPS
 from wm_drake.studies.answer import Answer, Part
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.experiment import Experiment
@@ -59,7 +60,16 @@ class VerdictTask(Task):
         known = known_responses(full, profile_of(full, options.profile))
         self.responses = tuple(r for r in known if r.group in SHOWN_GROUPS or r.name == GAP)
         measures = {*measures_of(full, self.responses), CONTACTS}
+        measures |= {STOPS.name} if STOPS.applies(full) else set()
         self.measures = tuple(name for name in MEASURES if name in measures)
+        self.live = self._live(machine) if options.live else ""
+
+    def _live(self, machine: Machine) -> str:
+        """Return the page that runs the loads of the machine."""
+        from wm_drake.live.exported import page_of_cases  # most verdicts have none
+
+        options = self.options
+        return page_of_cases(machine.parameters, self.cases, options.machine, options.sets)
 
     @property
     def _command(self) -> str:
@@ -110,7 +120,7 @@ class VerdictTask(Task):
             laundry_of(samples, self.clearance),
             laundry_masses(samples[0]),
         )
-        return replace(answer, parts=(*answer.parts, self._next(executor)))
+        return replace(answer, parts=(*answer.parts, self._next(executor)), live=self.live)
 
     def _next(self, executor: Executor) -> Part:
         """Return what to measure next, if the machine is known from drawings and catalogues."""
