@@ -67,6 +67,7 @@ def test_curves_of_a_drawing_give_a_machine_that_spins(wm_drake):
     assert spin.code in (0, 1), spin.err
 
 
+@pytest.mark.slow
 def test_python_and_json_give_the_same(wm_drake):
     result = wm.run_study("curves", file="bellows", quick=True, points=2, tilt="1 deg", quiet=True)
     printed = json.loads(

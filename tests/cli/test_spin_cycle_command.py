@@ -141,6 +141,7 @@ def test_measured_accelerations_are_integrated(study):
     assert error == pytest.approx(expected, rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_drum_that_can_whirl_is_run_and_said(study, whirling_file):
     shown = json.loads(study("--machine", whirling_file, "--json").out)
     plain = json.loads(study("--out", "perfect", "--json").out)

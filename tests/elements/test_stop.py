@@ -175,6 +175,7 @@ def test_eight_runs_side_by_side_are_single_runs():
     assert len(set(table.gasket_force.sel(axis="x").values)) > 4
 
 
+@pytest.mark.slow
 def test_energy_balances():
     """Store what the buffer holds; dissipate the loss and the friction, from the motion alone."""
     parameters = with_stop()

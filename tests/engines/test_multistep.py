@@ -205,6 +205,7 @@ def test_a_cabinet_that_grows_by_itself_may_grow():
     assert not is_followed(growing, np.full(2, SMOOTH), 1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["light_cabinet", "heavy_cabinet"])
 def test_a_cabinet_takes_steps_of_one_derivative_with_the_peaks_of_small_steps(name):
     """Compare steps of 2.5 ms with a sixteenth of it by Runge-Kutta, with the motor."""

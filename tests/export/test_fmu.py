@@ -86,6 +86,7 @@ def test_validator_has_nothing_to_say(fmu):
     assert validate_fmu(str(fmu)) == []
 
 
+@pytest.mark.slow
 def test_library_needs_libc_and_libm_only(fmu, tmp_path):
     with zipfile.ZipFile(fmu) as archive:
         (name,) = (n for n in archive.namelist() if n.endswith(".so"))

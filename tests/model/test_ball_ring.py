@@ -204,6 +204,7 @@ def test_two_balls_balance_an_unbalance_above_the_critical_speeds(rig, part):
     assert np.hypot(*residual[[0, 2]]) < 5e-3 * capacity
 
 
+@pytest.mark.slow
 def test_balls_add_to_the_unbalance_below_the_critical_speeds():
     """They touch beside the unbalance, and the radius grows by the sum of first moments."""
     moment, ring = 20e-6, {**RIG_RING, "start_angles": (1.4, 2.6)}
@@ -231,6 +232,7 @@ def test_balls_add_to_the_unbalance_below_the_critical_speeds():
     assert radius(record) / radius(alone) == pytest.approx(1.0 + balls / moment, rel=0.02)
 
 
+@pytest.mark.slow
 def test_balls_cannot_pass_each_other():
     """Let three balls fall from different heights, without damping: their order stays.
 

@@ -42,6 +42,7 @@ def test_moments_of_a_load_of_all_kinds():
     np.testing.assert_allclose(with_y, [0.01 + 0.02, -0.003], atol=1e-15)
 
 
+@pytest.mark.slow
 def test_balls_take_the_place_of_closed_form_in_both_planes(result):
     """At full speed each ring is opposite to its share of the load, to 1 % of its capacity."""
     capacity = 8.0 * 0.064 * 0.225
@@ -61,6 +62,7 @@ def test_balls_take_the_place_of_closed_form_in_both_planes(result):
         assert (balance.at_end < 0.01 * capacity).all()
 
 
+@pytest.mark.slow
 def test_tables_have_the_balance(result):
     tables = spin_answer(result).tables()
     balance = tables["balance"]
@@ -79,6 +81,7 @@ def test_a_machine_without_rings_has_no_balance():
     assert not {"balance", "balls"} & set(spin_answer(result).tables())
 
 
+@pytest.mark.slow
 def test_one_ring_has_one_plane_and_leaves_the_couple():
     tree = load_machine("ball_rings").model_dump(exclude_unset=True)
     tree["elements"] = {"only": tree["elements"]["front_ring"] | {"balls": 1}}  # compiled once

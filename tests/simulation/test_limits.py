@@ -55,7 +55,10 @@ def test_free_decay_has_the_closed_form_frequency_and_log_decrement(machine):
 
 @pytest.mark.parametrize(
     ("ratio", "engine"),
-    [*((ratio, "compiled") for ratio in (0.5, 0.9, 1.0, 1.1, 2.0)), (1.0, "drake")],
+    [
+        *((ratio, "compiled") for ratio in (0.5, 0.9, 1.0, 1.1, 2.0)),
+        pytest.param(1.0, "drake", marks=pytest.mark.slow),
+    ],
 )
 def test_unbalance_response_equals_the_closed_form(machine, ratio, engine):
     speed = ratio * natural_frequency()

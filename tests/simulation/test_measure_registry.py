@@ -41,7 +41,11 @@ CASES = [
 ]
 
 
-@pytest.fixture(scope="module", params=["reference", "motor", "free_stroke", "moving cabinet"])
+SLOW = ("free_stroke", "moving cabinet")  # each is compiled for this test alone
+MACHINES = ["reference", "motor", *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)]
+
+
+@pytest.fixture(scope="module", params=MACHINES)
 def both(request):
     """Return the table of a batch of a machine, and all measures of the record of each run."""
     is_moving = request.param == "moving cabinet"

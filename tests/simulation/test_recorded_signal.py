@@ -23,7 +23,7 @@ CASES = [
 ]
 
 
-@pytest.fixture(scope="module", params=["compiled", "drake"])
+@pytest.fixture(scope="module", params=["compiled", pytest.param("drake", marks=pytest.mark.slow)])
 def record(request):
     """Return a run through the resonances, with samples close enough for splines."""
     parameters = with_values(load_machine("reference"), {"output_period": 1.25e-3, "step": 1.25e-3})

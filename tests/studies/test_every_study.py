@@ -26,7 +26,9 @@ SHORTER = {
 }
 """Commands of studies that take minutes even with `--quick`: those of their pages."""
 SLOWLY = [
-    pytest.param(name, marks=[pytest.mark.slow] if name in {*REQUIRED, *SHORTER} else [])
+    pytest.param(
+        name, marks=[pytest.mark.slow] if name in {*REQUIRED, *SHORTER, "gasket-geometry"} else []
+    )
     for name in STUDIES
 ]
 SHORTER["tolerance"] = [(*KINDS["tolerance"].commands[0], "--samples", "32", "--subset", "0")]

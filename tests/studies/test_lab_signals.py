@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import scipy.io
+import xarray as xr
 from lab_writers import WRITERS
 
 from wm_drake.errors import InputError
@@ -88,6 +89,16 @@ def test_wrong_files_are_refused(tmp_path):
     scipy.io.savemat(tmp_path / "x.mat", {"S1_x": ACCELERATIONS[0]})
     with pytest.raises(InputError, match="needs one channel of the drum speed"):
         read_signals(tmp_path / "x.mat")
+    record = xr.Dataset(
+        {
+            "displacement": (("time", "sensor"), np.zeros((len(TIME), 0))),
+            "drum_angle": ("time", TIME),
+        },
+        {"time": TIME, "sensor": np.array([], dtype=str)},
+    )
+    record.to_netcdf(tmp_path / "run.nc", engine="h5netcdf")
+    with pytest.raises(InputError, match="displacement: has no values"):
+        read_signals(tmp_path / "run.nc")
 
 
 def write_named_csv(path, channels):

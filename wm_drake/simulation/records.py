@@ -151,8 +151,8 @@ def read_measured(path: Path, variables: Mapping[str, tuple[str, ...]]) -> xr.Da
         variables: Names of the wanted variables, with their dimensions.
 
     Raises:
-        InputError: the file is no netCDF file, or a variable is missing, has other dimensions, or
-            is not made of finite numbers.
+        InputError: the file is no netCDF file, or a variable is missing, has other dimensions, no
+            value, or is not made of finite numbers.
     """
     record = _readable(path)
     if isinstance(record, str):
@@ -162,6 +162,8 @@ def read_measured(path: Path, variables: Mapping[str, tuple[str, ...]]) -> xr.Da
             fault = "is missing" if name not in record.variables else "has other dimensions"
             need = ", ".join(dims)
             raise input_error(f"{fault}; it needs the dimensions {need}", where=str(path), key=name)
+        if record[name].size == 0:
+            raise input_error("has no values", where=str(path), key=name)
         if record[name].dtype.kind not in "iuf" or not np.all(np.isfinite(record[name].values)):
             raise input_error("has values that are not finite numbers", where=str(path), key=name)
     if "sensor" in record.dims and "sensor" not in record.coords:
