@@ -41,12 +41,14 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--quick", action="store_true", help="five cases, before 10 s")
+    parser.add_argument("--few", action="store_true", help="five cases, one of each group at least")
     parser.add_argument("--ledger", type=Path, default=Path("compare_error_causes.sqlite"))
     parser.add_argument("--page", type=Path, help="page to renew between its marks")
     parser.add_argument("--out", type=Path, help="also write the text to this file")
     arguments = parser.parse_args()
+    few = arguments.quick or arguments.few
     machine, profile = load_machine("free_stroke"), load_profile("spin_cycle")
-    cases = [c for c in load_unbalance_cases() if c.name in CASES or not arguments.quick]
+    cases = [c for c in load_unbalance_cases() if c.name in CASES or not few]
     profile = begin_of(profile) if arguments.quick else profile
     identity = {"study": "causes of error", "sources": sources_version()}
     with open_ledger(arguments.ledger, identity, resume=True) as ledger:
