@@ -41,7 +41,7 @@ from wm_drake.batch.ledger import open_ledger
 SHOWN = 12
 """Machines in the table."""
 
-SAMPLE = 80
+SAMPLE = 48
 """Machines of any score that are run, to see how well the first stage orders machines."""
 
 
