@@ -31,6 +31,7 @@ ORDER = (
     {"batch"},
     {"rigs"},
     {"report"},
+    {"live"},
     {"studies"},
     {"studio"},
     {"cli"},

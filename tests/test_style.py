@@ -17,7 +17,7 @@ EMPTY_WORDS = {"told", "found", "own", "wanted", "beside", "alone", "nothing"}
 
 MOST_ARGUMENTS = 5
 FORMULAS = (
-    "laws/", "elements/", "engines/compiled/", "export/page_kernel.py", "solid/",
+    "laws/", "elements/", "engines/compiled/", "export/page_", "solid/",
     "rigs/heavy_sponge.py",
 )  # fmt: skip
 """Files whose functions may have many arguments.

@@ -6,7 +6,8 @@
     wm.envelopes(record).upper.sel(sensor="Xr").plot()
 
 The rooms, in the order of the data flow: `parameters`, `solid`, `laws`, `elements`, `systems`,
-`model`, `engines`, `simulation`, `export`, `batch`, `rigs`, `report`, `studies`, `studio`, `cli`.
+`model`, `engines`, `simulation`, `export`, `batch`, `rigs`, `report`, `live`, `studies`, `studio`,
+`cli`.
 """
 
 import importlib

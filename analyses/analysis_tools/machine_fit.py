@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,10 +17,11 @@ from wm_drake.model.machine import Machine
 from wm_drake.parameters import load_machine
 from wm_drake.parameters.free import FreeFile
 from wm_drake.parameters.types import FloatArray
-from wm_drake.studies.calibrate.computed import Evaluation, PointRunner
+from wm_drake.studies.calibrate.computed import Evaluation
 from wm_drake.studies.calibrate.parameter_map import ParameterMap, parameter_map_of
 from wm_drake.studies.calibrate.study import calibration_problem, identity_of
-from wm_drake.studies.fitting.problem import PriorProblem, Residuals
+from wm_drake.studies.experiment import Experiment, kept_in
+from wm_drake.studies.fitting.problem import FitProblem, Measurement, ModelValues
 from wm_drake.studies.fitting.search import Search, descended
 
 CHANGE_DEVIATION = 0.06
@@ -42,12 +43,12 @@ def steady_end(steady: SteadyNet, start: FloatArray, iterations: int) -> FloatAr
 
 @dataclass(frozen=True)
 class FitByRuns:
-    """Least squares of a machine by runs; evaluations are kept in a ledger.
+    """Least squares of a machine by runs; runs are kept in a ledger.
 
     Attributes:
         machine: A machine with the sensors and loads of the reference machine.
         free: Its free quantities.
-        ledger_path: File of the evaluations; a second call goes on from there.
+        ledger_path: File of the runs; a second call goes on from there.
     """
 
     machine: Machine
@@ -55,10 +56,10 @@ class FitByRuns:
     ledger_path: Path
 
     def costs(self, points: FloatArray) -> FloatArray:
-        """Return the cost of each of some points (point, quantity). (point,)"""
+        """Return the misfit of each of some points (point, quantity). (point,)"""
         with self._problem() as problem:
             coordinates = np.array([problem.coordinates_of(point) for point in points])
-            return problem.costs(problem.evaluated(coordinates).exact, coordinates)
+            return Search(problem).costs(coordinates)
 
     def end(self, start: FloatArray, iterations: int) -> FloatArray:
         """Return the free quantities where least squares from a start end; see `steady_end`."""
@@ -68,45 +69,45 @@ class FitByRuns:
             return problem.points_at(end.point)
 
     @contextmanager
-    def _problem(self) -> Iterator[PriorProblem]:
+    def _problem(self) -> Iterator[FitProblem]:
         targets = adams_targets(load_machine(REFERENCE))
         identity = identity_of(self.machine, self.free, targets, PLAN)
         with open_ledger(self.ledger_path, identity, resume=True) as ledger:
-            runner = PointRunner(self.machine, ledger, workers=1)
-            yield problem_of(runner.values(parameter_map_of(self.machine, self.free), targets))
+            experiment = Experiment(self.machine, (), kept_in(ledger, workers=1))
+            parameter_map = parameter_map_of(self.machine, self.free)
+            yield problem_of(Evaluation(experiment, parameter_map, targets))
 
 
-def problem_of(values: Evaluation | SteadyNet) -> PriorProblem:
+def problem_of(values: Evaluation | SteadyNet) -> FitProblem:
     """Return the problem of all targets and of the changes by the gasket of [B] Table 1."""
     printed = printed_changes(load_machine(REFERENCE), values.targets)
     return _with_changes(calibration_problem(values, PLAN), values, printed)
 
 
 def _with_changes(
-    problem: PriorProblem, values: Evaluation | SteadyNet, printed: FloatArray
-) -> PriorProblem:
-    """Return a problem with the changes of [B] Table 1 as further residuals."""
+    problem: FitProblem, values: Evaluation | SteadyNet, printed: FloatArray
+) -> FitProblem:
+    """Return a problem with the changes of [B] Table 1 as a further measurement."""
 
-    def residuals(points: FloatArray) -> Residuals:
-        computed = values(points)
-        parts = problem.evaluate(points)
-        exact, smooth = (
-            np.hstack(
-                [
-                    part,
-                    (changes_of(values.targets, a) - printed).reshape(len(points), -1)
-                    / CHANGE_DEVIATION,
-                ]
-            )
-            for part, a in zip(parts, (computed.amplitude, computed.power_mean), strict=True)
+    def missed(amplitude: FloatArray) -> FloatArray:
+        changes = (changes_of(values.targets, amplitude) - printed) / CHANGE_DEVIATION
+        return changes.reshape(len(amplitude), -1)
+
+    def evaluate(points: FloatArray) -> ModelValues:
+        computed, parts = values(points), problem.evaluate(points)
+        assert isinstance(parts, ModelValues)
+        assert parts.smooth is not None
+        return parts._replace(
+            values=np.hstack([parts.values, missed(computed.amplitude)]),
+            smooth=np.hstack([parts.smooth, missed(computed.power_mean)]),
         )
-        return Residuals(exact, smooth)
 
-    return PriorProblem(problem.unknowns, residuals)
+    changes = Measurement("changes", np.zeros(printed.size), errors="known")
+    return replace(problem, measurements=(*problem.measurements, changes), evaluate=evaluate)
 
 
 def _report(evaluations: int, least: float) -> None:
-    print(f"{evaluations} evaluations, cost {least:.0f}", file=sys.stderr, flush=True)
+    print(f"{evaluations} evaluations, misfit {least:.3g}", file=sys.stderr, flush=True)
 
 
 def quantities_of(parameter_map: ParameterMap, point: FloatArray) -> pd.DataFrame:

@@ -6,7 +6,7 @@ two loads.
 """
 
 from collections.abc import Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -41,6 +41,7 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.calibrate.parameter_map import ParameterMap, parameter_map_of
 from wm_drake.studies.calibrate.response_targets import ComputedResponses
+from wm_drake.studies.experiment import Experiment, run_here
 
 PRIORS = Path(__file__).parents[1] / "reference_net.yaml"
 """Quantities and relations that replace those of reference_free.yaml."""
@@ -98,7 +99,8 @@ class Net:
 
     @cached_property
     def _study(self) -> ComputedResponses:
-        return ComputedResponses(self.machine, self.shape.targets.responses, workers=1)
+        experiment = Experiment(self.machine, (), partial(run_here, workers=1))
+        return ComputedResponses(experiment, self.shape.targets.responses)
 
     def drawn(self, rng: np.random.Generator) -> FloatArray:
         """Return a machine: the gasket by its relations, all else from the priors. (quantity,)"""

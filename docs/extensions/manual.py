@@ -35,8 +35,8 @@ from pygments.lexers.special import TextLexer
 from sphinx.application import Sphinx
 
 import wm_drake
+from wm_drake.live.exported import export_page
 from wm_drake.simulation.measures import MEASURES
-from wm_drake.studio.exported import export_page
 
 NAMES = "<!-- public names -->"
 COMMANDS, MEASURED = "<!-- command options -->", "<!-- measures -->"

@@ -65,8 +65,8 @@ for name, words in json.loads(sys.argv[1]).items():
 
 parameters = wm.load_machine("short.yaml")
 from wm_drake.studio.answers import numbers, runner_of
-from wm_drake.studio.machines import OpenMachine
-from wm_drake.studio.state import PageState
+from wm_drake.live.machine import OpenMachine
+from wm_drake.live.state import PageState
 opened = OpenMachine(parameters, wm.build_machine(parameters), wm.Scene(parameters))
 state = PageState(machine="short", load="middle")
 shown = numbers(opened, runner_of(opened), state, ["gasket.stiffness_x"])

@@ -61,7 +61,7 @@ def page(
     sets: SetOption = None,
 ) -> None:
     """Write a machine as one HTML file that runs it in a browser, without installation."""
-    from wm_drake.studio.exported import export_page
+    from wm_drake.live.exported import export_page
 
     parameters = load_parameters(machine, sets)
     for text in machine_warnings(parameters):

@@ -26,7 +26,7 @@ from numba import config
 from numba.extending import is_jitted
 
 from wm_drake.compiler.cache_files import LawCache, say_once
-from wm_drake.compiler.lanes import LawCompiler, number_array, stack_array
+from wm_drake.compiler.lanes import LawCompiler, TextCompiler, number_array, stack_array
 
 _PACKAGE = Path(__file__).parents[1]
 
@@ -141,7 +141,8 @@ def for_one_run(loop: Any) -> Any:
     function = types.FunctionType(
         source.__code__, source.__globals__ | single, source.__name__, source.__defaults__
     )
-    return numba.njit(error_model="numpy", fastmath={"contract", "nsz"})(function)
+    options: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract", "nsz"}}
+    return numba.njit(pipeline_class=TextCompiler, **options)(function)
 
 
 CACHE_FOLDER = _cache_folder()

@@ -353,13 +353,25 @@ class LawCompiler(Compiler):
 
     def define_pipelines(self) -> Any:
         """Return numba's passes."""
-        state = self.state
-        if any(_is_internal(kind) or has_indices(kind) for kind in state.args):
-            state.flags.no_cpython_wrapper = True
-            codegen = state.targetctx.codegen()
-            state.library = InlinedLibrary(codegen, state.func_id.func_qualname)
-            state.library.enable_object_caching()
+        if any(_is_internal(kind) or has_indices(kind) for kind in self.state.args):
+            _leave_out_machine_code(self.state)
         return super().define_pipelines()
+
+
+class TextCompiler(Compiler):
+    """numba's compiler for functions that other programs run: only their text of LLVM is needed."""
+
+    def define_pipelines(self) -> Any:
+        """Return numba's passes."""
+        _leave_out_machine_code(self.state)
+        return super().define_pipelines()
+
+
+def _leave_out_machine_code(state: Any) -> None:
+    """Compile a function without machine code and entry from Python."""
+    state.flags.no_cpython_wrapper = True
+    state.library = InlinedLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+    state.library.enable_object_caching()
 
 
 def _is_internal(kind: Any) -> bool:

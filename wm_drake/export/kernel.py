@@ -17,7 +17,7 @@ from numba.extending import intrinsic
 from wm_drake.compiler.compilation import law
 from wm_drake.compiler.elementary import sine_cosine
 from wm_drake.compiler.kept import kept
-from wm_drake.compiler.lanes import NUMBER_ARRAY
+from wm_drake.compiler.lanes import NUMBER_ARRAY, TextCompiler
 from wm_drake.compiler.vectors import add, cross, dot, rotate, rotate_back
 from wm_drake.elements.cabinet import FEET_COUNT, foot_of
 from wm_drake.elements.motion import BODY_STATE, TREE_STATE, motion_at, tub_motion
@@ -92,7 +92,10 @@ Plan = namedtuple("Plan", ("at", "of", "count", "elements", "gasket", "follows_s
 index of the gasket in the packed numbers (-1 without one), whether the speed is prescribed."""
 
 POINTER = types.CPointer(types.float64)
-OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract", "nsz"}}
+RUN_HERE: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract", "nsz"}}
+"""Options of numba for a function that this program runs too."""
+OPTIONS: dict[str, Any] = RUN_HERE | {"pipeline_class": TextCompiler}
+"""Options of one that is a part of others, or that only other programs run."""
 
 
 def _emit_address(context: Any, builder: Any, sig: Any, args: Any) -> Any:

@@ -15,6 +15,7 @@ from wm_drake.engines.compiled.mechanics import BODIES_SIZE
 from wm_drake.engines.compiled.packing import DrawnBodies, initial_state, pack
 from wm_drake.engines.compiled.step_check import check_step
 from wm_drake.errors import input_error
+from wm_drake.export.arrangement import drum_parts, entries_of, joined, pair_parts, places_of
 from wm_drake.export.kernel import NODE_SIZE, UNBALANCE_SIZE, Constants, Counts, Places, Plan
 from wm_drake.export.tunable import Tunable, tunables
 from wm_drake.model.build import build_machine
@@ -163,7 +164,7 @@ class _Contents:
         while len(self.unbalances) < FEWEST_UNBALANCES:
             self.unbalances.append((0.0, 0.0, 0.0, _usual_radius(setup.parameters, load)))
         self.mounts = mount_names(setup.parameters)
-        self.pairs = _shape_pairs(setup)
+        self.pairs, _ = pair_parts(Scene(setup.parameters), setup.rest_pose)
         self.currents = _currents(setup)
         self.count = Counts(
             packed=len(self.packed),
@@ -179,8 +180,7 @@ class _Contents:
 
     def model(self, step: float) -> ExportedModel:
         """Return the model."""
-        parts = self._constants()
-        of = Constants(*_begins(map(len, parts)))
+        of, constants = joined(Constants, self._constants())
         at = self._places()
         numbers = self._numbers(at)
         plan = Plan(
@@ -192,34 +192,26 @@ class _Contents:
             self.setup,
             plan,
             numbers,
-            np.concatenate(parts),
+            constants,
             tuple(self._variables(at, numbers)),
             free,
             step,
             self.load,
         )
 
-    def _constants(self) -> list[FloatArray]:
-        """Return the parts of the constants, in the order of `Constants`."""
-        bodies = DrawnBodies(
-            self.setup.machine.plant, self.setup.plant_context, self.setup.parameters.drive.joint
-        )
-        entries = [
-            (BODIES_SIZE + row, number, slope)
-            for number, tunable in enumerate(self.tuned)
-            for row, slope in zip(tunable.rows, tunable.slopes, strict=True)
-        ]
-        harmonics, rotation, origin = bodies.of_point_masses
-        return [
-            self.packed,
-            np.array([t.value for t in self.tuned]),
-            np.array(entries, dtype=float).ravel(),
-            harmonics.ravel(),
-            np.concatenate([rotation.ravel(), origin]),
-            self.setup.measured_points.ravel(),
-            np.array(self.pairs, dtype=float).ravel(),
-            np.array(self.currents),
-        ]
+    def _constants(self) -> dict[str, Any]:
+        """Return the parts of the constants."""
+        setup = self.setup
+        bodies = DrawnBodies(setup.machine.plant, setup.plant_context, setup.parameters.drive.joint)
+        return {
+            "packed": self.packed,
+            "start": [t.value for t in self.tuned],
+            "entries": entries_of((BODIES_SIZE + t.rows, t.slopes) for t in self.tuned),
+            **drum_parts(bodies),
+            "points": setup.measured_points,
+            "pairs": self.pairs,
+            "current": self.currents,
+        }
 
     def _places(self) -> Any:
         """Return the `Places`."""
@@ -252,11 +244,7 @@ class _Contents:
             "sample": begins.size + begins.rates,
             "wrenches": WRENCH_SIZE * count.mounts,
         }
-        begin = 1  # the first number is the time
-        places = {}
-        for name in Places._fields[:-1]:
-            places[name], begin = begin, begin + sizes[name]
-        return Places(**places, size=begin)
+        return places_of(Places, sizes, first=1)  # the first number is the time
 
     def _numbers(self, at: Any) -> FloatArray:
         """Return the numbers of an instance before a run."""
@@ -406,19 +394,3 @@ def structured(key: str) -> str:
     return ".".join(
         part if part.isidentifier() and part.isascii() else f"'{part}'" for part in key.split(".")
     )
-
-
-def _begins(sizes: Any) -> list[int]:
-    """Return where each of consecutive parts begins, and their size."""
-    return [0, *np.cumsum(list(sizes)).tolist()]
-
-
-def _shape_pairs(setup: Setup) -> list[FloatArray]:
-    """Return the numbers of each pair of shapes of tub group and housing, `PAIR_SIZE` each.
-
-    The direction of a pair is that in which it is separated at the rest pose.
-    """
-    return [
-        np.concatenate([moving.numbers, fixed.numbers, [moving.is_round, fixed.is_round], away])
-        for moving, fixed, away, _ in Scene(setup.parameters).separations(setup.rest_pose)
-    ]

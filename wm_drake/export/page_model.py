@@ -6,31 +6,26 @@ with the reason.
 """
 
 import ctypes
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from wm_drake.elements.cabinet import FEET_SIZE, FOOT, PADS
-from wm_drake.elements.feet import packed_feet
-from wm_drake.elements.friction_damper import FRICTION_DAMPER
+from wm_drake.elements.cabinet import FEET_COUNT
 from wm_drake.elements.mount import WRENCH_SIZE
-from wm_drake.elements.sensor import MEASURED_POINT, POINT_SIZE
-from wm_drake.elements.spring import SPRING
-from wm_drake.engines.compiled.cabinet import FEET_BEGIN
-from wm_drake.engines.compiled.mechanics import BODIES
+from wm_drake.elements.sensor import POINT_SIZE
 from wm_drake.engines.compiled.midpoint import TUBES
 from wm_drake.engines.compiled.multistep import PAST_INPUTS, PAST_RATES
-from wm_drake.engines.compiled.packing import DrawnBodies, drum_joint, initial_state, pack
-from wm_drake.engines.compiled.stepping import Stepping, choose_stepping
+from wm_drake.engines.compiled.packing import initial_state
+from wm_drake.engines.compiled.stepping import Stepping
 from wm_drake.errors import InputError
-from wm_drake.export.kernel import HARMONICS_BEGIN, HARMONICS_SIZE, UNBALANCE_SIZE
-from wm_drake.export.page_kernel import (
+from wm_drake.export.arrangement import drum_parts, entries_of, joined, pair_parts, places_of
+from wm_drake.export.kernel import HARMONICS_SIZE, UNBALANCE_SIZE
+from wm_drake.export.page_contents import Contents
+from wm_drake.export.page_plan import (
     BODY_SIZE,
-    FREE_LENGTH,
     GAP_SIZE,
-    GIVEN,
     PUSHES,
     SOLVED,
     SUMS,
@@ -40,23 +35,14 @@ from wm_drake.export.page_kernel import (
     Plan,
 )
 from wm_drake.export.tunable import TOLERANCE
-from wm_drake.model.bodies import drawn_frame
 from wm_drake.model.equilibrium import largest_rest
-from wm_drake.model.machine import Machine, Setup
-from wm_drake.model.scene import Scene
-from wm_drake.model.state_layout import CARRIER
-from wm_drake.parameters import Load, MachineParameters, SpinProfile
+from wm_drake.parameters import Load
 from wm_drake.parameters.types import FloatArray
-from wm_drake.simulation.band import pass_band
 from wm_drake.simulation.displacements import band_pass
 from wm_drake.simulation.mounts import mount_names, sums_size
-from wm_drake.simulation.steps import checked_integrator, checked_step
 
 Candidates = Mapping[str, tuple[float, float, float]]
 """Value, smallest and largest value of each number that might change, by key path. [SI]"""
-Move = Callable[[Mapping[str, float]], MachineParameters]
-"""Function that returns the machine with other values of some numbers. [SI]"""
-
 MOST_UNBALANCES = 8
 """Largest number of point masses of a load in a page."""
 ACCURACY = 1e-8
@@ -96,141 +82,6 @@ class PageModel:
     refused: dict[str, str]
     stepping: Stepping
     pair_names: list[str]
-
-
-class Contents:
-    """The parts of the model of a page, one after the other."""
-
-    def __init__(
-        self, machine: Machine, move: Move, profile: SpinProfile, depths: Sequence[float]
-    ) -> None:
-        """Set the machine up without load.
-
-        Args:
-            move: Function that returns the machine with other values of some numbers.
-            profile: Spin profile, which gives the step, the samples and the filter.
-            depths: Where along the drum axis orbits are drawn. [m]
-        """
-        self.machine, self.move, self.profile, self.depths = machine, move, profile, depths
-        self.context = machine.diagram.CreateDefaultContext()
-        self.setup = self.set_up({})
-        drawn = machine.set_up_bodies(None, machine.parameters)
-        self.drawn = machine.plant.GetMyContextFromRoot(drawn)
-        self.packed, self.layout = pack(self.setup)
-        parameters = self.setup.parameters
-        self.stepping = choose_stepping(
-            self.setup, self.packed, self.layout, profile, checked_step(parameters, None),
-            checked_integrator(parameters, None)
-        )  # fmt: skip
-        self.period = profile.sample_period(parameters.output_period)
-        self.band = pass_band(profile, self.period)
-        self.scene = Scene(parameters)
-        self.derived = self._derived()
-        self.start = self.rows(self.setup)
-
-    def set_up(
-        self, values: Mapping[str, float], *, gasket: bool = True, load: Load | None = None
-    ) -> Setup:
-        """Return the machine with other values of some numbers. [SI]
-
-        Without a load it has no residual imbalance either.
-        """
-        parameters = self.move(values) if values else self.machine.parameters
-        return self.machine.set_up(load, context=self.context, parameters=parameters, gasket=gasket)
-
-    def rows(self, setup: Setup) -> FloatArray:
-        """Return `full_rows` without what the functions compute from the others."""
-        rows = self.full_rows(setup)
-        rows[self.derived] = 0.0
-        return rows
-
-    def full_rows(self, setup: Setup) -> FloatArray:
-        """Return packed numbers, free length of each spring, measured points, numbers of feet."""
-        parameters = setup.parameters
-        types = (parameters.spring_types[s.type] for s in parameters.springs.values())
-        lengths = [t.free_length or 0.0 for t in types]
-        orbits = [
-            MEASURED_POINT.pack(p_ToM_T=(0.0, y, 0.0), direction_W=axis, at_rest=0.0)
-            for y in self.depths
-            for axis in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
-        ]
-        points = setup.measured_points.ravel(), *orbits
-        rows: list[FloatArray] = [pack(setup)[0], np.array(lengths), *points]
-        if setup.cabinet:
-            rows.append(packed_feet(setup.cabinet.cabinet, parameters.gravity))
-        return np.concatenate(rows)
-
-    def _derived(self) -> np.ndarray:
-        """Return the rows that the functions compute from others."""
-        parameters, mounts = self.setup.parameters, self.layout
-        rows: list[int] = []
-        for at, kind in zip(mounts.springs, self.spring_kinds(), strict=True):
-            names = ["rest_length", "taut_from"] + ["preload"] * (kind % PUSHES != GIVEN)
-            rows += [at + SPRING.offsets[name] for name in names]
-        for at in mounts.dampers:
-            rows += range(
-                at + FRICTION_DAMPER.offsets["axis"], at + FRICTION_DAMPER.offsets["axis"] + 3
-            )
-        if mounts.cabinet >= 0:
-            first = mounts.cabinet + FEET_BEGIN
-            sags = range(PADS.fixed_size + FOOT.offsets["at_rest"], FEET_SIZE, FOOT.fixed_size)
-            rows += [first + at for at in (PADS.offsets["damping_growth"], *sags)]
-        first = len(self.packed) + len(parameters.springs)
-        count = len(self.setup.measured_points) + 2 * len(self.depths)
-        rows += [first + POINT_SIZE * (k + 1) - 1 for k in range(count)]
-        return np.array(rows, dtype=int)
-
-    def spring_kinds(self) -> list[int]:
-        """Return what gives the preload of each spring, and whether it pushes."""
-        parameters, kinds = self.setup.parameters, []
-        for name, spring in parameters.springs.items():
-            free = parameters.spring_types[spring.type].free_length
-            kind = (
-                FREE_LENGTH if free is not None else GIVEN if spring.preload is not None else SOLVED
-            )
-            kinds.append(kind + PUSHES * self.setup.springs[name].pushes)
-        return kinds
-
-    def slopes(self, key: str, value: float, ends: Sequence[float]) -> FloatArray | None:
-        """Return how all rows grow with a number; None if one does not by a straight line."""
-        low, high = (self.rows(self.set_up({key: end})) - self.start for end in ends)
-        slopes = (high - low) / (ends[1] - ends[0])
-        straight = slopes * (ends[0] - value)
-        size = np.abs(self.start) + np.abs(low) + np.abs(high)
-        return None if np.any(np.abs(straight - low) > TOLERANCE * size) else slopes
-
-    def body_constants(self, name: str) -> FloatArray | None:
-        """Return the constants of a body that may change; None if it is in neither group."""
-        plant, context = self.machine.plant, self.drawn
-        tub, drum = plant.GetBodyByName("tub"), self._drum_joint.child_body()
-        body = plant.GetBodyByName(name)
-        groups = [{b.index() for b in plant.GetBodiesWeldedTo(of)} for of in (tub, drum)]
-        if plant.HasBodyNamed(CARRIER) or not any(body.index() in group for group in groups):
-            return None
-        X_TB = plant.CalcRelativeTransform(context, drawn_frame(plant, tub), body.body_frame())
-        inertia = body.CalcSpatialInertiaInBodyFrame(context)
-        central = inertia.Shift(inertia.get_com()).ReExpress(X_TB.rotation().inverse())
-        matrix = central.CalcRotationalInertia().CopyToFullMatrix3()
-        override = self.setup.parameters.bodies.get(name)
-        grows, origin = override is None or override.inertia is None, BODIES.offsets["origin"]
-        return np.array([
-            body.index() in groups[1], grows, inertia.get_mass(), *inertia.get_com(),
-            *X_TB.rotation().matrix().ravel(),
-            *(self.packed[origin : origin + 3] - X_TB.translation()),
-            *matrix[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]],
-        ])  # fmt: skip
-
-    @property
-    def _drum_joint(self) -> Any:
-        return drum_joint(self.machine.plant, self.setup.parameters.drive.joint)
-
-    def of_load(self, load: Load) -> FloatArray:
-        """Return what a load adds to the harmonics of the drum beside its point masses."""
-        joint = self.setup.parameters.drive.joint
-        bodies = DrawnBodies(self.machine.plant, self.drawn, joint)
-        points = bodies.packed(Load(unbalances=load.unbalances))
-        whole = bodies.packed(load)
-        return (whole - points)[HARMONICS_BEGIN : HARMONICS_BEGIN + HARMONICS_SIZE]
 
 
 class _Chosen:
@@ -306,9 +157,7 @@ def page_model(contents: Contents, candidates: Candidates) -> PageModel:
         InputError: the machine cannot be set up, or the compiled engine does not represent it.
     """
     chosen = _Chosen(contents, candidates)
-    parts = _constants(contents, chosen)
-    sizes = [len(part) for part in parts.values()]
-    of = Constants(**dict(zip(parts, _begins(sizes), strict=True)), size=sum(sizes))
+    of, constants = joined(Constants, _constants(contents, chosen))
     count = _counts(contents, chosen)
     at = _places(contents, count)
     plan = _plan(contents, at, of, count)
@@ -317,7 +166,7 @@ def page_model(contents: Contents, candidates: Candidates) -> PageModel:
     return PageModel(
         plan,
         numbers,
-        np.concatenate(list(parts.values())),
+        constants,
         places,
         {name: contents.of_load(load) for name, load in loads.items()},
         chosen.refused,
@@ -326,43 +175,23 @@ def page_model(contents: Contents, candidates: Candidates) -> PageModel:
     )
 
 
-def _begins(sizes: Sequence[int]) -> list[int]:
-    return [0, *np.cumsum(sizes)[:-1].tolist()]
-
-
-def _constants(contents: Contents, chosen: _Chosen) -> dict[str, FloatArray]:
-    """Return the parts of the constants, in the order of `Constants`."""
-    harmonics, rotation, origin = DrawnBodies(
-        contents.machine.plant, contents.drawn, contents.setup.parameters.drive.joint
-    ).of_point_masses
-    entries = [
-        (row, number, slopes[row])
-        for number, slopes in enumerate(chosen.slopes.values())
-        for row in np.flatnonzero(slopes)
-    ]
+def _constants(contents: Contents, chosen: _Chosen) -> dict[str, Any]:
+    """Return the parts of the constants."""
+    rows = [np.flatnonzero(slopes) for slopes in chosen.slopes.values()]
+    slopes = [of[at] for of, at in zip(chosen.slopes.values(), rows, strict=True)]
     sections, settled = band_pass(contents.period, contents.band)
-    pairs = contents.scene.separations(contents.setup.rest_pose)
+    pairs, distances = pair_parts(contents.scene, contents.setup.rest_pose)
     return {
-        "packed": contents.full_rows(contents.setup),
-        "start": np.array([chosen.value_of(key) for key in chosen.slopes]),
-        "entries": np.array(entries, dtype=float).ravel(),
-        "harmonics": harmonics.ravel(),
-        "drum": np.concatenate([rotation.ravel(), origin]),
-        "bodies": np.array(list(chosen.bodies.values())).ravel(),
+        "packed": contents.packed_rows,
+        "start": [chosen.value_of(key) for key in chosen.slopes],
+        "entries": entries_of(zip(rows, slopes, strict=True)),
+        **drum_parts(contents.bodies),
+        "bodies": [*chosen.bodies.values()],
         "initial": initial_state(contents.setup, contents.profile),
         "relaxation": contents.stepping.relaxation,
         "sections": sections,
         "settled": settled,
-        "pairs": np.concatenate(
-            [
-                [],
-                *(
-                    np.concatenate([m.numbers, f.numbers, [m.is_round, f.is_round], away])
-                    for m, f, away, _ in pairs
-                ),
-                [distance for *_, distance in pairs],
-            ]
-        ),
+        "pairs": [*pairs.ravel(), *distances],
     }
 
 
@@ -380,6 +209,7 @@ def _counts(contents: Contents, chosen: _Chosen) -> Any:
         points=len(setup.measured_points) + 2 * len(contents.depths),
         sensors=len(setup.sensors),
         mounts=len(mount_names(setup.parameters)),
+        feet=FEET_COUNT if setup.parameters.cabinet else 0,
         pairs=len(contents.scene.pair_names()),
     )
 
@@ -412,9 +242,7 @@ def _places(contents: Contents, count: Any) -> Any:
         "sums": sums_size(count.mounts),
         "answer": GAP_SIZE + count.mounts,
     }
-    return Places(
-        **dict(zip(sizes, _begins(list(sizes.values())), strict=True)), size=sum(sizes.values())
-    )
+    return places_of(Places, sizes)
 
 
 def _plan(contents: Contents, at: Any, of: Any, count: Any) -> Any:

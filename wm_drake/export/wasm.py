@@ -10,13 +10,20 @@ from collections.abc import Iterator, Mapping
 
 import llvmlite.binding as llvm
 
+from wm_drake.errors import input_error
 from wm_drake.export.object_code import exposed_module, remove_unused
 
 TRIPLE = "wasm32-unknown-unknown"
 FEATURES = "+bulk-memory,+sign-ext,+nontrapping-fptoint,+simd128,+mutable-globals"
 """What Chromium 91, Firefox 89 and Safari 16.4 have, and later ones."""
-CUSTOM, EXPORT = 0, 7
+CUSTOM, IMPORT, EXPORT = 0, 2, 7
 """Numbers of sections of a module."""
+OF_PAGE = {
+    *("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh"),
+    *("exp", "expm1", "log", "log1p", "log2", "log10", "pow", "cbrt", "hypot"),
+    "__multi3",
+}
+"""Functions that a page has for a module: those of JavaScript, and a product of 128 bits."""
 _COUNTER = re.compile(
     r"^(define [^\n]*@NRT_(?:in|de)cref\([^\n]*\{)\n.*?^\}", re.MULTILINE | re.DOTALL
 )
@@ -24,6 +31,8 @@ _COUNTER = re.compile(
 FUNCTION_TABLE = 8
 """Number of the table of symbols in the section "linking"."""
 FUNCTION_SYMBOL, DATA_SYMBOL, SECTION_SYMBOL = 0, 1, 3
+FUNCTION, TABLE, GLOBAL = 0, 1, 3
+"""Kinds of imports; the fourth is a memory."""
 UNDEFINED, EXPLICIT_NAME = 0x10, 0x40
 
 
@@ -32,6 +41,9 @@ def wasm_module(code: Mapping[str, str]) -> bytes:
 
     Args:
         code: LLVM's text of each function as numba gives it, by the name of its export.
+
+    Raises:
+        InputError: a law calls a function that a page does not have.
     """
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
@@ -52,6 +64,13 @@ def wasm_module(code: Mapping[str, str]) -> bytes:
 def with_exports(built: bytes, names: Mapping[str, str]) -> bytes:
     """Return a module from an object file: with exports, without what a linker reads."""
     sections = list(_sections(built))
+    imported = next((body for kind, body in sections if kind == IMPORT), b"\0")
+    if foreign := sorted(_imported_functions(imported) - OF_PAGE):
+        raise input_error(
+            f"an element calls {', '.join(foreign)}, which a page does not have; allowed are "
+            f"{', '.join(sorted(OF_PAGE - {'__multi3'}))}",
+            key="elements",
+        )
     linking = next(body for kind, body in sections if kind == CUSTOM and _name(body) == "linking")
     numbers = _function_symbols(linking)
     entries = b"".join(_text(name) + b"\x00" + _unsigned(numbers[name]) for name in names)
@@ -70,6 +89,33 @@ def _sections(built: bytes) -> Iterator[tuple[int, bytes]]:
         size, at = _read(built, at + 1)
         yield kind, built[at : at + size]
         at += size
+
+
+def _imported_functions(body: bytes) -> set[str]:
+    """Return the names of the functions that a module imports."""
+    count, at = _read(body, 0)
+    names = set[str]()
+    for _ in range(count):
+        size, at = _read(body, at)
+        size, at = _read(body, at + size)
+        name, kind, at = body[at : at + size].decode(), body[at + size], at + size + 1
+        if kind == FUNCTION:
+            names.add(name)
+            _, at = _read(body, at)
+        else:
+            at = _behind_type(body, kind, at)
+    return names
+
+
+def _behind_type(body: bytes, kind: int, at: int) -> int:
+    """Return where the next import begins behind the type of a table, a memory or a global."""
+    if kind == GLOBAL:
+        return at + 2
+    at += kind == TABLE
+    has_largest, at = body[at] & 1, at + 1
+    for _ in range(1 + has_largest):
+        _, at = _read(body, at)
+    return at
 
 
 def _name(body: bytes) -> str:

@@ -163,6 +163,7 @@ class SectionedPage:
         advice: Section without anchor between the summary and the contents.
         numbers_title: Heading of the numbers of the machine.
         script: Script of the page, beside that of the pictures.
+        live: Page that runs the machine, shown in a frame when it is opened; "" for none.
     """
 
     title: str
@@ -177,6 +178,7 @@ class SectionedPage:
     advice: Section | None = None
     numbers_title: str = "Parameters"
     script: Path | None = None
+    live: str = ""
 
     def html(self) -> str:
         """Return the page as text of one self-contained file."""

@@ -11,7 +11,7 @@ from wm_drake.compiler.kept import kept
 from wm_drake.compiler.lane_memory import aligned
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.model.scene import REPLAY_RATE
-from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.types import BoolArray, FloatArray
 from wm_drake.simulation.band import (
     FILTER_ORDER,
     LEAST_UPPER_EDGE,
@@ -27,6 +27,14 @@ LEAST_PADDING = 6 * FILTER_ORDER + 3
 """Samples that the filter needs at both ends: the padding that sosfiltfilt chooses by default."""
 REPLAY_SPAN = 8.0
 """Length of a replay. [s]"""
+ORBIT_REVOLUTIONS = 6.0
+"""Number of drum revolutions that an orbit shows, with the largest amplitude in the middle."""
+
+SAME_PLANE = 0.5e-3
+"""Distance below which the planes of two sensors have one orbit. [m]"""
+
+LONGEST_ORBIT = 8.0
+"""Longest time that an orbit shows; it matters for a drum that hardly turns. [s]"""
 
 
 def band_of(record: Record) -> tuple[float, float]:
@@ -233,6 +241,23 @@ def axis_motion(record: Record, y: float) -> FloatArray:
     """Return the path (n, 3) in W of the point of the drum axis at depth y in T, for orbits. [m]"""
     pose = np.column_stack([record.tub_angle.values, record.tub_position.values])
     return point_positions(pose, np.array([[0.0, y, 0.0]]))[:, 0]
+
+
+def orbit_window(
+    time: FloatArray, drum_angle: FloatArray, index: int, revolutions: float
+) -> BoolArray:
+    """Return which samples (n,) an orbit shows.
+
+    These are the samples within the given number of drum revolutions around the sample `index`, but
+    not beyond the longest time of an orbit.
+    """
+    turned, passed = np.abs(drum_angle - drum_angle[index]), np.abs(time - time[index])
+    return np.asarray((turned <= np.pi * revolutions) & (passed <= 0.5 * LONGEST_ORBIT))
+
+
+def have_one_orbit(y_front: float, y_rear: float) -> bool:
+    """Return whether two positions on the drum axis are so close that one orbit shows both. [m]"""
+    return abs(y_rear - y_front) < SAME_PLANE
 
 
 def replay_samples(time: FloatArray, largest: int) -> slice:

@@ -94,6 +94,7 @@ class Answer(Result):
         diverged: A line for each run that diverged, or another reason for exit code 1.
         others: Answers with pages of their own beside this one, by the names of their files.
         script: Script of the page, beside that of the pictures.
+        live: Page that runs the machine (`wm_drake.live`), in a frame of this one; "" for none.
         units: In which its numbers are read, of `report.reading`; those in which it was made.
     """
 
@@ -109,6 +110,7 @@ class Answer(Result):
     diverged: tuple[str, ...] = ()
     others: "Mapping[str, Answer]" = field(default_factory=dict)
     script: Path | None = None
+    live: str = ""
     units: str = field(default_factory=READING.get)
     float_format: ClassVar[str] = "%.9g"
 
@@ -162,6 +164,7 @@ class Answer(Result):
             method=self.method,
             advice=_section(self.short) if self.short else None,
             script=self.script,
+            live=self.live,
         )
 
     def pages(self, facts: Facts) -> Mapping[str, str]:

@@ -98,6 +98,9 @@ MEASURED: Any = option(
     "Repeatable. Default: those of the machine file, for its own numbers, loads and profile.",
     "CSV",
 )
+LIVE: Any = option(
+    False, "Let the page run the machine too: folded, with sliders, without a server."
+)
 SEED: Any = option(0, "Seed of all random numbers.", "N", ge=0, le=2**32 - 1)
 
 
@@ -324,6 +327,7 @@ class Study:
 SHIPPED = (
     "balancer.options:BALANCER",
     "calibrate.options:CALIBRATE",
+    "cycle.options:CYCLE",
     "design.options:DESIGN",
     "drive.options:DRIVE",
     "gasket.options:GASKET",
@@ -331,6 +335,7 @@ SHIPPED = (
     "gasket_damping.options:GASKET_DAMPING",
     "gasket_geometry.options:GASKET_GEOMETRY",
     "modes.options:MODES",
+    "next.options:NEXT",
     "response.options:RESPONSE",
     "spin.options:SPIN",
     "spin_cycle.options:SPIN_CYCLE",
@@ -341,11 +346,10 @@ SHIPPED = (
 """Studies of this package: module below `wm_drake.studies`, and name."""
 
 SI_ONLY = (
-    *("calibrate", "spin", "verdict"),
-    *("study gasket-damping", "study gasket-geometry", "study response"),
-    *("rig bushing", "rig damper", "rig gasket"),
+    *("spin", "verdict"),
+    *("study gasket-damping", "study gasket-geometry"),
     *("study design", "study gasket", "study spin-cycle", "study spin-identify", "study tolerance"),
-    *("identify bushing", "identify damper", "identify gasket"),
+    *("identify bushing", "identify gasket"),
 )
 """Commands whose numbers do not all carry a quantity: their units cannot be chosen."""
 

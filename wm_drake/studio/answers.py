@@ -8,7 +8,6 @@ a picture, the others have the other loads of the machine. In the numbers, they 
 turned by a hundredth of its slider, which gives the sensitivity arrows.
 """
 
-import itertools
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -20,10 +19,13 @@ from wm_drake.batch.runs import Runner, RunResult, ShownMotion
 from wm_drake.batch.work_items import BatchKey, Preparation, WorkItem
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.errors import InputError, Problem
+from wm_drake.live.machine import OpenMachine, is_same
+from wm_drake.live.measures import foot_title, heads_of, mount_title, shown_measures
+from wm_drake.live.state import PageState
 from wm_drake.model.expectations import unusual_springs
 from wm_drake.model.machine import Setup
 from wm_drake.model.scene import Gap
-from wm_drake.parameters import MachineParameters, SpinProfile
+from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.plausibility import unusual_numbers
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
@@ -31,22 +33,18 @@ from wm_drake.report.formatting import plain, shape_name
 from wm_drake.report.quantity import SPEED, STEP, Quantity
 from wm_drake.simulation.band import band_warnings, pass_band
 from wm_drake.simulation.cases import Case
-from wm_drake.simulation.displacements import local_maxima, replay_samples
+from wm_drake.simulation.displacements import (
+    ORBIT_REVOLUTIONS,
+    have_one_orbit,
+    local_maxima,
+    orbit_window,
+    replay_samples,
+)
 from wm_drake.simulation.measures import MEASURES, Variable
-from wm_drake.simulation.measures.labels import LABELS
+from wm_drake.simulation.measures.record import foot_loads_of
 from wm_drake.simulation.outputs import point_displacements
-from wm_drake.simulation.records import Record
+from wm_drake.simulation.records import Record, cabinet_in
 from wm_drake.studies.inputs import friction_warnings
-from wm_drake.studies.spin.figures import ORBIT_REVOLUTIONS, have_one_orbit, orbit_window
-from wm_drake.studio.machines import OpenMachine, is_same
-from wm_drake.studio.parts import words_of
-from wm_drake.studio.state import PageState
-
-FIRST = ("amplitudes", "gap", "extremes", "mounts")
-"""Measures that the page shows first, in this order."""
-
-EACH = ("sensor",)
-"""Dimensions of which a comparison of variants shows each number; of others it has the largest."""
 
 LANES = WIDTH - 1
 """How many numbers one run turns."""
@@ -59,14 +57,6 @@ MICRO, MILLI = 1e-6, 1e-3
 """Displacements are sent in whole micrometres, times in whole milliseconds."""
 
 
-def shown_measures() -> tuple[str, ...]:
-    """Return the names of the measures of which the page shows a variable."""
-    shown = [
-        one.name for one in MEASURES.values() if any(v.studio is not None for v in one.variables)
-    ]
-    return (*FIRST, *(name for name in shown if name not in FIRST))
-
-
 def picture_runner_of(machine: OpenMachine) -> Runner:
     """Return the runner of the pictures of a machine: the first run of a batch has a motion."""
     return Runner(machine.parameters, ("amplitudes", "gap"), histories=False, motions={0})
@@ -74,7 +64,7 @@ def picture_runner_of(machine: OpenMachine) -> Runner:
 
 def runner_of(machine: OpenMachine) -> Runner:
     """Return the runner of the numbers of a machine: the first run of a batch has a history."""
-    return Runner(machine.parameters, shown_measures(), histories={0})
+    return Runner(machine.parameters, shown_measures(machine.parameters), histories={0})
 
 
 def picture(machine: OpenMachine, runner: Runner, state: PageState) -> dict[str, Any]:
@@ -145,21 +135,6 @@ def arrows(
     return _arrows(machine, *_run_turned(machine, runner, state, keys))
 
 
-def influential_keys(machine: OpenMachine, state: PageState) -> list[str]:
-    """Return the numbers that can change a run of a state: not the cabinet, no other load."""
-    prefix = f"loads.{state.load}." if not state.masses else "no load of the machine"
-    with machine.lock:
-        sliders = machine.sliders
-    return [
-        key
-        for key, slider in sliders.items()
-        if not slider.needs
-        and not key.startswith(("cabinet.", "step", "profile.", "imperfections.phase_error"))
-        and (not key.startswith("loads.") or key.startswith(prefix))
-        and (state.gasket or not key.startswith("gasket."))
-    ]
-
-
 def _run_turned(
     machine: OpenMachine, runner: Runner, state: PageState, keys: Sequence[str]
 ) -> tuple[list[tuple[str, float, Case]], dict[int, RunResult]]:
@@ -222,7 +197,7 @@ def _rows_of(machine: OpenMachine, run: RunResult) -> list[dict[str, Any]]:
     """Return the rows of the table of measures, in units for reading."""
     return [
         row
-        for name in shown_measures()
+        for name in shown_measures(machine.parameters)
         for variable in MEASURES[name].variables
         if variable.studio is not None
         for row in _rows(machine, run, variable)
@@ -237,30 +212,6 @@ def _rows(machine: OpenMachine, run: RunResult, variable: Variable) -> list[dict
         head | {"value": value, "alarm": head["touches"] and value is not None and value <= 0.0}
         for head, value in zip(heads, values, strict=True)
     ]
-
-
-def heads_of(
-    parameters: MachineParameters, profile: SpinProfile, variable: Variable
-) -> list[dict[str, Any]]:
-    """Return what a row says of each number of a variable, without its value.
-
-    `touches` says that a value of 0 and below is an alarm.
-    """
-    along = [LABELS[dim](parameters, profile) for dim in variable.dims]
-    unit, heads = variable.unit_text, []
-    for labels in itertools.product(*along):
-        words = [words_of(label.split(".")) if "." in label else label for label in labels]
-        heads.append(
-            {
-                "title": f"{variable.short_title_of(words)}, {unit}",
-                "kind": variable.kind,
-                "group": "" if variable.dims in ((), EACH) else f"largest {variable.kind}, {unit}",
-                "decimals": variable.studio,
-                "sensor": labels[0] if variable.name == "amplitude" else None,
-                "touches": variable.name == "smallest_gap",
-            }
-        )
-    return heads
 
 
 def _gap_of(run: RunResult) -> dict[str, Any]:
@@ -370,7 +321,10 @@ def _forces(record: Record) -> dict[str, Any]:
     for index, name in enumerate(record.mount.values):
         if name == "gasket" and not has_gasket:
             continue
-        forces[f"mount {words_of(str(name).split('.'))}"] = size[:, index]
+        forces[mount_title(str(name))] = size[:, index]
+    if cabinet_in(record):
+        feet = foot_loads_of(record)
+        forces |= {foot_title(name): feet.normal[:, k] for k, name in enumerate(feet.feet)}
     count = record.sizes["time"]
     begins = np.unique(np.linspace(0, count, min(BINS, count), endpoint=False).astype(int))
     return {

@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from wm_drake.errors import InputError, input_error, reason_of
+from wm_drake.live.machine import OpenMachine
+from wm_drake.live.state import DESCRIBED, PageState
 from wm_drake.parameters import MachineParameters, load_machine, machine_path, shipped_machines
 from wm_drake.parameters.files import extended_files, machine_changes, yaml_text
 from wm_drake.report.provenance import now
-from wm_drake.studio.machines import Machines, OpenMachine
-from wm_drake.studio.state import DESCRIBED, PageState
+from wm_drake.studio.machines import Machines
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,63}")
 

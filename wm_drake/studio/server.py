@@ -22,11 +22,13 @@ from starlette.staticfiles import StaticFiles
 
 from wm_drake.batch.runs import Runner
 from wm_drake.errors import InputError, input_error
+from wm_drake.live.exported import STATIC
+from wm_drake.live.machine import OpenMachine
+from wm_drake.live.state import PageState, Text
 from wm_drake.report.provenance import program
 from wm_drake.studio.answers import (
     LANES,
     arrows,
-    influential_keys,
     numbers,
     picture,
     picture_runner_of,
@@ -35,19 +37,19 @@ from wm_drake.studio.answers import (
 from wm_drake.studio.forms import forms
 from wm_drake.studio.guard import Guard
 from wm_drake.studio.jobs import Jobs
-from wm_drake.studio.machines import Machines, OpenMachine
+from wm_drake.studio.machines import Machines
 from wm_drake.studio.saving import ExistsAlreadyError, save_machine
-from wm_drake.studio.state import PageState, Text
 from wm_drake.studio.turns import OvertakenError, Turns
-
-STATIC = Path(__file__).parent / "static"
 
 KEPT_RANKINGS = 32
 """Number of rankings of the influential numbers that are kept."""
 
+MOST_RANKED = 2000
+"""Largest number of numbers whose influence a page may ask for."""
+
 _REPORT_POLICY = (
     "sandbox allow-scripts allow-popups allow-downloads; default-src 'none'; img-src 'self' data: "
-    "blob:; style-src 'unsafe-inline'; font-src data:; "
+    "blob:; style-src 'unsafe-inline'; font-src data:; frame-src blob:; worker-src blob:; "
     "script-src 'unsafe-inline' 'unsafe-eval' blob:"
 )
 """Policy of a report: it may draw itself, but it has no origin and reaches nothing."""
@@ -68,6 +70,12 @@ class NumbersRequest(RunRequest):
     """The same with some numbers turned."""
 
     keys: Annotated[list[Text], Field(max_length=LANES)] = []
+
+
+class RankingRequest(RunRequest):
+    """Numbers whose influence on a run is wanted."""
+
+    keys: Annotated[list[Text], Field(max_length=MOST_RANKED)]
 
 
 class SaveRequest(_Body):
@@ -123,21 +131,20 @@ class Studio:
         machine, _, runner = self.opened(state.machine)
         return numbers(machine, runner, state, keys)
 
-    async def ranking(self, state: PageState) -> list[dict[str, Any]]:
-        """Return the arrows of all numbers that influence a run; pages share the work."""
-        key = state.model_dump_json()
+    async def ranking(self, state: PageState, keys: list[str]) -> list[dict[str, Any]]:
+        """Return the arrows of numbers that influence a run; pages share the work."""
+        key = f"{state.model_dump_json()} {keys}"
         task = self._rankings.get(key)
         if task is None or (task.done() and (task.cancelled() or task.exception())):
-            task = asyncio.ensure_future(self._rank(key, state))
+            task = asyncio.ensure_future(self._rank(key, state, keys))
             self._rankings[key] = task
             while len(self._rankings) > KEPT_RANKINGS:
                 del self._rankings[next(iter(self._rankings))]
         return await asyncio.shield(task)
 
-    async def _rank(self, key: str, state: PageState) -> list[dict[str, Any]]:
+    async def _rank(self, key: str, state: PageState, keys: list[str]) -> list[dict[str, Any]]:
         take = partial(self.turns.take, f"ranking {key}", background=True)
         machine, _, runner = await take(lambda: self.opened(state.machine))
-        keys = await take(partial(influential_keys, machine, state))
         effects: list[dict[str, Any]] = []
         for begin in range(0, len(keys), LANES):
             part = keys[begin : begin + LANES]
@@ -241,9 +248,9 @@ class _Routes:
         return _json({"place": self.studio.turns.place(f"page {page}")})
 
     async def ranking(self, request: Request) -> Response:
-        """Return the arrows of all numbers that influence a run."""
-        body = RunRequest.model_validate_json(await request.body())
-        return _json({"arrows": await self.studio.ranking(body.state)})
+        """Return the arrows of the numbers that a page wants to rank."""
+        body = RankingRequest.model_validate_json(await request.body())
+        return _json({"arrows": await self.studio.ranking(body.state, body.keys)})
 
     async def save(self, request: Request) -> Response:
         """Save a machine file."""

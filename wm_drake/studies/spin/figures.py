@@ -9,20 +9,18 @@ import xarray as xr
 from wm_drake.parameters.types import BoolArray, FloatArray, IndexArray
 from wm_drake.report import figure as fig
 from wm_drake.report.quantity import SPEED, TIME, Quantity, shown
-from wm_drake.simulation.displacements import axis_motion, envelopes, moment_of_largest_amplitude
+from wm_drake.simulation.displacements import (
+    ORBIT_REVOLUTIONS,
+    axis_motion,
+    envelopes,
+    have_one_orbit,
+    moment_of_largest_amplitude,
+    orbit_window,
+)
 from wm_drake.simulation.outputs import point_positions
 from wm_drake.simulation.records import Record
 from wm_drake.studies.spin.data import DISPLACEMENT, FORCE, MOMENT, PLACE
 from wm_drake.studies.spin.study import GAP
-
-ORBIT_REVOLUTIONS = 6.0
-"""Number of drum revolutions that an orbit shows, with the largest amplitude in the middle."""
-
-SAME_PLANE = 0.5e-3
-"""Distance below which the planes of two sensors have one orbit. [m]"""
-
-LONGEST_ORBIT = 8.0
-"""Longest time that an orbit shows; it matters for a drum that hardly turns. [s]"""
 
 
 def envelopes_figure(record: Record, measured: xr.DataArray | None = None) -> fig.Figure:
@@ -173,18 +171,6 @@ def axis_path(record: Record, y: float) -> FloatArray:
     return axis_motion(record, y) - at_rest
 
 
-def orbit_window(
-    time: FloatArray, drum_angle: FloatArray, index: int, revolutions: float
-) -> BoolArray:
-    """Return which samples (n,) an orbit shows.
-
-    These are the samples within the given number of drum revolutions around the sample `index`, but
-    not beyond the longest time of an orbit.
-    """
-    turned, passed = np.abs(drum_angle - drum_angle[index]), np.abs(time - time[index])
-    return np.asarray((turned <= np.pi * revolutions) & (passed <= 0.5 * LONGEST_ORBIT))
-
-
 def orbit_limits(paths: Sequence[FloatArray]) -> tuple[float, float]:
     """Return the half widths in x and z of a frame around all paths, in the unit of the paths.
 
@@ -195,11 +181,6 @@ def orbit_limits(paths: Sequence[FloatArray]) -> tuple[float, float]:
     )
     x_limit = max(x_size, z_size) or 1.0
     return x_limit, max(z_size, 0.4 * x_limit)
-
-
-def have_one_orbit(y_front: float, y_rear: float) -> bool:
-    """Return whether two positions on the drum axis are so close that one orbit shows both. [m]"""
-    return abs(y_rear - y_front) < SAME_PLANE
 
 
 def _depths(y_front: float, y_rear: float) -> list[str]:

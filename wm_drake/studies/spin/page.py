@@ -17,6 +17,7 @@ from wm_drake.report.page import versions_of
 from wm_drake.report.quantity import SPEED, Quantity
 from wm_drake.report.table import readable
 from wm_drake.simulation.balance import rings_of
+from wm_drake.simulation.displacements import have_one_orbit
 from wm_drake.simulation.measures.registry import tabulated
 from wm_drake.simulation.records import save_record
 from wm_drake.simulation.spring_tension import slack_springs
@@ -52,6 +53,7 @@ from wm_drake.studies.spin.study import (
     write_replay,
 )
 from wm_drake.studies.spin.vibration import vibration_plots
+from wm_drake.studies.stops import stops_sentence
 
 if TYPE_CHECKING:
     from wm_drake.studies.modes.study import NaturalModes
@@ -262,8 +264,9 @@ def summary(runs: SpinRuns, amplitudes: xr.Dataset) -> str:
         opening += f" {excluded} excluded from this summary."
     main = max(ended, key=lambda case: _peak(case)[0])
     largest = f"The largest amplitude occurs with load {main.title}: {_peak_text(main)}."
-    sentences = (_contact_sentence(ended), opening, largest, _agreement(runs, ended, amplitudes))
-    return " ".join(sentences)
+    contact = _contact_sentence(ended), stops_sentence(runs.measures)
+    sentences = (*contact, opening, largest, _agreement(runs, ended, amplitudes))
+    return " ".join(filter(None, sentences))
 
 
 def _peak(case: CaseResult) -> tuple[float, str, float]:
@@ -362,9 +365,9 @@ def overlap_warnings(runs: SpinRuns) -> list[str]:
     """Return a warning for each load with which tub and housing overlap."""
     gaps = [(case.title, case.measures.smallest_gap) for case in runs.results]
     return [
-        f"Load {title}: {gap.parts} overlap by {GAP.text(-gap.distance)}. The model has no contact "
-        "forces. In the real machine these parts would collide, and the motion after that is not "
-        "valid."
+        f"Load {title}: {gap.parts} overlap by {GAP.text(-gap.distance)}. The model has no "
+        "contact forces but those of stops. In the real machine these parts would collide, and the "
+        "motion after that is not valid."
         for title, gap in gaps
         if gap is not None and gap.distance <= 0.0
     ]
@@ -479,7 +482,7 @@ def _more_tables(runs: SpinRuns) -> list[LabelledTable]:
             across=variable.dims[-1] if variable.dims else "",
             is_in_terminal=True,
         )
-        for variable in tabulated()
+        for variable in tabulated(runs.parameters)
     ]
 
 
@@ -523,7 +526,7 @@ def _orbits_plot(case: CaseResult) -> Plot | None:
         return None
     depths = case.record.sensor_point.sel(axis="y")
     ends = float(depths.min()), float(depths.max())
-    is_one = figures.have_one_orbit(*ends)
+    is_one = have_one_orbit(*ends)
     planes = "plane of the sensors" if is_one else "planes of the foremost and the rearmost sensor"
     caption = (
         f"Path of the drum axis in the {planes}, seen from the front of the machine. Dot and dark "

@@ -1,0 +1,344 @@
+"""Compiled functions of a page that set a machine up: bodies, struts, preloads, rest pose, feet.
+
+They do what `wm_drake.model.equilibrium` and `wm_drake.model.cabinet` do with numpy and Drake.
+"""
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from wm_drake.compiler.compilation import law
+from wm_drake.compiler.elementary import sqrt
+from wm_drake.compiler.matrices import plus, scaled, six
+from wm_drake.compiler.vectors import add, cross, dot, rotate, scale, subtract
+from wm_drake.elements.cabinet import FEET_COUNT, FOOT, FULL_DAMPING, PADS, read_pads
+from wm_drake.elements.feet import FEET, load_on_feet, read_feet
+from wm_drake.elements.friction_damper import FRICTION_DAMPER
+from wm_drake.elements.motion import tub_motion
+from wm_drake.elements.mount import WRENCH_SIZE, write_mount_wrenches
+from wm_drake.elements.spring import SPRING, read_spring, taut_tension
+from wm_drake.engines.compiled.cabinet import FEET_BEGIN
+from wm_drake.engines.compiled.mechanics import BODIES, mass_properties, read_bodies
+from wm_drake.export.kernel import INVERSE_MASS, OPTIONS, add_point_mass, drum_adder, numbers_at
+from wm_drake.export.page_plan import BODY_CONSTANTS, BODY_SIZE, FREE_LENGTH, PUSHES, SOLVED, SUMS
+from wm_drake.laws.feet import normal_loads
+from wm_drake.laws.table import stiffness_force
+from wm_drake.model.tub_statics import MOST_STEPS, POSE_STEP
+
+REMAINING = 1e-10
+"""Largest force [N] or moment [N m] that remains on the tub at rest."""
+NOT_BALANCED, SLACK, FAR = -1.0, -2.0, -3.0
+"""Why a machine has no equilibrium near its drawn pose."""
+
+
+@law
+def solve(a, b, n):
+    """Solve n linear equations by elimination with pivots; return whether there is a solution.
+
+    Args:
+        a: Coefficients by rows, overwritten.
+        b: Right side; the solution is written into it.
+    """
+    for i in range(n):
+        pivot = i
+        for k in range(i + 1, n):
+            if abs(a[n * k + i]) > abs(a[n * pivot + i]):
+                pivot = k
+        if not abs(a[n * pivot + i]) > 0.0:
+            return False
+        for j in range(n):
+            a[n * i + j], a[n * pivot + j] = a[n * pivot + j], a[n * i + j]
+        b[i], b[pivot] = b[pivot], b[i]
+        for k in range(i + 1, n):
+            factor = a[n * k + i] / a[n * i + i]
+            for j in range(i, n):
+                a[n * k + j] = a[n * k + j] - factor * a[n * i + j]
+            b[k] = b[k] - factor * b[i]
+    for i in range(n - 1, -1, -1):
+        for j in range(i + 1, n):
+            b[i] = b[i] - a[n * i + j] * b[j]
+        b[i] = b[i] / a[n * i + i]
+    return True
+
+
+def body_changer(plan: Any) -> Any:
+    """Return the function (v, c) that changes mass and centre of mass of bodies.
+
+    In the sums of tub group and drum, a body is a point mass and its central inertia.
+    """
+    at, of, count = plan.at, plan.of, plan.count
+    add_to_drum = drum_adder(plan)
+    moment, inertia = BODIES.offsets["tub_moment"], BODIES.offsets["tub_inertia"]
+
+    @njit(**OPTIONS)
+    def change_body(v, c, k, sums):
+        numbers, body, place = numbers_at(v, 0), of.bodies + BODY_CONSTANTS * k, at.bodies
+        place += BODY_SIZE * k
+        constants, frame = numbers_at(c, 0), body + 6
+        mass, old = numbers[place], constants[body + 2]
+        centre = (numbers[place + 1], numbers[place + 2], numbers[place + 3])
+        drawn = (constants[body + 3], constants[body + 4], constants[body + 5])
+        add_point_mass(sums, mass, centre, constants, frame)
+        add_point_mass(sums, -old, drawn, constants, frame)
+        growth = constants[body + 1] * (mass / old - 1.0)
+        for i in range(6):
+            sums[4 + i] = sums[4 + i] + growth * constants[frame + 12 + i]
+
+    @njit(**OPTIONS)
+    def add_bodies(v, c):
+        p, constants = numbers_at(v, at.packed), numbers_at(c, 0)
+        of_drum, of_tub = numbers_at(v, at.total), numbers_at(v, at.total + SUMS)
+        for k in range(2 * SUMS):
+            of_drum[k] = 0.0
+        for k in range(count.bodies):
+            in_drum = constants[of.bodies + BODY_CONSTANTS * k] > 0.5
+            change_body(v, c, k, of_drum if in_drum else of_tub)
+        p[INVERSE_MASS] = p[INVERSE_MASS] / (1.0 + of_tub[0] * p[INVERSE_MASS])
+        for k in range(3):
+            p[moment + k] = p[moment + k] + of_tub[1 + k]
+        for k in range(6):
+            p[inertia + k] = p[inertia + k] + of_tub[4 + k]
+        add_to_drum(v, c)
+
+    return add_bodies
+
+
+def strut_placer(plan: Any) -> Any:
+    """Return the function (v) that computes what follows from the ends of struts.
+
+    These are drawn lengths and given preloads of springs, and the axes of dampers.
+    """
+    at, first, mounts, settles = plan.at, plan.count.numbers, plan.elements.mounts, plan.settles
+    axis, length = FRICTION_DAMPER.offsets["axis"], SPRING.offsets["rest_length"]
+    preload, kinds = SPRING.offsets["preload"], np.array([k % PUSHES for k in (*plan.springs, 0)])
+    set_taut = taut_setter(plan)
+
+    @njit(**OPTIONS)
+    def place_struts(v):
+        p = numbers_at(v, at.packed)
+        for begin in mounts.dampers:
+            line, size = strut(p, begin)
+            for k in range(3):
+                p[begin + axis + k] = line[k] / size
+        for k in range(len(mounts.springs)):
+            begin = mounts.springs[k]
+            _, p[begin + length] = strut(p, begin)
+            if kinds[k] == FREE_LENGTH:
+                short = p[first + k] - p[begin + length]
+                p[begin + preload] = -stiffness_force(short, *read_spring(p, begin).stiffness)
+            if kinds[k] == SOLVED and settles:
+                p[begin + preload] = 0.0
+            set_taut(v, k)
+
+    return place_struts
+
+
+@law
+def strut(p, at):
+    """Return line and length of a strut as drawn, from the housing end to the tub end. [m]"""
+    tub, housing = read_spring_ends(p, at)
+    line = subtract(tub, housing)
+    return line, sqrt(dot(line, line))
+
+
+@law
+def read_spring_ends(p, at):
+    """Return tub end (T) and housing end (W) of a strut, with which its numbers begin. [m]"""
+    return (p[at], p[at + 1], p[at + 2]), (p[at + 3], p[at + 4], p[at + 5])
+
+
+def taut_setter(plan: Any) -> Any:
+    """Return the function (v, k) that sets the tension from which spring k is taut."""
+    at, mounts, taut = plan.at, plan.elements.mounts, SPRING.offsets["taut_from"]
+    pushes = np.array([kind >= PUSHES for kind in (*plan.springs, 0)])
+
+    @njit(**OPTIONS)
+    def set_taut(v, k):
+        p, begin = numbers_at(v, at.packed), mounts.springs[k]
+        spring = read_spring(p, begin)
+        p[begin + taut] = -np.inf
+        if not pushes[k]:
+            p[begin + taut] = taut_tension(spring.preload, *spring.stiffness)
+
+    return set_taut
+
+
+def settler(plan: Any) -> Any:
+    """Return the function (v) that finds preloads and rest pose of the empty machine.
+
+    It does what `wm_drake.model.equilibrium` does: preloads that balance the tub as drawn as well
+    as they can, then the pose at which nothing remains, by Newton's method. It returns 0, or why
+    there is no such pose.
+    """
+    at, size, limits = plan.at, plan.elements.begins.size, plan.limits
+    preload_springs, newton_step = _preloads(plan), _newton_step(plan)
+
+    @njit(**OPTIONS)
+    def settle(v):
+        rest, trial = numbers_at(v, at.rest), numbers_at(v, at.trial)
+        state = numbers_at(v, at.state)
+        for k in range(size):
+            trial[k] = state[k]
+        for k in range(6):
+            rest[k] = trial[k] = 0.0
+        status = preload_springs(v)
+        if status < 0.0:
+            return status
+        for _ in range(MOST_STEPS):
+            status = newton_step(v)
+            if status != 1.0:
+                break
+        if status != 0.0:
+            return NOT_BALANCED
+        for k in range(6):
+            if not abs(rest[k]) <= limits[k // 3]:
+                return FAR
+        return 0.0
+
+    return settle
+
+
+def _newton_step(plan: Any) -> Any:
+    """Return the function (v) that moves the rest pose by a step.
+
+    It returns 0 if the pose is one of rest, 1 after a step, -1 if there is none.
+    """
+    at, on_tub = plan.at, _on_tub(plan)
+
+    @njit(**OPTIONS)
+    def newton_step(v):
+        rest, trial = numbers_at(v, at.rest), numbers_at(v, at.trial)
+        slopes, step = numbers_at(v, at.slopes), numbers_at(v, at.step)
+        for k in range(6):
+            trial[k] = rest[k]
+        now, largest = on_tub(v), 0.0
+        for k in range(6):
+            step[k], largest = now[k], max(largest, abs(now[k]))
+        if largest <= REMAINING:
+            return 0.0
+        for k in range(6):
+            trial[k] = rest[k] + POSE_STEP
+            moved = on_tub(v)
+            trial[k] = rest[k]
+            for i in range(6):
+                slopes[6 * i + k] = (moved[i] - now[i]) / POSE_STEP
+        if not solve(slopes, step, 6):
+            return -1.0
+        for k in range(6):
+            rest[k] = rest[k] - step[k]
+        return 1.0
+
+    return newton_step
+
+
+def _preloads(plan: Any) -> Any:
+    """Return the function (v) that finds the preloads which balance the machine as drawn.
+
+    They solve the normal equations of the least squares of force and moment.
+    """
+    at, preload = plan.at, SPRING.offsets["preload"]
+    solved = [k for k, kind in enumerate(plan.springs) if kind % PUSHES == SOLVED]
+    count, numbers = len(solved), np.array([*solved, 0])
+    begins = np.array([*plan.elements.mounts.springs[solved], 0], dtype=np.int64)
+    pushes = np.array([*(plan.springs[k] >= PUSHES for k in solved), False])
+    set_taut, on_tub = taut_setter(plan), _on_tub(plan)
+
+    @njit(**OPTIONS)
+    def preload_springs(v):
+        p, normal = numbers_at(v, at.packed), numbers_at(v, at.slopes)
+        right = numbers_at(v, at.step)
+        now = on_tub(v)
+        for i in range(count):
+            pull = pull_of(p, begins[i])
+            right[i] = -product(pull, now)
+            for j in range(count):
+                normal[count * i + j] = product(pull, pull_of(p, begins[j]))
+        if not solve(normal, right, count):
+            return NOT_BALANCED
+        for i in range(count):
+            p[begins[i] + preload] = right[i]
+            set_taut(v, numbers[i])
+            if not (right[i] > 0.0 or pushes[i]):
+                return SLACK
+        return 0.0
+
+    return preload_springs
+
+
+@law
+def product(a, b):
+    """Return the scalar product of two tuples of six numbers."""
+    return dot((a[0], a[1], a[2]), (b[0], b[1], b[2])) + dot((a[3], a[4], a[5]), (b[3], b[4], b[5]))
+
+
+@law
+def pull_of(p, at):
+    """Return moment about To and force, six numbers, of a spring that pulls with 1 N as drawn."""
+    hook, housing = read_spring_ends(p, at)
+    line = subtract(housing, hook)
+    pull = scale(1.0 / sqrt(dot(line, line)), line)
+    moment = cross(hook, pull)
+    return (moment[0], moment[1], moment[2], pull[0], pull[1], pull[2])
+
+
+def _on_tub(plan: Any) -> Any:
+    """Return the function (v) of moment about the origin of W and force on the tub at rest.
+
+    They are those of gravity and all mounts at the state `at.trial`.
+    """
+    at, resting = plan.at, plan.resting
+    others = len(resting.others.at) if resting.others else 0
+    count = sum(len(part) for part in resting[:3]) + others
+
+    @njit(**OPTIONS)
+    def on_tub(v):
+        p, x = numbers_at(v, at.packed), numbers_at(v, at.trial)
+        wrenches = numbers_at(v, at.wrenches)
+        write_mount_wrenches(x, p, resting, wrenches)
+        total = weight_at(tub_motion(x), p)
+        for i in range(count):
+            total = plus(total, scaled(-1.0, six(wrenches, WRENCH_SIZE * i)))
+        return total
+
+    return on_tub
+
+
+@law
+def weight_at(motion, p):
+    """Return moment about the origin of W and force of the weight of tub and empty drum. [N m, N]
+
+    Args:
+        motion: `TubMotion`.
+        p: Packed numbers of the bodies, the drum at angle 0.
+    """
+    bodies, masses = read_bodies(p, 0), mass_properties(p, 1.0, 0.0)
+    mass = 1.0 / bodies.inverse_mass
+    about_To = add(masses.moment, scale(mass, bodies.origin))
+    about_Wo = add(rotate(motion.rotation, about_To), scale(mass, motion.position))
+    m, f = cross(about_Wo, bodies.gravity), scale(mass, bodies.gravity)
+    return (m[0], m[1], m[2], f[0], f[1], f[2])
+
+
+def foot_loader(plan: Any) -> Any:
+    """Return the function (v) that puts the weight on the feet of a cabinet that moves.
+
+    It does what `wm_drake.model.cabinet.cabinet_at_rest` does.
+    """
+    at, numbers, cabinet = plan.at, plan.count.packed - FEET.fixed_size, plan.elements.cabinet
+    first = 0 if cabinet is None else cabinet + FEET_BEGIN
+    growth, sag = PADS.offsets["damping_growth"], PADS.fixed_size + FOOT.offsets["at_rest"]
+    foot = FOOT.fixed_size
+
+    @njit(**OPTIONS)
+    def load_feet(v, motion):
+        p = numbers_at(v, at.packed)
+        feet, pads = read_feet(p, numbers), read_pads(p, first)
+        load = load_on_feet(weight_at(motion, p), feet)
+        normal = normal_loads(load[0], load[3], load[4], feet.x, feet.y)
+        mean = 0.25 * (normal[0] + normal[1] + normal[2] + normal[3])
+        p[first + growth] = pads.vertical_stiffness / (FULL_DAMPING * mean)
+        for i in range(FEET_COUNT):
+            p[first + sag + foot * i] = normal[i] / pads.vertical_stiffness
+
+    return load_feet

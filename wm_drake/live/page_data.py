@@ -1,0 +1,256 @@
+"""What a page without a server knows of its machine: compiled code, numbers, words."""
+
+import base64
+import json
+import math
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from wm_drake.compiler.kept import kept
+from wm_drake.engines.compiled.multistep import STEPS_BEFORE
+from wm_drake.engines.compiled.stepping import LARGEST_TURN
+from wm_drake.errors import input_error
+from wm_drake.export.page_contents import Contents
+from wm_drake.export.page_kernel import page_kernel
+from wm_drake.export.page_model import (
+    UNBALANCE_FIELDS,
+    Candidates,
+    page_model,
+    without_wrong,
+)
+from wm_drake.export.tunable import LEAST
+from wm_drake.export.wasm import wasm_module
+from wm_drake.live.machine import MOST_STEPS, OpenMachine
+from wm_drake.live.measures import foot_title, heads_of, mount_title, shown_measures
+from wm_drake.live.sliders import Slider
+from wm_drake.live.state import PageState
+from wm_drake.model.build import build_machine
+from wm_drake.model.scene import REPLAY_RATE, Scene
+from wm_drake.parameters import MachineParameters
+from wm_drake.parameters.files import machine_tree
+from wm_drake.parameters.spin import SAMPLES_OF_TURN
+from wm_drake.parameters.units import Unit
+from wm_drake.report.formatting import shape_name
+from wm_drake.report.provenance import program
+from wm_drake.simulation.band import PADDING_PERIODS
+from wm_drake.simulation.displacements import (
+    LEAST_PADDING,
+    LONGEST_ORBIT,
+    ORBIT_REVOLUTIONS,
+    REPLAY_SPAN,
+    have_one_orbit,
+)
+from wm_drake.simulation.measures import MEASURES
+from wm_drake.simulation.mounts import mount_names
+
+SOURCES = {
+    "amplitude": ("sizes", 0),
+    "smallest_gap": ("gap", 0),
+    "detergent_displacement": ("extremes", 0),
+    "gasket_force": ("extremes", 0),
+    "gasket_moment": ("extremes", 3),
+    "mount_force_peak": ("mounts", 0),
+}
+"""Measures that the compiled machine has: name of the variable, array of a worker's answer and
+index in it, from the sensors or the points on."""
+NOT_HERE = ("loads.", "profile.", "step", "output_period")
+"""Numbers that do not enter the packed numbers: the page changes loads and profile itself."""
+AS_EXPORTED = "it is that of the exported file"
+LARGEST = 1e300
+"""In place of an infinite number, which JSON does not have."""
+
+
+def page_data(parameters: MachineParameters) -> dict[str, Any]:
+    """Return all that the page knows of a machine, its compiled code too; kept on disk."""
+    key = f"page of {parameters.model_dump_json()} {sorted(parameters.sources.items())}"
+    data: dict[str, Any] = json.loads(
+        kept(key, lambda: json.dumps(_page_data(parameters), allow_nan=False).encode())
+    )
+    return data
+
+
+def _page_data(parameters: MachineParameters) -> dict[str, Any]:
+    opened = OpenMachine(parameters, build_machine(parameters), Scene(parameters))
+    candidates = _candidates(opened)
+    setup, profile = opened.machine.set_up(None), parameters.profile
+    ends = [point[1] for point in setup.sensor_points.values()]
+    front, rear = float(min(ends)), float(max(ends))
+    depths = [front] if have_one_orbit(front, rear) else [front, rear]
+
+    def move(values: Mapping[str, float]) -> MachineParameters:
+        changed = parameters
+        for key, value in values.items():
+            changed = opened.moved_by(changed, key, value - candidates[key][0])
+        return changed
+
+    contents = Contents(opened.machine, move, profile, depths)
+    _check_length(profile.duration / contents.stepping.step)
+    model = page_model(contents, candidates)
+    functions = page_kernel(model.plan)
+    model = without_wrong(model, functions["wm_set_up"].ctypes, contents, candidates)
+    code = {name: function.inspect_llvm() for name, function in functions.items()}
+    elements, count = model.plan.elements, model.plan.count
+    return {
+        "program": program(),
+        "tree": machine_tree(parameters),
+        "machine": _machine(opened, model.places, model.refused),
+        "model": {
+            "at": model.plan.at._asdict(),
+            "count": count._asdict(),
+            "numbers": model.numbers.tolist(),
+            "constants": _finite(model.constants.tolist()),
+            "places": model.places,
+            "sample": elements.begins.size + elements.begins.rates,
+            "padding": round(PADDING_PERIODS / contents.band[0] / contents.period),
+            "leastPadding": LEAST_PADDING,
+            "mostSteps": MOST_STEPS,
+            "fastest": (1.0 + 1e-9) * 2.0 * math.pi / (SAMPLES_OF_TURN * contents.period),
+            "stepping": {
+                "integrator": model.stepping.integrator,
+                "step": model.stepping.step,
+                "period": contents.period,
+                "largestTurn": LARGEST_TURN,
+                "control": contents.layout.control_period,
+                "stepsBefore": STEPS_BEFORE,
+            },
+        },
+        "wasm": base64.b64encode(wasm_module(code)).decode(),
+        "loads": _loads(parameters, model.of_load),
+        "profile": {"time": profile.time, "speed": profile.speed},
+        "band": contents.band,
+        "depths": depths,
+        "pairs": [[shape_name(n) for n in pair.split("|")] for pair in model.pair_names],
+        "measured": _measured(opened),
+        "rows": [row for name in shown_measures(parameters) for row in _rows(opened, name, count)],
+        "forces": _forces(parameters, model.plan.gasket >= 0),
+        "masses": _masses(),
+        "drawing": {
+            "orbits": {"revolutions": ORBIT_REVOLUTIONS, "longest": LONGEST_ORBIT},
+            "replay": {"span": REPLAY_SPAN, "rate": REPLAY_RATE},
+        },
+    }
+
+
+def _check_length(steps: float) -> None:
+    """Raise an InputError for a run of too many steps."""
+    if steps > MOST_STEPS:
+        raise input_error(
+            f"a run of {steps:.0f} steps is too long for a page; allowed are {MOST_STEPS}: give "
+            "the machine a shorter profile",
+            key="profile.time",
+        )
+
+
+def _candidates(opened: OpenMachine) -> Candidates:
+    """Return value and ends of each number that may enter the compiled functions. [SI]"""
+    candidates = {}
+    for key, slider in opened.sliders.items():
+        if slider.needs or key.startswith(NOT_HERE):
+            continue
+        si = 1.0 / slider.unit.from_si(1.0)
+        candidates[key] = float(slider.number.nominal or 0.0), slider.low * si, slider.high * si
+    return candidates
+
+
+def _machine(
+    opened: OpenMachine, places: Mapping[str, int], refused: Mapping[str, str]
+) -> dict[str, Any]:
+    """Return the machine as the studio has it; each number also with its units and limits."""
+    machine = opened.for_page()
+    numbers: Any = machine["numbers"]
+    labels: dict[str, dict[str, float]] = {}
+    for slider in opened.sliders.values():
+        units = labels.setdefault(slider.unit.si, {})
+        for unit in (slider.unit, Unit(slider.unit.si, slider.unit.si)):
+            units[unit.label] = 1.0 / unit.from_si(1.0)
+    for number in numbers:
+        key = number["key"]
+        slider = opened.sliders[key]
+        number["units"] = labels[slider.unit.si]
+        number["kind"] = (
+            "table" if slider.number.is_table else "entry" if slider.is_entry else "number"
+        )
+        number["least"], number["most"] = _limits(slider)
+        runs = key in places or re.fullmatch(
+            r"loads\..*\.unbalances\.\d+\.\w+|profile\.(time|speed)\.\d+", key
+        )
+        if not runs and not number["needs"]:
+            number["needs"], number["fixed"] = refused.get(key, AS_EXPORTED), True
+        if number["needs"]:
+            number["low"] = number["high"] = number["value"]
+    return machine
+
+
+def _limits(slider: Slider) -> tuple[float, float]:
+    """Return the ends of the allowed range of a number; one that is excluded is near. [SI]"""
+    allowed = slider.allowed
+    low = allowed.low if allowed.low_is_in else allowed.low + LEAST
+    high = allowed.high if allowed.high_is_in else allowed.high - LEAST
+    return max(low, -LARGEST), min(high, LARGEST)
+
+
+def _finite(values: list[float]) -> list[float]:
+    """Return numbers for JSON, which has no infinite ones."""
+    return [max(-LARGEST, min(LARGEST, value)) for value in values]
+
+
+def _loads(parameters: MachineParameters, of_load: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        name: {
+            "unbalances": [{f: getattr(u, f) for f in UNBALANCE_FIELDS} for u in load.unbalances],
+            "harmonics": of_load[name].tolist() if of_load[name].any() else [],
+        }
+        for name, load in parameters.loads.items()
+    }
+
+
+def _masses() -> dict[str, Any]:
+    """Return units and limits of the numbers of a described mass."""
+    fields = {"mass": ("kg", "g"), "radius": ("m", "mm"), "y": ("m", "mm"), "phase": ("rad", "deg")}
+    return {
+        name: {
+            "units": {u.label: 1.0 / u.from_si(1.0) for u in (Unit(si, si), Unit(si, shown))},
+            "least": 0.0 if name in ("mass", "radius") else -LARGEST,
+            "most": LARGEST,
+            "allowed": "≥ 0" if name in ("mass", "radius") else "any number",
+        }
+        for name, (si, shown) in fields.items()
+    }
+
+
+def _measured(opened: OpenMachine) -> dict[str, Any]:
+    """Return what was measured, by load and by whether the gasket is in."""
+    return {
+        load: {
+            word: opened.measured(PageState(machine="", load=load, gasket=word == "yes"))
+            for word in ("yes", "no")
+        }
+        for load in opened.parameters.loads
+    }
+
+
+def _rows(opened: OpenMachine, measure: str, count: Any) -> list[dict[str, Any]]:
+    """Return the rows of the table of measures, and where the answer of a worker has each value."""
+    rows = []
+    for variable in MEASURES[measure].variables:
+        if variable.studio is None or variable.name not in SOURCES:
+            continue
+        array, first = SOURCES[variable.name]
+        if array == "extremes":
+            first += count.sensors if variable.name.startswith("detergent") else count.points
+        heads = heads_of(opened.parameters, opened.parameters.profile, variable)
+        factor = variable.unit.from_si(1.0)
+        rows += [
+            head | {"from": [array, first + k], "factor": factor} for k, head in enumerate(heads)
+        ]
+    return rows
+
+
+def _forces(parameters: MachineParameters, has_gasket: bool) -> list[tuple[str, int]]:
+    """Return name and number of each force that is drawn over time."""
+    gasket = [f"gasket {letter}{axis}" for letter in "FM" for axis in "xyz"] if has_gasket else []
+    others = [mount_title(name) for name in mount_names(parameters)]
+    if parameters.cabinet:
+        others += map(foot_title, parameters.cabinet.corners)
+    return [*((n, k) for k, n in enumerate(gasket)), *((n, 6 + k) for k, n in enumerate(others))]
