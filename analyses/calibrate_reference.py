@@ -30,8 +30,7 @@ from wm_drake.parameters.free import FreeFile, load_free
 from wm_drake.parameters.measured import EXPERIMENT, measured_amplitudes
 from wm_drake.parameters.published import published_results
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.progress import progress_bar
-from wm_drake.studies.calibrate.computed import PointRunner
+from wm_drake.report.progress import progress_bar, progress_bars
 from wm_drake.studies.calibrate.prediction import FITS, Prediction, predict
 from wm_drake.studies.calibrate.response_targets import with_deviations
 from wm_drake.studies.calibrate.results import predictions_of
@@ -43,6 +42,7 @@ from wm_drake.studies.calibrate.study import (
     identity_of,
 )
 from wm_drake.studies.calibrate.targets import Targets, targets_of
+from wm_drake.studies.experiment import Experiment, kept_in
 from wm_drake.studies.gasket.screening import published_for
 
 REFERENCE = "reference"
@@ -80,16 +80,17 @@ def main() -> None:
     prediction_plan = replace(plan, draws=QUICK_DRAWS) if arguments.quick else PREDICTION
     ledger_path = arguments.out.with_suffix(".sqlite")
     with open_ledger(ledger_path, identity_of(machine, free, targets, plan), resume=True) as ledger:
-        runner = PointRunner(machine, ledger)
-        with progress_bar(plan.starts, "searches") as done:
-            shown = replace(runner, report=lambda start, *_: done(start))
-            calibration = calibrate(shown, free, targets, plan)
+        experiment = Experiment(machine, (), kept_in(ledger))
+        with progress_bars(["searches"]) as show:
+            calibration = calibrate(
+                experiment, free, targets, plan, lambda done, least: show(0, done)
+            )
         if arguments.write:
             _write(calibration)
         predictions = []
         with progress_bar(len(held_out), "predictions") as done:
             for number, group in enumerate(held_out, start=1):
-                predictions += predict(runner, free, calibration, [group], prediction_plan)
+                predictions += predict(experiment, free, calibration, [group], prediction_plan)
                 done(number)
         ledger.mark_finished()
     tables = {

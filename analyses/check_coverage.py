@@ -24,11 +24,12 @@ from wm_drake.model.machine import Machine
 from wm_drake.parameters import load_machine
 from wm_drake.parameters.free import FreeFile, load_free
 from wm_drake.parameters.types import FloatArray
-from wm_drake.studies.calibrate.computed import Evaluation, PointRunner
+from wm_drake.studies.calibrate.computed import Evaluation
 from wm_drake.studies.calibrate.options import CalibrateOptions
 from wm_drake.studies.calibrate.parameter_map import ParameterMap, parameter_map_of
 from wm_drake.studies.calibrate.study import Calibration, SearchPlan, calibrate, identity_of
 from wm_drake.studies.calibrate.targets import Targets
+from wm_drake.studies.experiment import Experiment, kept_in
 
 LOADS = tuple((name, True) for name in ("middle", "counter", "back", "front"))
 QUANTITIES = ("spring_stiffness", "damper_friction", "damper_lean", "gasket_radial")
@@ -56,7 +57,7 @@ def main() -> None:
         truth, targets = _planted(machine, parameter_map, seed)
         calibration = _calibrated(machine, free, targets, SearchPlan(starts=starts, seed=seed))
         best = calibration.solutions[0]
-        spread = best.posterior.spread() * parameter_map.deviation
+        spread = best.fit.remaining * parameter_map.deviation
         inside.append(np.abs(best.point - truth) <= Z * spread)
         costs = np.array([end.cost for end in calibration.ended])
         worse.append(np.mean(costs > best.cost + WORSE))
@@ -96,7 +97,7 @@ def _planted(
     sensors = tuple(machine.parameters.sensors)
     ones = np.ones((len(LOADS), len(sensors)))
     targets = Targets(LOADS, sensors, ones, ones)
-    exact = Evaluation(machine, parameter_map, targets)(truth[None]).amplitude[0]
+    exact = Evaluation(Experiment(machine, ()), parameter_map, targets)(truth[None]).amplitude[0]
     return truth, replace(targets, amplitude=exact * np.exp(NOISE * rng.normal(size=ones.shape)))
 
 
@@ -106,7 +107,7 @@ def _calibrated(
     with tempfile.TemporaryDirectory() as folder:
         identity = identity_of(machine, free, targets, plan)
         with open_ledger(Path(folder) / "ledger.sqlite", identity) as ledger:
-            return calibrate(PointRunner(machine, ledger), free, targets, plan)
+            return calibrate(Experiment(machine, (), kept_in(ledger)), free, targets, plan)
 
 
 def _binomial(hits: int, count: int) -> tuple[float, float]:

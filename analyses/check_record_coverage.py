@@ -2,39 +2,41 @@
 
 For each seed the script plants a machine: friction of the dampers and mass of the unbalance that
 differ from those of the reference machine by up to a quarter. Its accelerometers are not ideal:
-gravity, an offset, a gain that is wrong by 1 %, a tilt of 2 degrees, noise. Three repeats start
-late by other times. The calibration knows none of it.
+gravity, an offset that drifts, a gain that is wrong by 1 %, a tilt of 2 degrees, noise. Three
+repeats start late by other times. The calibration knows none of it.
 
     python analyses/check_record_coverage.py --seeds 100
 """
 
 import argparse
 import sys
-from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.stats import beta
 
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
-from wm_drake.parameters import SpinProfile, load_machine, with_values
+from wm_drake.parameters import MachineParameters, SpinProfile, load_machine, with_values
 from wm_drake.parameters.recorded import Synchronous
 from wm_drake.parameters.recorded_sensors import RecordedSensor, RecordedTest, recorded_test_of
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.records import Record
+from wm_drake.studies.calibrate.recorded import RecordedLoad, without_edges
+from wm_drake.studies.calibrate.records import RecordModel, calibrated
 from wm_drake.studies.compare.pairs import paired, predicted_signals
 from wm_drake.studies.compare.recordings import TestRecording
-from wm_drake.studies.record_calibrate.study import RecordModel, calibrated, without_edges
-from wm_drake.studies.record_calibrate.task import records_of
-from wm_drake.studies.spin_identify.study import sought_of
+from wm_drake.studies.experiment import Experiment, record_here
+from wm_drake.studies.fitting.sought import SoughtNumbers, sought_of
 
 UNKNOWNS = ("damper_types.friction.friction_force", "loads.middle.unbalances.0.mass")
 SENSORS = ("S1_x", "S1_z", "S2_x", "S2_z", "S3_x", "S3_z")
 SPAN = np.log(1.25)
-GAIN, OFFSET, TILT, NOISE, LATE = 0.01, 0.1, np.deg2rad(2.0), 0.02, (0.5, 2.0)
-"""Deviations of gain and offset [m/s^2], tilt [rad], noise [m/s^2], and range of starts [s]."""
+GAIN, OFFSET, DRIFT, TILT, NOISE, LATE = 0.01, 0.1, 0.1, np.deg2rad(2.0), 0.02, (0.5, 2.0)
+"""Deviations of gain, offset and its drift over a record [m/s^2], tilt [rad], noise [m/s^2], and
+range of starts [s]."""
 PROFILE = SpinProfile(time=(0.0, 25.0, 30.0), speed=(0.0, 36.0, 36.0))
 
 
@@ -43,19 +45,24 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="one seed")
     parser.add_argument("--seeds", type=int, default=100)
+    parser.add_argument("--first", type=int, default=0, help="first seed")
+    parser.add_argument("--by", default="envelope", help="envelope, order, rms or history")
     parser.add_argument("--out", type=Path, help="also write the result to this file")
     arguments = parser.parse_args()
     machine = build_machine(load_machine("reference"))
-    inside = []
-    for seed in range(1 if arguments.quick else arguments.seeds):
-        inside.append(_covers(machine, seed))
-        print(f"seed {seed}: {int(inside[-1].sum())} of {len(UNKNOWNS)}", file=sys.stderr)
+    rows = []
+    count = 1 if arguments.quick else arguments.seeds
+    for seed in range(arguments.first, arguments.first + count):
+        rows.append(_found(machine, seed, arguments.by))
+        print(f"seed {seed}: {rows[-1].tolist()}", file=sys.stderr, flush=True)
     lines = []
-    for name, hits in zip(UNKNOWNS, np.transpose(inside), strict=True):
+    for name, row in zip(UNKNOWNS, np.moveaxis(rows, 1, 0), strict=True):
+        hits, error, half = row[:, 0] > 0.0, row[:, 1], row[:, 2]
         low, high = _binomial(int(hits.sum()), len(hits))
         lines.append(
             f"{name}: {hits.sum()} of {len(hits)} intervals hold the planted value; probability "
-            f"{100 * low:.0f} to {100 * high:.0f} %"
+            f"{100 * low:.0f} to {100 * high:.0f} %; median half-width {100 * np.median(half):.1f} "
+            f"%, median error {100 * np.median(np.abs(error)):.1f} %"
         )
     text = "\n".join(lines)
     print(text)
@@ -63,27 +70,38 @@ def main() -> None:
         arguments.out.write_text(text + "\n", encoding="utf-8")
 
 
-def _covers(machine: Machine, seed: int) -> FloatArray:
-    """Return whether the interval of each unknown holds its planted value."""
+def _found(machine: Machine, seed: int, by: Any) -> FloatArray:
+    """Return for each unknown whether its interval holds the planted value, error, half-width."""
     parameters, generator = machine.parameters, np.random.default_rng(seed)
     sought = tuple(sought_of(parameters, [name]) for name in UNKNOWNS)
     truth = np.array([s.guess for s in sought]) * np.exp(generator.uniform(-SPAN, SPAN, 2))
     planted = with_values(parameters, dict(zip(UNKNOWNS, truth.tolist(), strict=True)))
-    case = Case("middle", planted.loads["middle"], PROFILE, parameters=planted)
     sensors = {name: recorded_test_of(parameters).sensors[name] for name in SENSORS}
     points = machine.set_up().accelerometer_points
     places = {name: points[name[:2]] for name in SENSORS}
-    record = records_of(machine, [case])[0]
-    recordings = _recordings(record, sensors, places, generator)
-    nominal = Case("middle", parameters.loads["middle"], PROFILE)
-    run = records_of(machine, [nominal])[0]
-    predicted, test = predicted_signals(run, sensors, places), RecordedTest(sensors=sensors)
+    recordings = _recordings(_record(machine, planted), sensors, places, generator)
+    run, test = _record(machine, parameters), RecordedTest(sensors=sensors)
+    predicted = predicted_signals(run, sensors, places)
     pairs = tuple(without_edges(paired(r, run, predicted, test)) for r in recordings)
-    parts = sensors, places, sought, "envelope", partial(records_of, machine)
-    fit, _ = calibrated(RecordModel(parameters, nominal, pairs, *parts), seed)
+    load = RecordedLoad("middle", lambda changed: changed.loads["middle"], pairs)
+    free = SoughtNumbers(parameters, sought, "calibrated")
+    model = RecordModel(Experiment(machine, ()), free, (load,), sensors, places, by)
+    fit, _ = calibrated(model, seed)
     return np.array(
-        [e.lower <= value <= e.upper for e, value in zip(fit.estimates, truth, strict=True)]
+        [
+            [e.lower <= true <= e.upper, e.value / true - 1.0, (e.upper - e.lower) / 2.0 / e.value]
+            for e, true in zip(fit.estimates, truth, strict=False)
+        ],
+        dtype=float,
     )
+
+
+def _record(machine: Machine, parameters: MachineParameters) -> Record:
+    """Return the record of a run of a machine with other numbers."""
+    case = Case("middle", parameters.loads["middle"], PROFILE, parameters=parameters)
+    records: list[Record] = []
+    record_here(machine, [case], lambda number, record: records.append(record), "runs")
+    return records[0]
 
 
 def _recordings(
@@ -101,7 +119,8 @@ def _recordings(
             update={"tilt": tilt, "gain": float(np.exp(GAIN * generator.standard_normal()))}
         )
         signal = predicted_signals(record, {name: faulty}, places)[:, 0]
-        signals[name] = signal + OFFSET * generator.standard_normal()
+        slope = DRIFT * generator.standard_normal() * np.linspace(-0.5, 0.5, len(signal))
+        signals[name] = signal + OFFSET * generator.standard_normal() + slope
     recordings, time = [], record.time.values
     for _ in range(3):
         late = int(np.searchsorted(time, generator.uniform(*LATE)))

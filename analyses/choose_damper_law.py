@@ -25,9 +25,9 @@ from wm_drake.parameters.damper_laws import DAMPER_LAWS
 from wm_drake.parameters.files import read_yaml, yaml_text
 from wm_drake.parameters.free import FreeFile
 from wm_drake.report.progress import progress_bar
-from wm_drake.studies.calibrate.computed import PointRunner
 from wm_drake.studies.calibrate.solutions import Solution
 from wm_drake.studies.calibrate.study import calibrate, identity_of
+from wm_drake.studies.experiment import Experiment, kept_in
 
 FREE = Path(__file__).with_name(f"{REFERENCE}_free.yaml")
 KEY = "damper_types.friction"
@@ -170,7 +170,8 @@ def main() -> None:
             identity = identity_of(machine, free, targets, plan)
             kept = (arguments.out or path).with_name(f"{law}.sqlite")
             with open_ledger(kept, identity, resume=True) as ledger:
-                found = calibrate(PointRunner(machine, ledger), free, targets, plan)
+                experiment = Experiment(machine, (), kept_in(ledger))
+                found = calibrate(experiment, free, targets, plan)
             rows.append(row_of(law, found.solutions[0]))
             done(number)
     rows.sort(key=lambda row: float(row["cost"]))

@@ -35,12 +35,13 @@ FIRST = 2550.0
 """First speed above the resonances. [rpm]"""
 
 
-def rig(damping: float, gravity: float = 9.81) -> MachineParameters:
+def rig(damping: float, gravity: float = 9.81, **race: float) -> MachineParameters:
     """Return the rig with two balls, at a race damping over m R^2 times the critical speed.
 
     Args:
         damping: Ratio.
         gravity: [m/s^2]
+        race: Other numbers of the ring, such as its eccentricity, in SI.
     """
     apart = 1.001 * np.arcsin(0.5 * DIAMETER / RADIUS)
     ring = {
@@ -53,7 +54,7 @@ def rig(damping: float, gravity: float = 9.81) -> MachineParameters:
         "damping": damping * MASS * RADIUS**2 * CYLINDRIC,
         "race_frequency": 3000.0 * np.pi,
         "start_angles": (HEAVY - apart, HEAVY + apart),
-    }
+    } | race
     tree = wm.load_machine("rodrigues_2010").model_dump(exclude_unset=True)
     changes = {"elements": {"abb": ring}, "gravity": gravity}
     return MachineParameters.model_validate(tree | changes)

@@ -38,9 +38,9 @@ from wm_drake.parameters import (
 from wm_drake.parameters.free import FreeFile
 from wm_drake.parameters.measured import EXPERIMENT
 from wm_drake.report.quantity import quantity_of, shown
-from wm_drake.studies.calibrate.computed import PointRunner
 from wm_drake.studies.calibrate.study import SearchPlan, calibrate, identity_of
 from wm_drake.studies.calibrate.targets import targets_of
+from wm_drake.studies.experiment import Experiment, kept_in
 from wm_drake.studies.gasket.screening import at, labels_of, published_for, sign_differs
 
 REFERENCE = "reference"
@@ -203,10 +203,10 @@ def damping_line(machine: MachineParameters, is_quick: bool) -> list[str]:
     with tempfile.TemporaryDirectory() as folder:
         ledger_path = Path(folder) / "ledger.sqlite"
         with open_ledger(ledger_path, identity_of(built, free, targets, plan)) as ledger:
-            found = calibrate(PointRunner(built, ledger), free, targets, plan)
+            found = calibrate(Experiment(built, (), kept_in(ledger)), free, targets, plan)
     best, known = found.solutions[0], found.parameter_map
     misses = float(np.sqrt(np.nanmean(np.log1p(best.errors) ** 2)))
-    spread = np.sqrt(np.diag(best.posterior.spread_matrix(misses / DEVIATION)))
+    spread = np.sqrt(np.diag(best.fit.linear.covariance(misses / DEVIATION)))
     spread = known.in_units(spread * known.deviation)
     units = (unknown.unit.shown for unknown in known.unknowns)
     values = zip(known.in_units(best.point), spread, units, strict=True)

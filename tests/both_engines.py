@@ -60,14 +60,16 @@ class BothEngines:
         tube_sponges = places(self.context, machine.telescopes.values())
         stretches = places(self.context, machine.bushings.values())
         own = places(self.context, machine.others.values())
+        self._water = water = places(self.context, [machine.water] if machine.water else [])
         count = self.context.num_continuous_states()
-        known = np.concatenate([*self._trees, feet, sponges, tube_sponges, stretches, own])
+        known = np.concatenate([*self._trees, feet, sponges, tube_sponges, stretches, own, water])
         self._motor = np.setdiff1d(np.arange(count), known)
         rest = {
             state_map.STRUT_SPONGE: iter(sponges),
             state_map.TUBES: iter(tube_sponges),
             state_map.STRETCHES: iter(stretches),
             state_map.ELEMENT: iter(own),
+            state_map.WATER: iter(water),
         }
         has_sponge = iter([damper.has_sponge for damper in setup.dampers.values()])
         trees, index, sizes = iter(self._trees), [], np.full(count, SPONGE)
@@ -85,7 +87,7 @@ class BothEngines:
             elif part.kind == state_map.DRIVE:
                 indices = [*self._motor, -1]
                 sizes[self._motor] = INTEGRAL
-            elif part.kind in (state_map.STRETCHES, state_map.ELEMENT):
+            elif part.kind in (state_map.STRETCHES, state_map.ELEMENT, state_map.WATER):
                 indices = [next(others) for _ in part.roles]
             else:
                 tree = next(trees)
@@ -94,6 +96,7 @@ class BothEngines:
                 indices = [*np.asarray(tree)[BODY], *(feet if cabinet else [])]
             index.extend(indices)
         sizes[feet] = SLIP
+        sizes[water] = 1.0
         self.of_drake, self.sizes = np.array(index, dtype=int), sizes
 
     def compiled_order(self, numbers):
@@ -109,6 +112,7 @@ class BothEngines:
             speed: Speed of the drum that the controller of a motor gets. [rad/s]
         """
         self.context.SetContinuousState(state)
+        self.setup.follow_water()
         if len(self._motor):
             port = self.machine.diagram.GetInputPort("drum_speed_reference")
             port.FixValue(self.context, [speed])
@@ -140,6 +144,7 @@ class BothEngines:
         ]
         for _ in range(count):
             state = rng.uniform(-1.0, 1.0, len(self.sizes)) * self.sizes
+            state[self._water] = np.abs(state[self._water])  # shares
             drake, compiled = self.rates(state, rng.uniform(-20.0, 20.0), rng.uniform(-60.0, 60.0))
             visit()
             for group, smallest in groups:

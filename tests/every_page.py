@@ -113,12 +113,12 @@ KINDS = {
             ("record", "compare", "recording", "--load", "middle", "--profile", "short_cycle.yaml"),
         ),
     ),
-    "record_calibrate": Kind(
+    "calibrate_records": Kind(
         "sections.html",
         (
             ("spin", "--load", "middle", "--profile", "short_cycle.yaml", "--out", "bench"),
             (
-                "record", "calibrate", "recording", "--load", "middle", "--profile", "short_cycle.yaml",
+                "calibrate", "recording", "--load", "middle", "--profile", "short_cycle.yaml",
                 "--unknown", "damper_types.friction.friction_force",
             ),
         ),
@@ -129,8 +129,13 @@ KINDS = {
         "--profile", "short_cycle.yaml",
     ),
     "verdict": _one("sections.html", "verdict", "short.yaml", "--samples", "16", "--profile", "short_cycle.yaml"),
+    "next": _one(
+        "sections.html", "study", "next", "--free", "free.yaml", "--samples", "32", "--budget", "2",
+        "--profile", "short_cycle.yaml",
+    ),
     "design": _one("sections.html", "study", "design", "gasket", "--evaluations", "48", "--population", "16", "--profile", "short_cycle.yaml"),
     "balancer": _one("sections.html", "study", "balancer", "--quick"),
+    "cycle": _one("sections.html", "study", "cycle", "--profile", "short_cycle.yaml"),
     "drive": _one("sections.html", "study", "drive", "--load", "middle", "--torques", "3", "--unbalances", "2", "--loads", "4"),
 }  # fmt: skip
 

@@ -121,7 +121,7 @@ wm-drake spin --load middle --out spin
 wm-drake record channels spin/record_middle.nc
 wm-drake record orders spin/record_middle.nc --out orders
 wm-drake record compare spin/record_middle.nc --load middle --channels 'Xr=displacement(Xr)' --out compare
-wm-drake record calibrate spin/record_middle.nc --load middle --channels 'Xr=displacement(Xr)' --unknown 'damper_types.friction.friction_force=(30, 40) N' --quick --out record_calibrate
+wm-drake calibrate spin/record_middle.nc --load middle --channels 'Xr=displacement(Xr)' --unknown 'damper_types.friction.friction_force=(30, 40) N' --quick --out record_calibrate
 wm-drake calibrate --machine short.yaml --free free.yaml --targets measured.csv --quick --out calibrate
 wm-drake verdict short.yaml --samples 16 --out verdict
 wm-drake export fmu --load middle --out machine.fmu
@@ -133,6 +133,7 @@ wm-drake study gasket --quick --response D --profile short_cycle.yaml --out gask
 wm-drake study gasket-damping --mesh 20 --record middle=spin/record_middle.nc --out gasket_damping
 wm-drake study gasket-geometry --quick --profile short_cycle.yaml --out gasket_geometry
 wm-drake study modes --quick --out modes
+wm-drake study next short.yaml --quick --free free.yaml --out next
 wm-drake study response --quick --load middle --out response
 wm-drake study spin-cycle --quick --profile eight_regions.yaml --out spin_cycle
 wm-drake study spin-identify --quick --case 2 --unknown 'gasket.stiffness_y=(1, 4) N/mm' --profile short_cycle.yaml --out spin_identify

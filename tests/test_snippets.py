@@ -46,13 +46,15 @@ NOT_RUN = {  # beginning of a command, and why this test does not run it
     "wm-drake study tolerance laundry --samples 8192": "minutes: the tutorial will-it-hit runs 128",
     "wm-drake study design mine.yaml --evaluations 5000": "minutes: test_readme reads the file",
     "wm-drake study gasket-damping --mesh 0.05": "minutes: --mesh 4 is in the gallery",
+    "wm-drake study next --free free.yaml": "the tutorial measure-next runs it with a short machine",
     "wm-drake calibrate --free free.yaml --resume": "continues what was interrupted: test_cli_calibrate",
 }
 HOURS = (  # commands of more than ten seconds of processor time; the marker `hours` runs them
     "wm-drake verdict", "wm-drake gasket curves folded",
     "wm-drake study tolerance", "wm-drake study spin-cycle", "wm-drake study spin-identify",
     "wm-drake study gasket", "wm-drake study drive", "wm-drake study balancer", "wm-drake study design",
-    "wm-drake study modes", "wm-drake study response", "wm-drake calibrate", "wm-drake record calibrate",
+    "wm-drake study next",
+    "wm-drake study modes", "wm-drake study response", "wm-drake calibrate",
     "wm-drake spin --engine drake", "wm-drake identify gasket rubber/*.csv --axis radial --method",
     "wm-drake identify damper bench/*.csv --law coulomb", "wm-drake identify damper fit/*.csv",
     "wm-drake spin --compare-gasket --out", "wm-drake spin --machine ball_rings",

@@ -1,6 +1,7 @@
 """Least squares of a machine to all targets, and to the changes by the gasket of [B] Table 1."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,10 +14,11 @@ from wm_drake.model.machine import Machine
 from wm_drake.parameters import load_machine
 from wm_drake.parameters.free import FreeFile
 from wm_drake.parameters.types import FloatArray
-from wm_drake.studies.calibrate.computed import Evaluation, PointRunner
+from wm_drake.studies.calibrate.computed import Evaluation
 from wm_drake.studies.calibrate.parameter_map import ParameterMap, parameter_map_of
 from wm_drake.studies.calibrate.study import calibration_problem, identity_of
-from wm_drake.studies.fitting.problem import PriorProblem, Residuals
+from wm_drake.studies.experiment import Experiment, kept_in
+from wm_drake.studies.fitting.problem import FitProblem, Measurement, ModelValues
 from wm_drake.studies.fitting.search import Search, descended
 
 CHANGE_DEVIATION = 0.06
@@ -40,7 +42,8 @@ def fitted_point(
     parameter_map = parameter_map_of(machine, free)
     identity = identity_of(machine, free, targets, PLAN)
     with open_ledger(ledger_path, identity, resume=True) as ledger:
-        values = PointRunner(machine, ledger, workers=1).values(parameter_map, targets)
+        experiment = Experiment(machine, (), kept_in(ledger, workers=1))
+        values = Evaluation(experiment, parameter_map, targets)
         problem = _with_changes(
             calibration_problem(values, PLAN), values, printed_changes(reference, targets)
         )
@@ -49,29 +52,28 @@ def fitted_point(
         return problem.points_at(end.point)
 
 
-def _with_changes(problem: PriorProblem, values: Evaluation, printed: FloatArray) -> PriorProblem:
-    """Return a problem with the changes of [B] Table 1 as further residuals."""
+def _with_changes(problem: FitProblem, values: Evaluation, printed: FloatArray) -> FitProblem:
+    """Return a problem with the changes of [B] Table 1 as a further measurement."""
 
-    def residuals(points: FloatArray) -> Residuals:
-        computed = values(points)
-        parts = problem.evaluate(points)
-        exact, smooth = (
-            np.hstack(
-                [
-                    part,
-                    (changes_of(values.targets, a) - printed).reshape(len(points), -1)
-                    / CHANGE_DEVIATION,
-                ]
-            )
-            for part, a in zip(parts, (computed.amplitude, computed.power_mean), strict=True)
+    def missed(amplitude: FloatArray) -> FloatArray:
+        changes = (changes_of(values.targets, amplitude) - printed) / CHANGE_DEVIATION
+        return changes.reshape(len(amplitude), -1)
+
+    def evaluate(points: FloatArray) -> ModelValues:
+        computed, parts = values(points), problem.evaluate(points)
+        assert isinstance(parts, ModelValues)
+        assert parts.smooth is not None
+        return parts._replace(
+            values=np.hstack([parts.values, missed(computed.amplitude)]),
+            smooth=np.hstack([parts.smooth, missed(computed.power_mean)]),
         )
-        return Residuals(exact, smooth)
 
-    return PriorProblem(problem.unknowns, residuals)
+    changes = Measurement("changes", np.zeros(printed.size), errors="known")
+    return replace(problem, measurements=(*problem.measurements, changes), evaluate=evaluate)
 
 
 def _report(evaluations: int, least: float) -> None:
-    print(f"{evaluations} evaluations, cost {least:.0f}", file=sys.stderr, flush=True)
+    print(f"{evaluations} evaluations, misfit {least:.3g}", file=sys.stderr, flush=True)
 
 
 def quantities_of(parameter_map: ParameterMap, point: FloatArray) -> pd.DataFrame:

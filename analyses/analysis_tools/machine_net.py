@@ -8,7 +8,7 @@ runs. The second stage makes the gasket study of 27 trials and two loads.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -38,6 +38,7 @@ from wm_drake.simulation.cases import Case
 from wm_drake.studies.calibrate.parameter_map import ParameterMap, parameter_map_of
 from wm_drake.studies.calibrate.response_targets import ComputedResponses
 from wm_drake.studies.calibrate.targets import Targets
+from wm_drake.studies.experiment import Experiment, run_here
 
 PRIORS = Path(__file__).parents[1] / "reference_net.yaml"
 """Quantities and relations that replace those of reference_free.yaml."""
@@ -137,7 +138,9 @@ class Net:
 
     @cached_property
     def _study(self) -> ComputedResponses:
-        return ComputedResponses(self.machine, self.targets.responses, workers=1)
+        return ComputedResponses(
+            Experiment(self.machine, (), partial(run_here, workers=1)), self.targets.responses
+        )
 
     def drawn(self, rng: np.random.Generator) -> FloatArray:
         """Return a machine: the gasket by its relations, all else from the priors. (quantity,)"""

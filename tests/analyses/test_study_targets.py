@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from analysis_tools.study_targets import StudyRuns, study_targets
+from linear_fits import fit_at
 
 from wm_drake.batch import simulate_many
 from wm_drake.model.build import build_machine
@@ -23,7 +24,7 @@ from wm_drake.studies.calibrate.results import predictions_of
 from wm_drake.studies.calibrate.solutions import Solution
 from wm_drake.studies.calibrate.targets import targets_of
 from wm_drake.studies.doe.orthogonal import orthogonal_levels
-from wm_drake.studies.fitting.posterior import Posterior
+from wm_drake.studies.experiment import Experiment
 
 MEANS = "load,response,term,percent,effects\nmiddle,Fx,constant,,50\nmiddle,My,constant,,4\n"
 OF_STUDY = """load,response,term,percent,effects
@@ -52,7 +53,9 @@ def targets_in(machine, tmp_path, text):
 
 def test_a_mean_over_the_design_is_that_of_its_trials(short, tmp_path):
     targets = targets_in(short, tmp_path, MEANS)
-    computed = ComputedResponses(short, targets)([short.parameters, short.parameters])
+    computed = ComputedResponses(Experiment(short, ()), targets)(
+        [short.parameters, short.parameters]
+    )
     p, factors = short.parameters, levels_of(short.parameters, load_factors(GASKET_FACTORS))
     trials = [at_levels(p, factors, row.tolist()) for row in orthogonal_levels(8, 27)]
     cases = [Case("middle", p.loads["middle"], p.profile, parameters=trial) for trial in trials]
@@ -104,9 +107,9 @@ def test_values_of_held_out_loads_are_predicted_by_kind(short, tmp_path):
     amplitude, responses = 1.1 * targets.amplitude, wanted.copy()
     responses[[target.load == "counter" for target in targets.responses]] = [33.0, 50.0]
     limits = np.stack([responses, responses - 11.0, responses + 4.0])
-    posterior = Posterior(np.zeros(1), np.ones((1, 1)), 1)
+    fit = fit_at([0.0], [[1.0]])
     with_all, without = (
-        Solution(None, t, 0, np.zeros(1), a, r, 1.0, 0.0, posterior, 1)
+        Solution(None, t, 0, fit, a, r, 1.0, 0.0)
         for t, a, r in (
             (targets, targets.amplitude, wanted),
             (others, 1.2 * others.amplitude, wanted[: len(others.responses)]),

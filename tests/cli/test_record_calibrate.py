@@ -1,4 +1,4 @@
-"""`record calibrate`: planted numbers are recovered, wrong structures are called wrong."""
+"""`calibrate` with records: planted numbers are recovered, wrong structures are called wrong."""
 
 import json
 from pathlib import Path
@@ -13,6 +13,7 @@ from wm_drake.parameters.recorded_sensors import RecordedSensor
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.recorded_signal import recorded_signal
 from wm_drake.simulation.runs import simulate
+from wm_drake.studies.calibrate.records import turned_load
 
 SENSORS = ("S1_x", "S1_z", "S3_x", "S3_z")
 FRICTION = "damper_types.friction.friction_force"
@@ -21,12 +22,13 @@ NOISE, GAIN, OFFSET, TILT = 0.02, 0.01, 0.1, np.deg2rad(2.0)
 """Noise [m/s^2], deviations of gains and offsets [1, m/s^2], and tilt [rad] of the sensors."""
 
 
-def plant(changes, seed=1, repeats=3):
+def plant(changes, seed=1, repeats=3, angle=0.0):
     """Write records of the reference machine with other numbers, by sensors that are not ideal."""
     parameters = load_machine("reference")
     Path("p.yaml").write_text(PROFILE)
     machine = build_machine(with_values(parameters, changes))
-    case = Case("middle", machine.parameters.loads["middle"], load_profile("p.yaml"))
+    load = turned_load(machine.parameters.loads["middle"], angle)
+    case = Case("middle", load, load_profile("p.yaml"))
     record, points = simulate(machine, case), machine.set_up().accelerometer_points
     generator = np.random.default_rng(seed)
     frames = parameters.accelerometer_frames()
@@ -57,7 +59,7 @@ def calibrate(wm_drake):
 
     def command(files, *words, code=0):
         ended = wm_drake(
-            "record", "calibrate", *files, "--test", "test.yaml", "--profile", "p.yaml", *words,
+            "calibrate", *files, "--test", "test.yaml", "--profile", "p.yaml", *words,
             "--out", "out", "--overwrite", "--json",
         )  # fmt: skip
         assert ended.code == code, ended.err
@@ -66,7 +68,8 @@ def calibrate(wm_drake):
     return command
 
 
-@pytest.mark.parametrize("by", ["envelope", "order", "rms"])
+@pytest.mark.slow
+@pytest.mark.parametrize("by", ["envelope", "order", "rms", "history"])
 def test_a_planted_friction_is_found(calibrate, by):
     truth = 1.2 * load_machine("reference").damper_types["friction"].friction_force
     result = calibrate(plant({FRICTION: truth}), "--unknown", FRICTION, "--by", by)
@@ -78,6 +81,7 @@ def test_a_planted_friction_is_found(calibrate, by):
     assert "calibrated to run_0.mf4" in text
 
 
+@pytest.mark.slow
 def test_a_wrong_structure_is_called_wrong(calibrate):
     """Plant springs that are half as stiff again; free the friction of the dampers only."""
     springs = load_machine("reference").spring_types
@@ -102,3 +106,77 @@ def test_wrong_unknowns_are_refused(calibrate, unknown, message):
     error = calibrate(["run.csv"], "--unknown", unknown, code=2)
     assert message in error
     assert len(error.strip().splitlines()) == 1
+
+
+@pytest.mark.slow
+def test_signals_over_time_tell_the_angle_of_the_drum_and_the_clock(calibrate):
+    """Plant a drum that stood 40 degrees further at the start."""
+    truth = 1.1 * load_machine("reference").damper_types["friction"].friction_force
+    files = plant({FRICTION: truth}, repeats=1, angle=np.deg2rad(40.0))
+    result = calibrate(files, "--unknown", FRICTION, "--by", "history")
+    found = {row["unknown"]: row for row in result["estimates"]}
+    assert found[FRICTION]["value"] == pytest.approx(truth, rel=0.03)
+    assert found["drum angle of run_0.mf4"]["value"] == pytest.approx(40.0, abs=3.0)
+    assert result["answer"].startswith("Good fit to 1 record: the signals ")
+
+
+FREE = """
+quantities:
+  friction:
+    bounds: (20, 60) N
+    prior: (34, 6) N
+    sets: damper_types.friction.friction_force
+    source: test
+"""
+
+
+@pytest.mark.slow
+def test_quantities_of_a_free_file_and_a_record_of_a_named_load(calibrate):
+    """Give the load before the name of the file; the test names another one."""
+    truth = 1.2 * load_machine("reference").damper_types["friction"].friction_force
+    files = plant({FRICTION: truth}, repeats=1)
+    text = Path("test.yaml").read_text()
+    Path("test.yaml").write_text(text.replace("load: middle", "load: counter"))
+    Path("free.yaml").write_text(FREE)
+    result = calibrate([f"middle={files[0]}"], "--free", "free.yaml", "--by", "order")
+    found = result["estimates"][0]
+    assert found["unknown"] == "friction"
+    assert found["value"] == pytest.approx(truth, rel=0.06)
+    machine = load_machine("out/calibrated.yaml")
+    assert machine.damper_types["friction"].friction_force == pytest.approx(
+        found["value"], rel=1e-3
+    )
+    assert machine.sources[FRICTION].startswith("fit: friction ")
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ((), "--unknown: records need either --unknown KEYS[=RANGE] or --free FILE"),
+        (("--unknown", FRICTION, "--targets", "a.csv"), "--targets: is about targets"),
+        (("--unknown", FRICTION, "--by", "history", "--speed", "measured"), "--by: history needs"),
+        (("--free", "free.yaml"), "free.yaml: spring_preload and spring_elongation"),
+    ],
+)
+def test_options_that_do_not_fit_records_are_refused(calibrate, words, message):
+    Path("run.csv").write_text("time [s],Xr [mm]\n0,1\n1,2\n")
+    Path("p.yaml").write_text(PROFILE)
+    Path("test.yaml").write_text("load: middle\nsensors: {Xr: {axis: x, frame: sensor_Xr}}\n")
+    Path("free.yaml").write_text(f"spring_preload: {{prior: '(100, 20) N', source: test}}\n{FREE}")
+    error = calibrate(["run.csv"], *words, code=2)
+    assert message in error
+    assert len(error.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--free", "free.yaml", "--by", "order"), "--by: is about records"),
+        ((), "--free: is missing"),
+    ],
+)
+def test_options_that_do_not_fit_targets_are_refused(wm_drake, words, message):
+    Path("free.yaml").write_text(FREE)
+    ended = wm_drake("calibrate", *words)
+    assert ended.code == 2
+    assert message in ended.err

@@ -174,6 +174,24 @@ def test_the_recorded_speed_drives_the_model(compare, laboratory):
     assert max(row["error_percent"] for row in result["errors_acceleration"]) < 5.0
 
 
+@pytest.mark.slow
+def test_order_one_tells_the_speed_that_drives_the_model(compare, laboratory):
+    """Name a profile that is 1 % slow, for a record without a channel of the speed."""
+    time, channels, _ = laboratory
+    write_test(speed="")
+    write_csv("run.csv", time, channels)
+    slow = PROFILE.replace("320", "316.8").split("regions")[0]
+    Path("slow.yaml").write_text(slow)
+    words = ("run.csv", "--test", "test.yaml", "--profile", "slow.yaml", "--speed")
+    distances = {
+        speed: max(row["distance_percent"] for row in found["sensors_acceleration"])
+        for speed in ("profile", "measured")
+        if (found := compare(*words, speed))
+    }
+    assert distances["measured"] < 5.0
+    assert distances["measured"] < 0.5 * distances["profile"]
+
+
 def test_a_reversed_sensor_is_named(compare, laboratory):
     time, channels, rpm = laboratory
     reversed_ = {**channels, "Acc 1": (-channels["Acc 1"][0], "g"), "Drum": (rpm, "rpm")}

@@ -36,6 +36,13 @@ FREE = """quantities:
   friction: {bounds: "(10, 60) N", prior: "(30, 10) N", sets: damper_types.friction.friction_force, source: test}
   radius: {bounds: "(230, 250) mm", prior: "(240, 5) mm", sets: loads.middle.unbalances.0.radius, source: test}
 """
+
+
+def candidate(kind, what, accuracy):
+    """Return the file of a candidate measurement."""
+    return {"c.yaml": f"candidates: {{m: {{kind: {kind}, {what}, accuracy: {accuracy}}}}}\n"}
+
+
 STRAIGHT = [f"{0.01 * k},{(k % 20 - 10) ** 2},{k % 20}" for k in range(100)]
 FILES = {
     "p.yaml": PROFILE,
@@ -243,6 +250,23 @@ CASES = {  # command -> arguments, message, more files
         ("", "forms", {"d.yaml": DESIGN.replace("low: 90 %", "low: 9 kg")}),
         ("", "d.yaml: loads.0: 'midle' is not a load of machine", {"d.yaml": DESIGN.replace("[middle]", "[midle]")}),
         ("", "d.yaml: loads.1: 'back' is named twice", {"d.yaml": DESIGN.replace("[middle]", "[back, back]")}),
+    ],
+    "study next --out out": [
+        ("--free free.yaml --tolerances laundry_and_parts", "--tolerances: is given beside --free; allowed is one of them"),
+        ("--calibrated folder", "--calibrated: needs the free file of the calibration; add --free FILE"),
+        ("--free free.yaml --calibrated folder", "--calibrated: no such file 'folder/estimates.csv'"),
+        ("--free f.yaml", "f.yaml:2: quantities.friction.prior", {"f.yaml": FREE.replace('prior: "(30, 10) N", ', "")}),
+        ("--tolerances laundry", "--tolerances: only the laundry scatters"),
+        ("--for Dq", "--for: no response 'Dq'"),
+        ("--free free.yaml --candidates nosuch", "no shipped file of candidates of that name (known: usual)"),
+        ("--free free.yaml --candidates c.yaml", "candidates.m.bodies.tubb: no link 'tubb' in the SDF (did you mean 'tub'?", candidate("number", "keys: [bodies.tubb.mass]", "1 g")),
+        ("--free free.yaml --candidates c.yaml", "candidates.m.accuracy: '0 g' is not a standard deviation above 0; write for example 2 % or 1 kg", candidate("number", "keys: [bodies.tub.mass]", "0 g")),
+        ("--free free.yaml --candidates c.yaml", "candidates.m.accuracy: '0 %' is not a standard deviation above 0", candidate("run", "load: middle", "0 %")),
+        ("--free free.yaml --candidates c.yaml", "candidates.m.load: no load 'midle' (did you mean 'middle'?", candidate("run", "load: midle", "5 %")),
+        ("--free free.yaml --candidates c.yaml", "candidates.m.sensors: no sensor 'Xq'", candidate("run", "load: middle, sensors: [Xq]", "5 %")),
+        ("--free free.yaml --candidates c.yaml", "candidates.m.component: no component 'damper_types.frction' (did you mean 'damper_types.friction'?", candidate("bench", "component: damper_types.frction, frequency: 1 Hz, amplitude: 1 mm", "5 %")),
+        ("--free free.yaml --candidates c.yaml", "candidates.m.axis: no axis 'radial'; allowed are x, y, z", candidate("bench", "component: gasket, axes: [radial], frequency: 1 Hz, amplitude: 1 mm", "5 %")),
+        ("--free free.yaml --candidates c.yaml", "c.yaml:1: candidates.m", candidate("weigh", "keys: [bodies.tub.mass]", "1 g")),
     ],
     "study modes --out out": [
         ("--amplitude '0 mm'", "no amplitude"),

@@ -38,7 +38,7 @@ imperfections:
     y: 170 mm
 """
 """Parts that no shipped machine has: docs/how-to/rubber.md, compliant-bearing.md."""
-TOGETHER = "a motor, balls and tubes"
+TOGETHER = "a motor, balls, liquid and tubes"
 ALIKE = {
     "reference": "test_fmu.py runs it",
     "light_cabinet": "the machine of rubber has its feet",
@@ -46,6 +46,7 @@ ALIKE = {
     "rodrigues_2010": "two bushings alone",
     "free_stroke": TOGETHER,
     "ball_rings": TOGETHER,
+    "liquid_rings": TOGETHER,
     "motor": TOGETHER,
 }
 """Machines without compiled code that others do not have, and why."""
@@ -62,9 +63,10 @@ OUTPUTS = {
 
 
 def machine_named(name, folder):
-    """Return a shipped machine, that of `RUBBER`, or one with the parts of three shipped ones."""
+    """Return a shipped machine, that of `RUBBER`, or one with the parts of four shipped ones."""
     if name == TOGETHER:
-        parts = {"elements": wm.load_machine("ball_rings").elements}
+        rings = (wm.load_machine(name).elements for name in ("ball_rings", "liquid_rings"))
+        parts = {"elements": {ring: e for elements in rings for ring, e in elements.items()}}
         parts |= {"drive": wm.load_machine("motor").drive}
         return wm.load_machine("free_stroke").model_copy(update=parts)
     if name != "rubber":

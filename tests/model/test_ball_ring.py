@@ -49,7 +49,7 @@ def with_rings(parameters=None, **rings):
 
 
 def moved(balls, rng, ring=RING, place=PLACE):
-    """Return states of a ring (6 n,) that is deflected, turns and has two balls in contact."""
+    """Return states of a ring (7 n,) that is deflected, turns and has two balls in contact."""
     angles = np.sort(rng.uniform(0.0, 2.0 * np.pi, balls))
     if balls > 1:
         angles[1] = angles[0] + 0.95 * ring["ball_diameter"] / ring["race_radius"]
@@ -57,7 +57,8 @@ def moved(balls, rng, ring=RING, place=PLACE):
     places = ring["race_radius"] * (np.outer(np.sin(angles), side) + np.outer(np.cos(angles), top))
     velocities = rng.uniform(20.0, 40.0) * np.cross(axis, places)
     moves = rng.uniform(-1e-4, 1e-4, (balls, 3)), rng.uniform(-0.3, 0.3, (balls, 3))
-    return np.hstack([places + moves[0], velocities + moves[1]]).ravel()
+    bristles = rng.uniform(-1.0, 1.0, (balls, 1))
+    return np.hstack([places + moves[0], velocities + moves[1], bristles]).ravel()
 
 
 @pytest.mark.parametrize("name", ["reference", "motor"])
@@ -104,20 +105,20 @@ def law_at(state, motion, ring):
     system.GetInputPort("plant_state").FixValue(context, motion)
     context.SetContinuousState(state)
     force = system.GetOutputPort("generalized_force").Eval(context)
-    return force, system.EvalTimeDerivatives(context).CopyToVector().reshape(-1, 6)
+    return force, system.EvalTimeDerivatives(context).CopyToVector().reshape(-1, 7)
 
 
 @pytest.mark.parametrize("balls", [1, 2, 5])
 def test_power_and_momentum_balance(balls):
     """Balance what drum and tub give the balls, with damping, friction and contact."""
     rng = np.random.default_rng(balls)
-    ring = {**RING, "balls": balls}
+    ring = {**RING, "balls": balls, "eccentricity": 5e-3, "eccentricity_phase": 0.5}
     mass, k = ring["ball_mass"], ring["ball_mass"] * (1000.0 * np.pi) ** 2
     for _ in range(20):
         motion = rng.uniform(-1.0, 1.0, 14) * ([0.3] * 3 + [0.05] * 3 + [9.0] + [2.0] * 6 + [60.0])
-        states = moved(balls, rng, ring).reshape(-1, 6)
+        states = moved(balls, rng, ring).reshape(-1, 7)
         force, rates = law_at(states.ravel(), motion, ring)
-        v, acceleration, u = states[:, 3:], rates[:, 3:], rates[:, :3]
+        v, acceleration, u = states[:, 3:6], rates[:, 3:6], rates[:, :3]
         given = mass * (acceleration - PLACE.gravity)
         np.testing.assert_allclose(force[3:6], -given.sum(axis=0), atol=1e-9 * k * 1e-3)
         R = Rotation.from_euler("xyz", motion[:3]).as_matrix()
@@ -126,19 +127,24 @@ def test_power_and_momentum_balance(balls):
         supplied = force @ motion[7:14] + np.sum(given * v)
         _, axis, _ = PLACE.tub_rotation.T
         q = states[:, :3]
+        side, _, top = PLACE.tub_rotation.T
+        at = motion[6] + 0.5  # angle of the eccentricity
+        centre = 5e-3 * (np.sin(at) * side + np.cos(at) * top)
+        moving = u - motion[13] * np.cross(axis, centre)  # against the centre of the race
         y, y_rate = q @ axis, u @ axis
-        across = q - np.outer(y, axis)
+        across = q - np.outer(y, axis) - centre
         r = np.linalg.norm(across, axis=1)
         out = across / r[:, None]
         r_rate, s = (
-            np.sum(u * out, axis=1),
-            np.sum(u * np.cross(axis, out), axis=1) - r * motion[13],
+            np.sum(moving * out, axis=1),
+            np.sum(moving * np.cross(axis, out), axis=1) - r * motion[13],
         )
         elastic = k * np.sum((r - ring["race_radius"]) * r_rate + y * y_rate)
         push = k * (r - ring["race_radius"]) + 2.0 * DAMPING_RATIO * np.sqrt(k * mass) * r_rate
         lost = 2.0 * DAMPING_RATIO * np.sqrt(k * mass) * np.sum(r_rate**2 + y_rate**2)
         lost += np.sum(ring["damping"] / ring["race_radius"] ** 2 * s**2)
-        lost += np.sum(ring["rolling_resistance"] * np.abs(push) * s**2 / np.hypot(s, 0.01))
+        share = (0.01 * states[:, 6] + s) / (0.01 + np.abs(s))
+        lost += np.sum(ring["rolling_resistance"] * np.abs(push) * share * s)
         in_contact = 0.0
         for i in range(balls if balls > 2 else balls - 1):
             apart = q[i] - q[(i + 1) % balls]
@@ -155,7 +161,7 @@ def test_power_and_momentum_balance(balls):
 
 def test_derivatives_of_the_system_are_those_of_differences():
     placed = BALL_RING.place(PLACE, BallRing.model_validate({**RING, "balls": 2}))
-    system, rng = ElementSystem(placed.kind, placed.packed(), 12), np.random.default_rng(1)
+    system, rng = ElementSystem(placed.kind, placed.packed(), 14), np.random.default_rng(1)
     sizes = np.array([0.2] * 3 + [0.05] * 3 + [2.0] + [0.5] * 6 + [20.0])
     state = np.concatenate([sizes * rng.uniform(-1.0, 1.0, 14), moved(2, rng)])
 
@@ -179,12 +185,46 @@ def rig():
     return wm.build_machine(with_rings(load_machine("rodrigues_2010"), abb=RIG_RING))
 
 
-def at_constant_speed(rig, rpm, moment, duration=8.0, step=1e-4):
-    """Return the record of a rig with an unbalance [kg m] in the plane of the ring, at 115 deg."""
+def at_constant_speed(rig, rpm, moment, duration=8.0, step=1e-4, **changes):
+    """Return the record of a rig with an unbalance [kg m] in the plane of the ring, at 115 deg.
+
+    Args:
+        changes: Numbers of the ring. [SI]
+    """
     speed, unbalance = rpm * np.pi / 30.0, {"moment": moment, "y": -0.02, "phase": 2.0}
     profile = SpinProfile(time=(0.0, duration), speed=(speed, speed))
     load = Load.model_validate({"static": unbalance})
-    return wm.simulate(rig, wm.Case("", load, profile), step=step)
+    keys = {f"elements.abb.{name}": value for name, value in changes.items()}
+    parameters = wm.with_values(rig.parameters, keys)
+    return wm.simulate(rig, wm.Case("", load, profile, True, parameters), step=step)
+
+
+def test_balls_park_while_the_axis_is_near_the_centre_of_rotation(rig):
+    """Balls roll only where the axis is more than mu R from the centre, here 86 um."""
+    moment, half = 20e-6, np.arccos(20e-6 / (2.0 * 0.44e-3 * 42.8e-3))
+    beside = tuple(2.0 + np.pi + half * np.array([-0.8, 0.8]))
+    free, parked = (
+        at_constant_speed(rig, 4500.0, moment, 2.0, start_angles=beside, rolling_resistance=mu)
+        for mu in (0.0, 2e-3)
+    )
+    mean = [
+        record.displacement.values[-2000:].reshape(-1, 2, 2).mean(axis=1)
+        for record in (free, parked)
+    ]
+    radius = [np.hypot(*(each - each.mean(axis=0)).T).max() for each in mean]
+    moved = [np.ptp(record.ball_ring_angle.values[:, 0], axis=0).max() for record in (free, parked)]
+    assert moved[1] < np.deg2rad(1.5) < 0.3 * moved[0]
+    assert radius[0] < 0.2 * radius[1] < 0.2 * 2e-3 * RIG_RING["race_radius"]
+
+
+def test_the_centre_of_an_eccentric_race_becomes_the_centre_of_rotation(rig):
+    """Balls take the places at which the axis is as far from the centre as the race, opposite."""
+    record = at_constant_speed(rig, 4500.0, 15e-6, 8.0, eccentricity=10e-6, eccentricity_phase=0.7)
+    last = record.isel(time=slice(-500, None))
+    # the plane of the ring is in the middle of the two housings; sensors measure z and x
+    z, x = last.displacement.values.reshape(-1, 2, 2).mean(axis=1).T
+    turned = ((z + 1j * x) * np.exp(-1j * last.drum_angle.values)).mean()
+    assert abs(turned + 10e-6 * np.exp(0.7j)) < 1e-6
 
 
 @pytest.mark.parametrize("part", [0.3, 0.6, 0.9])

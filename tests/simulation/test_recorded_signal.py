@@ -9,7 +9,7 @@ from wm_drake.model.build import build_machine
 from wm_drake.parameters import Load, SpinProfile, load_machine, with_values
 from wm_drake.parameters.recorded_sensors import RecordedSensor
 from wm_drake.simulation.cases import Case
-from wm_drake.simulation.recorded_signal import recorded_signal
+from wm_drake.simulation.recorded_signal import recorded_signal, turned_signals
 from wm_drake.simulation.runs import simulate
 
 POINT = np.array([0.21, -0.17, 0.26])
@@ -110,3 +110,16 @@ def test_a_filter_is_settled_at_the_start(still):
     np.testing.assert_allclose(signal, 9.81, atol=1e-4)
     coupled = recorded_signal(still, sensor_of(ac_coupling=0.5), POINT)
     np.testing.assert_allclose(coupled, 0.0, atol=1e-4)
+
+
+def test_a_sensor_that_is_off_by_small_angles_records_a_sum(record):
+    small, sensor = 2e-3, sensor_of(low_pass="100 Hz")
+    along, x, y = turned_signals(record, {"a": sensor}, {"a": POINT})[:, 0].T
+    for tilt, expected in (
+        ([small, 0.0, 0.0], along - small * y),
+        ([0.0, small, 0.0], along + small * x),
+        ([0.0, 0.0, small], along),
+    ):
+        turned = sensor.model_copy(update={"tilt": tuple(tilt)})
+        found = recorded_signal(record, turned, POINT)
+        assert rms(found - expected) < 1e-5 * rms(along)

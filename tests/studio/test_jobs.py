@@ -16,14 +16,15 @@ from wm_drake.studio.jobs import Jobs
 from wm_drake.studio.machines import Machines
 
 STATE = PageState(machine="reference", load="middle", values={"gasket.stiffness_x": "4 N/mm"})
-PROGRAM = """
+PAGE = '<p class="summary">Gap 3 &lt; 4 mm.</p>'
+PROGRAM = f"""
 import sys, pathlib, time
 arguments = sys.argv[3:]
 print("runs: 3 of 40, 10 s", flush=True)
 if "--samples=16" in arguments:
     time.sleep(60)
 pathlib.Path("results").mkdir()
-pathlib.Path("results/report.html").write_text("done")
+pathlib.Path("results/report.html").write_text({PAGE!r})
 """
 
 
@@ -63,11 +64,18 @@ def test_study_runs_and_its_report_is_found(jobs, opened):
     shown = waited(jobs, identifier, "finished")
     assert shown["progress"] == (3, 40)
     assert shown["command"].endswith("--machine machine.yaml --out results --trials=27")
-    assert jobs.report_file(identifier, "report.html").read_text() == "done"
+    assert jobs.report_file(identifier, "report.html").read_text() == PAGE
     machine = (jobs.folder / identifier / "machine.yaml").read_text()
     assert "set in wm-drake studio" in machine
     # a later server finds it
     assert [job["state"] for job in Jobs(jobs.folder).listed()] == ["finished"]
+
+
+def test_study_with_the_machine_as_argument_runs_and_its_answer_is_shown(jobs, opened):
+    identifier = jobs.start(*opened, STATE, "next", {"budget": "2"})
+    shown = waited(jobs, identifier, "finished")
+    assert shown["command"] == "wm-drake study next machine.yaml --out results --budget=2"
+    assert shown["answer"] == "Gap 3 < 4 mm."
 
 
 def test_study_is_cancelled_and_continued(jobs, opened):

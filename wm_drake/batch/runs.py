@@ -13,7 +13,7 @@ from wm_drake.compiler.lane_memory import aligned, fill_lanes
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.elements.mount import WRENCH_SIZE
 from wm_drake.elements.sensor import POINT_SIZE
-from wm_drake.elements.state_map import RATES_SIZE
+from wm_drake.elements.state_map import RATES_SIZE, WATER
 from wm_drake.engines.compiled.mechanics import DRUM_ANGLE, DRUM_RATE, STATE_SIZE
 from wm_drake.engines.compiled.run import RunLanes, integrate_runs
 from wm_drake.engines.compiled.samples import trajectory_of
@@ -41,6 +41,7 @@ from wm_drake.simulation.mount_histories import measure_mounts_lanes
 from wm_drake.simulation.mounts import mount_names, sums_size
 from wm_drake.simulation.records import Record, as_record
 from wm_drake.simulation.spring_tension import tensions_at
+from wm_drake.simulation.stops import approaches
 
 _NONE = np.empty(0, dtype=np.int64)
 """No indices."""
@@ -251,7 +252,7 @@ class Runner:
         return RunResult(item.number, item.case, values, run.diverged, record, gap, motion)
 
     def _record(self, item: WorkItem, schedule: Schedule, samples: FloatArray) -> Record:
-        trajectory = trajectory_of(samples, schedule, item.packed, item.numbers.layout)
+        trajectory = trajectory_of(samples, schedule, item.packed, item.layout)
         record = as_record(item.numbers.setup, item.case, trajectory)
         stepping = item.numbers.stepping
         return record.assign_attrs(
@@ -342,7 +343,7 @@ class LaneRun(Run):
     @functools.cached_property
     def _trajectory(self) -> Trajectory:
         samples = np.ascontiguousarray(self.lane.samples)
-        return trajectory_of(samples, self.schedule, self.item.packed, self.item.numbers.layout)
+        return trajectory_of(samples, self.schedule, self.item.packed, self.item.layout)
 
     @property
     def drum_angle(self) -> FloatArray:
@@ -439,7 +440,7 @@ class LaneRun(Run):
     def _floor_forces(self) -> FloatArray | None:
         """Return the forces of the floor on the feet of a cabinet that moves, else None."""
         states = self.lane.samples[: self.good, : len(self.item.begin)]
-        cabinet = self.item.numbers.layout.states.cabinet(states)
+        cabinet = self.item.layout.states.cabinet(states)
         if cabinet is None:
             return None
         assert self.item.numbers.setup.cabinet is not None
@@ -458,13 +459,23 @@ class LaneRun(Run):
         return self._springs[1]
 
     @property
+    def approaches(self) -> tuple[FloatArray, FloatArray]:
+        return approaches(self.item.numbers.setup, self._samples(slice(STATE_SIZE)))
+
+    @property
+    def mass_left(self) -> FloatArray:
+        states = self.lane.samples[: self.good, : len(self.item.begin)]
+        left = self.item.layout.states.take(states, WATER)
+        return np.asarray(self.item.case.load.masses(left).sum(axis=1))
+
+    @property
     def diverged(self) -> str:
         """Return why and when the run diverged, as its record has it; "" if it did not."""
         time, samples, good = self.schedule.time, self.lane.samples, self.good
         if good == len(time):
             return ""
         states = samples[good : good + 1, : len(self.item.begin)]
-        cabinet = self.item.numbers.layout.states.cabinet(states)
+        cabinet = self.item.layout.states.cabinet(states)
         reason = diverging_coordinate(samples[good], None if cabinet is None else cabinet[0, :2])
         assert reason is not None  # this is the first sample out of bounds
         return divergence_text(Divergence(float(time[good]), *reason), time[:good], samples[:good])

@@ -10,6 +10,7 @@ from wm_drake.compiler.lanes import WIDTH
 from wm_drake.engines.compiled.mechanics import DRUM_RATE
 from wm_drake.engines.compiled.packing import DrawnBodies, Layout, initial_state, pack_elements
 from wm_drake.engines.compiled.stepping import Stepping, choose_stepping
+from wm_drake.engines.compiled.water import with_water
 from wm_drake.engines.memory import check_size
 from wm_drake.errors import InputError, Problem, input_error
 from wm_drake.model.machine import Machine, Setup
@@ -55,7 +56,7 @@ class WorkItem:
         number: Number of the case, in the given order.
         case: The case.
         numbers: Shared by all cases with these parameters.
-        packed: All packed numbers, as from `pack`.
+        packed, layout: All packed numbers and their layout, as from `pack_run`.
         begin: State at the start of the run.
     """
 
@@ -63,6 +64,7 @@ class WorkItem:
     case: Case
     numbers: PackedParameters
     packed: FloatArray
+    layout: Layout
     begin: FloatArray
 
 
@@ -132,7 +134,7 @@ class Preparation:
         for number, case in enumerate(cases):
             item = self._work_item(number, case)
             numbers = item.numbers
-            key = BatchKey(case.profile, numbers.layout, numbers.stepping, numbers.period)
+            key = BatchKey(case.profile, item.layout, numbers.stepping, numbers.period)
             work_items = waiting.setdefault(key, [])
             work_items.append(item)
             if len(work_items) == WIDTH:
@@ -147,9 +149,11 @@ class Preparation:
             raise InputError(
                 Problem(f"case {number} '{case.name}'", p.key, p.message) for p in error.problems
             ) from None
-        begin = numbers.rest.copy()
+        begin = np.concatenate([numbers.rest, np.ones(len(case.load.wet))])
         begin[DRUM_RATE] = case.profile.speed[0]
-        return WorkItem(number, case, numbers, np.concatenate([bodies, numbers.elements]), begin)
+        packed = np.concatenate([bodies, numbers.elements])
+        packed, layout = with_water(packed, numbers.layout, case.load, self._drawn[0][1])
+        return WorkItem(number, case, numbers, packed, layout, begin)
 
     def _bodies(self, parameters: MachineParameters, load: Load | None) -> FloatArray:
         """Return the packed bodies, which cases with the same bodies, frames and load share."""

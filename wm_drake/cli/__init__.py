@@ -30,7 +30,7 @@ COMMANDS = {
     ),
     "calibrate": (
         "wm_drake.studies.calibrate.options:CALIBRATE",
-        "Fit unknown numbers of a machine to measured amplitudes, within bounds and with priors.",
+        "Fit unknown numbers of a machine to measured amplitudes, or to records of its sensors.",
     ),
     "studio": (
         "wm_drake.cli.studio:studio",

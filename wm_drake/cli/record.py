@@ -11,9 +11,8 @@ from wm_drake.cli.components import group_of
 from wm_drake.report.terminal import Console
 from wm_drake.studies.compare.options import COMPARE
 from wm_drake.studies.orders.options import ORDERS
-from wm_drake.studies.record_calibrate.options import RECORD_CALIBRATE
 
-app = group_of((COMPARE, RECORD_CALIBRATE, ORDERS))
+app = group_of((COMPARE, ORDERS))
 
 
 @app.command("channels")

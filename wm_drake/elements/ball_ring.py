@@ -5,11 +5,13 @@ derivation; `docs/theory/ball-ring.md` shows it, and says why the race has a sti
 T of the tub, for a ball at q from the centre of the race, with the axis a of the drum:
 
     y = q . a,   r = |q - y a|,   n = (q - y a)/r,   t = a x n,   u = q'
-    F = -(k (r - R) + c u.n) n - (k y + c u.a) a - (d s/R^2 + mu |N| s/sqrt(s^2 + s_0^2)) t
+    F = -(k (r - R) + c u.n) n - (k y + c u.a) a - (d s/R^2 - f) t
     s = u.t - r phi',    N = k (r - R) + c u.n,    m v' = F + F_contact + m g
 
-v: velocity in W; phi': rate of the drum; s: sliding velocity of the ball's centre against the race.
-The force -F acts on the drum where the ball is. Neighbours touch at the distance D:
+v: velocity in W; phi': rate of the drum; s: velocity of the ball's centre against the race; f:
+rolling resistance (`wm_drake.laws.rolling`). The centre of the race turns with the drum at its
+eccentricity from the axis. The force -F acts on the drum where the ball is. Neighbours touch at the
+distance D:
 
     F_contact = (k/s_0) max(0, o (o + tau o')) along the line of centres,  o = max(0, D - distance)
 """
@@ -22,10 +24,12 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from wm_drake.compiler.compilation import law
-from wm_drake.compiler.elementary import angle_of, sine_cosine, sqrt, where
+from wm_drake.compiler.elementary import angle_of, sqrt, where
 from wm_drake.compiler.packed import SCALAR, VECTOR, PackedLayout, generated
-from wm_drake.compiler.vectors import add, cross, dot, rotate, rotate_back, scale, subtract
+from wm_drake.compiler.vectors import add, cross, dot, rotate, scale, subtract
 from wm_drake.elements.kind import DrumPlace, ElementKind, Output, PlacedElement, State
+from wm_drake.elements.on_drum import rate_in_tub, seen_from_drum, turned_with_drum
+from wm_drake.laws.rolling import rolling_bristle_rate, rolling_resistance
 from wm_drake.parameters import units as u
 from wm_drake.parameters.element_kinds import DrumElement
 from wm_drake.parameters.types import FloatArray
@@ -50,11 +54,15 @@ NUMBERS = PackedLayout(
     damping=SCALAR,
     rolling=SCALAR,
     full_friction=SCALAR,
+    rolling_distance=SCALAR,
+    runout_up=SCALAR,
+    runout_side=SCALAR,
     stiffness=SCALAR,
     dashpot=SCALAR,
 )
-"""Centre of the race from To, axis of the drum and direction to its top at angle 0, in T; gravity
-in W [m/s^2]; m [kg]; D, R [m]; d [N m s/rad]; mu; s_0 [m/s]; k [N/m], c [N s/m]."""
+"""Point of the drum axis from To, axis of the drum and direction to its top at angle 0, in T;
+gravity in W [m/s^2]; m [kg]; D, R [m]; d [N m s/rad]; mu; v_t [m/s]; x_c [m]; centre of the race
+from the axis, to the top and to the side of the drum [m]; k [N/m], c [N s/m]."""
 read_numbers = NUMBERS.read
 
 
@@ -70,8 +78,11 @@ class BallRing(DrumElement):
         race_radius: Radius of the circle on which the centres of the balls move.
         damping: Viscous torque about the drum axis on a ball, per rate against the drum.
         rolling_resistance: Rolling friction over the force of the race on a ball.
-        full_friction_velocity: Velocity against the race at which rolling friction is 71 % of its
-            full value.
+        full_friction_velocity: Velocity against the race above which the resistance is that of a
+            rolling ball; far below it the ball hangs on its contact and may park.
+        rolling_distance: Way of a parked ball after which its resistance is 63 % of its full value.
+        eccentricity: Distance of the centre of the race from the axis of the drum.
+        eccentricity_phase: Its angle from the top of the drum.
         race_frequency: Natural frequency of a ball on its elastic race. The radius of the balls is
             too large by the square of spin speed over this frequency. A quarter of a millisecond is
             a step that follows 500 Hz.
@@ -86,6 +97,9 @@ class BallRing(DrumElement):
     damping: Annotated[u.RotationalDamping, Field(ge=0.0)]
     rolling_resistance: Annotated[u.Ratio, Field(ge=0.0)] = 0.0
     full_friction_velocity: Annotated[u.Velocity, Field(gt=0.0)] = 0.01
+    rolling_distance: Annotated[u.Length, Field(gt=0.0)] = 10e-6
+    eccentricity: Annotated[u.Length, Field(ge=0.0)] = 0.0
+    eccentricity_phase: u.Angle = 0.0
     race_frequency: Annotated[u.Speed, Field(gt=0.0)] = 1000.0 * np.pi
     start_angles: u.Angles | None = None
 
@@ -116,31 +130,38 @@ class BallRing(DrumElement):
 
 
 @law
-def on_ball(motion, numbers, place, velocity):
-    """Return the force of the race on a ball, and the rate of its place, both in T.
+def on_ball(motion, numbers, centre, place, velocity, bristle):
+    """Return the force of the race on a ball, in T, and the rates of its place and its bristle.
 
     Args:
         motion: `DrumMotion`.
         numbers: Numbers of `NUMBERS` by name.
-        place: Place of the ball from the centre of the race, in T. [m]
+        centre: Centre of the race from the axis, in T. [m]
+        place: Place of the ball from the axis, in T. [m]
         velocity: Velocity of the ball in W. [m/s]
+        bristle: State of `rolling_bristle_rate`.
     """
     axis, radius = numbers.axis, numbers.radius
-    w = rotate_back(motion.rotation, motion.angular_velocity)
-    moving = rotate_back(motion.rotation, subtract(velocity, motion.velocity))
-    rate = subtract(moving, cross(w, add(numbers.centre, place)))
-    along = dot(place, axis)
-    across = subtract(place, scale(along, axis))
+    rate = rate_in_tub(motion, add(numbers.centre, place), velocity)
+    in_race = subtract(place, centre)
+    moving = subtract(rate, scale(motion.drum_rate, cross(axis, centre)))
+    along = dot(in_race, axis)
+    across = subtract(in_race, scale(along, axis))
     distance = sqrt(dot(across, across))
     outward = scale(1.0 / distance, across)
     ahead = cross(axis, outward)
-    sliding = dot(rate, ahead) - distance * motion.drum_rate
-    push = numbers.stiffness * (distance - radius) + numbers.dashpot * dot(rate, outward)
-    guide = numbers.stiffness * along + numbers.dashpot * dot(rate, axis)
-    full = sqrt(sliding * sliding + numbers.full_friction * numbers.full_friction)
-    drag = numbers.damping / (radius * radius) + numbers.rolling * abs(push) / full
-    force = add(scale(push, outward), add(scale(guide, axis), scale(drag * sliding, ahead)))
-    return scale(-1.0, force), rate
+    sliding = dot(moving, ahead) - distance * motion.drum_rate
+    push = numbers.stiffness * (distance - radius) + numbers.dashpot * dot(moving, outward)
+    guide = numbers.stiffness * along + numbers.dashpot * dot(moving, axis)
+    rolling = rolling_resistance(
+        abs(push), sliding, bristle, numbers.rolling, numbers.full_friction
+    )
+    drag = numbers.damping / (radius * radius) * sliding - rolling
+    force = add(scale(push, outward), add(scale(guide, axis), scale(drag, ahead)))
+    bristle_rate = rolling_bristle_rate(
+        sliding, bristle, numbers.rolling_distance, numbers.full_friction
+    )
+    return scale(-1.0, force), rate, bristle_rate
 
 
 @law
@@ -172,9 +193,7 @@ def ball_angle(motion, numbers, place):
     Returns:
         Angle [rad]; places of the ball to the top and to the side, in D [m].
     """
-    up, side = dot(place, numbers.top), dot(place, cross(numbers.axis, numbers.top))
-    sine, cosine = sine_cosine(motion.drum_angle)
-    c, s = up * cosine + side * sine, side * cosine - up * sine
+    c, s = seen_from_drum(motion, numbers.axis, numbers.top, place)
     size = sqrt(c * c + s * s)
     angle = angle_of(abs(s) / size, c / size)
     return where(s < 0.0, -angle, angle), c, s
@@ -191,6 +210,7 @@ LAWS = {
     "rotate": rotate,
     "scale": scale,
     "subtract": subtract,
+    "turned_with_drum": turned_with_drum,
 }
 """Names in the source of the law of a ring."""
 
@@ -209,6 +229,9 @@ def numbers_of(parameters: BallRing, ends: DrumPlace) -> dict[str, Any]:
         "damping": parameters.damping,
         "rolling": parameters.rolling_resistance,
         "full_friction": parameters.full_friction_velocity,
+        "rolling_distance": parameters.rolling_distance,
+        "runout_up": parameters.eccentricity * np.cos(parameters.eccentricity_phase),
+        "runout_side": parameters.eccentricity * np.sin(parameters.eccentricity_phase),
         "stiffness": stiffness,
         "dashpot": 2.0 * DAMPING_RATIO * parameters.ball_mass * parameters.race_frequency,
     }
@@ -216,15 +239,20 @@ def numbers_of(parameters: BallRing, ends: DrumPlace) -> dict[str, Any]:
 
 def placed_ring(ends: DrumPlace, parameters: BallRing) -> PlacedElement:
     """Return a ring in its place; at the start its balls turn with the drum."""
-    kind, angles = ring_of(parameters.balls), parameters.first_angles
+    numbers, angles = numbers_of(parameters, ends), parameters.first_angles
     side, axis, top = ends.tub_rotation.T
     places = parameters.race_radius * (
         np.outer(np.sin(angles), side) + np.outer(np.cos(angles), top)
     )
-    initial, per_rate = np.zeros((2, parameters.balls, 6))
-    initial[:, :3], per_rate[:, 3:] = places, np.cross(axis, places)
-    packed = NUMBERS.pack(**numbers_of(parameters, ends))
-    return PlacedElement(kind, ends, packed, (initial.ravel(), per_rate.ravel()))
+    places += numbers["runout_side"] * side + numbers["runout_up"] * top
+    start = functools.partial(_turning, places, axis)
+    return PlacedElement(ring_of(parameters.balls), ends, NUMBERS.pack(**numbers), start)
+
+
+def _turning(places: FloatArray, axis: FloatArray, drum_rate: float) -> FloatArray:
+    """Return the states of balls (balls, 3) that turn with the drum. (7 balls,)"""
+    velocities = drum_rate * np.cross(axis, places)
+    return np.hstack([places, velocities, np.zeros((len(places), 1))]).ravel()
 
 
 def _lines(balls: int) -> Sequence[str]:
@@ -236,6 +264,8 @@ def _lines(balls: int) -> Sequence[str]:
         "    zero = 0.0 * motion.drum_rate",
         "    force, moment, first = (zero, zero, zero), (zero, zero, zero), (zero, zero, zero)",
         "    twist, share = zero, numbers.mass",
+        "    up, side = numbers.runout_up, numbers.runout_side",
+        "    centre = turned_with_drum(motion, numbers.axis, numbers.top, up, side)",
     ]
     for i in range(balls):
         place, velocity = (
@@ -244,7 +274,8 @@ def _lines(balls: int) -> Sequence[str]:
         )
         lines += [
             f"    q_{i}, v_{i} = ({place}), ({velocity})",
-            f"    f_{i}, u_{i} = on_ball(motion, numbers, q_{i}, v_{i})",
+            f"    f_{i}, u_{i}, z_{i} = on_ball("
+            f"motion, numbers, centre, q_{i}, v_{i}, state.bristle_{i})",
             f"    force = subtract(force, f_{i})",
             f"    moment = subtract(moment, cross(add(numbers.centre, q_{i}), f_{i}))",
             f"    twist = twist - dot(numbers.axis, cross(q_{i}, f_{i}))",
@@ -261,7 +292,7 @@ def _lines(balls: int) -> Sequence[str]:
     for i in range(balls):
         pull = f"rotate(motion.rotation, scale(1.0 / numbers.mass, f_{i}))"
         lines.append(f"    w_{i} = add(numbers.gravity, {pull})")
-        rates += [f"{vector}_{i}[{k}]" for vector in "uw" for k in range(3)]
+        rates += [f"{vector}_{i}[{k}]" for vector in "uw" for k in range(3)] + [f"z_{i}"]
     angles = ", ".join(f"angle_{i}" for i in range(balls))
     lines += [
         "    m, f = rotate(motion.rotation, moment), rotate(motion.rotation, force)",
@@ -273,17 +304,14 @@ def _lines(balls: int) -> Sequence[str]:
 
 @functools.cache
 def ring_of(balls: int) -> ElementKind:
-    """Return the kind of rings with a number of balls, which have six states each.
+    """Return the kind of rings with a number of balls, which have seven states each.
 
-    The states of a ball are its place from the centre of the race in T and its velocity in W, so
-    that no acceleration of the tub enters its equations.
+    The states of a ball are its place from the axis in T and its velocity in W, so that no
+    acceleration of the tub enters its equations, and the bristle of its rolling resistance.
     """
-    states = [
-        State(f"{kind}_{axis}_{i}", unit)
-        for i in range(balls)
-        for kind, unit in (("place", "m"), ("velocity", "m/s"))
-        for axis in "xyz"
-    ]
+    each = [(f"place_{axis}", "m") for axis in "xyz"]
+    each += [*((f"velocity_{axis}", "m/s") for axis in "xyz"), ("bristle", "")]
+    states = [State(f"{name}_{i}", unit) for i in range(balls) for name, unit in each]
     return ElementKind(
         name="ball_ring",
         parameters=BallRing,

@@ -235,14 +235,14 @@ class PlacedElement:
 
     Attributes:
         packed_numbers: Numbers of `ElementKind.layout`.
-        start: States at the start of a run with a drum at rest, and what a unit of the rate of the
-            drum adds to them; those of the kind if None.
+        start: Function that returns the states at the start of a run from the rate of the drum
+            [rad/s]; those of the kind if None.
     """
 
     kind: ElementKind
     ends: Ends | DrumPlace
     packed_numbers: FloatArray
-    start: tuple[FloatArray, FloatArray] | None = None
+    start: Callable[[float], FloatArray] | None = None
 
     @property
     def structure(self) -> list[int]:
@@ -258,7 +258,7 @@ class PlacedElement:
         """Return the values of its states at the start, at a rate of the drum. [rad/s]"""
         if self.start is None:
             return np.array([state.initial for state in self.kind.states])
-        return self.start[0] + drum_rate * self.start[1]
+        return self.start(drum_rate)
 
     def without_friction(self) -> "PlacedElement":
         """Return the element without dry friction."""

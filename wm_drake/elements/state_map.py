@@ -20,6 +20,7 @@ from wm_drake.parameters.types import FloatArray
 ANGLE, POSITION, JOINT = "angle", "position", "joint position"
 ANGULAR_VELOCITY, VELOCITY, JOINT_VELOCITY = "angular velocity", "velocity", "joint velocity"
 SPONGE, CONTROL, SLIP, ELEMENT_STATE = "sponge", "control", "slip", "own"
+WATER_LEFT = "water left"
 """Roles of states, with `FRICTION` and `MAXWELL` of rubber. `ELEMENT_STATE` is
 that of a state of an element kind of another package."""
 PLACES = (ANGLE, POSITION, JOINT)
@@ -43,13 +44,15 @@ BODY_ROLES = tuple(
 
 TUB, STRUT_SPONGE, TUBES, CARRIER = "tub", "sponge of a strut", "tubes", "carrier"
 DRIVE, CABINET, STRETCHES, ELEMENT = "drive", "cabinet", "stretches", "element"
-ORDER = (TUB, STRUT_SPONGE, TUBES, CARRIER, DRIVE, CABINET, STRETCHES, ELEMENT)
+WATER = "water"
+ORDER = (TUB, STRUT_SPONGE, TUBES, CARRIER, DRIVE, CABINET, STRETCHES, ELEMENT, WATER)
 """Kinds of parts, in the order of their states.
 
 Tub and drum (`TREE_STATE`); the sponge of each strut damper, in use or not; each telescopic damper
 (`TUBES_STATE`); the drum carrier of a compliant bearing (`BODY_STATE`); a drive with a motor
 (`MOTOR_STATE`); a cabinet that moves (`BODY_STATE`, then the slips of its feet); the stretches of
-each bushing of rubber; the states of each element of another package."""
+each bushing of rubber; the states of each element of another package; the share of water that is
+left in each wet mass of the load."""
 
 TUB_WORDS, BEARING_WORDS = "the tub", "the drum in its bearing"
 DRIVE_WORDS, CABINET_WORDS = "the drum with its motor", "the cabinet on its feet"
@@ -63,8 +66,8 @@ class Begins(NamedTuple):
     """Indices for compiled functions. The tub begins at 0.
 
     Attributes:
-        sponges, tubes, carrier, motor, cabinet, stretches, elements: Where the parts of each kind
-            begin in the state, in the order of `ORDER`.
+        sponges, tubes, carrier, motor, cabinet, stretches, elements, water: Where the parts of each
+            kind begin in the state, in the order of `ORDER`.
         size: Number of states.
         stretch_inputs, wrench_input: Where the rates of rubber bushings and the wrench on the
             cabinet begin in the inputs of internal states.
@@ -79,6 +82,7 @@ class Begins(NamedTuple):
     cabinet: int
     stretches: int
     elements: int
+    water: int
     size: int
     stretch_inputs: int
     wrench_input: int
@@ -186,6 +190,7 @@ class StateMap:
             cabinet=self.span(CABINET).start,
             stretches=self.span(STRETCHES).start,
             elements=self.span(ELEMENT).start,
+            water=self.span(WATER).start,
             size=self.size,
             stretch_inputs=struts,
             wrench_input=wrench,
@@ -267,6 +272,11 @@ def stretches_part(name: str, roles: Sequence[str]) -> StatePart:
 def element_part(name: str, size: int) -> StatePart:
     """Return the states of an element of another package."""
     return _part(ELEMENT, [ELEMENT_STATE] * size, f"element '{name}'")
+
+
+def water_part(count: int) -> StatePart:
+    """Return the shares of water that are left in the wet masses of a load."""
+    return _part(WATER, [WATER_LEFT] * count, "the water of the load")
 
 
 def carrier_part() -> StatePart:

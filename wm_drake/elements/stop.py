@@ -68,13 +68,28 @@ class Stop(Element):
 
 
 @law
-def stop_wrench(motion, _state, p, at):
-    """Return moment about To and force on the tub, and force, compression and its rate."""
-    stop = read_numbers(p, at)
+def stop_approach(motion, stop):
+    """Return how the tub is placed before a buffer.
+
+    Args:
+        motion: `TubMotion` of the tub.
+        stop: Numbers of `NUMBERS` by name.
+
+    Returns:
+        Arm of the point from To, and its velocity, in W; compression of the buffer, below 0 where
+        the point is away from it, and its rate. [m, m/s, m, m/s]
+    """
     arm = rotate(motion.rotation, stop.point)
     velocity = add(motion.velocity, cross(motion.angular_velocity, arm))
     compression = stop.reach - dot(stop.axis, add(motion.position, arm))
-    rate = -dot(stop.axis, velocity)
+    return arm, velocity, compression, -dot(stop.axis, velocity)
+
+
+@law
+def stop_wrench(motion, _state, p, at):
+    """Return moment about To and force on the tub, and force, compression and its rate."""
+    stop = read_numbers(p, at)
+    arm, velocity, compression, rate = stop_approach(motion, stop)
     force = stop_force(compression, rate, stop.loss, stop.stiffness)
     along = transverse(velocity, stop.axis)
     rubbing = rubbing_force(force, along, stop.friction, stop.full_friction)

@@ -89,12 +89,16 @@ def run_drake(
     period = profile.sample_period(setup.parameters.output_period)
     check_size(profile, step, period)
     samples = _Samples(setup, output_times(profile, period))
-    failure = ""
+    dries, failure = bool(setup.load and setup.load.wet), ""
     try:
         for row, time in enumerate(samples.time):
             advance_to(simulator, time, profile)
             simulator.AdvancePendingEvents()  # a sampled controller acts before the sample is taken
+            if dries:
+                setup.follow_water()
             samples.take(row)
+            if dries:
+                setup.follow_water(0.5 * period)
             if row % SAMPLES_BETWEEN_CHECKS == 0:
                 if diverging_coordinate(*samples.poses()) is not None:
                     break
@@ -157,6 +161,8 @@ class _Samples:
         self._deformation = np.zeros((len(time), len(dampers)))
         self._motor_torque = np.full(len(time), np.nan)
         self._slips = np.full((len(time), SLIP_SIZE), np.nan)
+        wet = len(setup.load.wet) if setup.load else 0
+        self._water = np.full((len(time), wet), np.nan) if wet else None
 
     def poses(self) -> tuple[FloatArray, FloatArray | None]:
         """Return roll, pitch, yaw, x, y, z of the tub now, seen from the cabinet [rad, m].
@@ -187,6 +193,11 @@ class _Samples:
                 [element.GetOutputPort("state").Eval(context) for element, context in self._others]
             )
         self._motor_torque[row] = self._torque.Eval(self._torque_context)[0]
+        water = self._machine.water
+        if self._water is not None and water is not None:
+            context = water.GetMyContextFromRoot(self._setup.context)
+            left = context.get_continuous_state_vector().CopyToVector()
+            self._water[row] = left[: self._water.shape[1]]
         feet = self._machine.feet
         if feet is not None:
             context = feet.GetMyContextFromRoot(self._setup.context)
@@ -217,6 +228,10 @@ class _Samples:
             moving = np.column_stack([cabinet, self._slips])
         columns = self.time, state, self._deformation, self._motor_torque, of_tub, tubes, carrier
         trajectory = Trajectory(
-            *columns, self._stretches, cabinet=moving, element_states=self._element_states
+            *columns,
+            self._stretches,
+            cabinet=moving,
+            element_states=self._element_states,
+            water=self._water,
         )
         return cut_at_divergence(trajectory, failure)

@@ -62,6 +62,7 @@ class Trajectory:
             those of the tub in `state`, then how far each foot has slid, x and y [m]; None for a
             fixed one.
         element_states: (n, k) States of elements of other packages; None without any.
+        water: (n, wet) Share of water that is left in each wet mass of the load; None if it stays.
     """
 
     time: FloatArray
@@ -75,6 +76,7 @@ class Trajectory:
     divergence: Divergence | None = None
     cabinet: FloatArray | None = None
     element_states: FloatArray | None = None
+    water: FloatArray | None = None
 
     def part(self, rows: slice) -> "Trajectory":
         """Return some of the samples."""

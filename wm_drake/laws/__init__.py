@@ -23,10 +23,10 @@ Equation -> function -> test (below tests/laws):
 Rubber beyond [A] and [B] (Dahl 1968; own closed forms): rubber.dahl_rate, dahl_after_path,
 maxwell_rate, test in test_rubber. Own derivations: normal loads of four feet, margins of sliding,
 turning and tilting in `feet`, test in test_feet; a foot that slides and lifts in `foot_contact`,
-test in test_foot_contact; a shaft with play in its bearing in `clearance`, test in
-test_clearance. Contact with a rubber buffer (Hunt and Crossley 1975) in `stop`, test in
-tests/elements/test_stop. Torque limit, speed controller and bearing friction of a drive in `motor`,
-test in test_motor.
+test in test_foot_contact; a shaft with play in its bearing in `clearance`, test in test_clearance.
+Contact with a rubber buffer (Hunt and Crossley 1975) in `stop`, test in tests/elements/test_stop.
+Rolling resistance of balls that may park (Dahl 1968, Coulomb) in `rolling`, test in test_rolling.
+Torque limit, speed controller and bearing friction of a drive in `motor`, test in test_motor.
 
 Dampers without a sponge (damper.coulomb_damper, stv_damper, havsin_damper) add a dashpot to a
 friction law. The registry of damper laws is `wm_drake.parameters.damper_laws`.

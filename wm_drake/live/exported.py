@@ -96,10 +96,18 @@ def page_text(
         gasket: Whether the page begins with the gasket.
 
     Raises:
-        InputError: the machine has no load, or the compiled engine does not represent it.
+        InputError: the machine has no load or one that dries, or the compiled engine does not
+            represent it.
     """
     if not parameters.loads:
         raise input_error("the machine has no load, so there is nothing to run", key="loads")
+    for name, load in parameters.loads.items():
+        if load.wet:
+            raise input_error(
+                "its water leaves during a run, which the functions of a page do not follow; name "
+                "other loads by --load, or leave water out",
+                key=f"loads.{name}",
+            )
     begin = {"gasket": gasket and parameters.gasket is not None}
     data = page_data(parameters)
     data |= {"given": given or parameters.name, "sets": [*sets], "begin": begin}

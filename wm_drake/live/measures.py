@@ -15,10 +15,12 @@ EACH = ("sensor",)
 """Dimensions of which a comparison of variants shows each number; of others it has the largest."""
 
 
-def shown_measures() -> tuple[str, ...]:
-    """Return the names of the measures of which the page shows a variable."""
+def shown_measures(parameters: MachineParameters) -> tuple[str, ...]:
+    """Return the names of the measures of a machine of which the page shows a variable."""
     shown = [
-        one.name for one in MEASURES.values() if any(v.studio is not None for v in one.variables)
+        one.name
+        for one in MEASURES.values()
+        if one.applies(parameters) and any(v.studio is not None for v in one.variables)
     ]
     return (*FIRST, *(name for name in shown if name not in FIRST))
 

@@ -122,7 +122,7 @@ def _page_data(parameters: MachineParameters) -> dict[str, Any]:
         "depths": depths,
         "pairs": [[shape_name(n) for n in pair.split("|")] for pair in model.pair_names],
         "measured": _measured(opened),
-        "rows": [row for name in shown_measures() for row in _rows(opened, name, count)],
+        "rows": [row for name in shown_measures(parameters) for row in _rows(opened, name, count)],
         "forces": _forces(parameters, model.plan.gasket >= 0),
         "masses": _masses(),
         "drawing": {

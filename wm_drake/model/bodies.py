@@ -443,9 +443,23 @@ def set_bodies(plant: MultibodyPlant, context: Any, parameters: MachineParameter
 
 def add_load(plant: MultibodyPlant, context: Any, load: Load) -> None:
     """Add the point masses of a load to the drum in a plant Context."""
-    drum, X_BD = plant.GetBodyByName(DRUM), axis_pose(plant)
-    loaded = with_load(moved_to(drum.CalcSpatialInertiaInBodyFrame(context), X_BD), load)
-    drum.SetSpatialInertiaInBodyFrame(context, moved_to(loaded, X_BD.inverse()))
+    set_drum(plant, context, drum_inertia(plant, context), (load,))
+
+
+def drum_inertia(plant: MultibodyPlant, context: Any) -> SpatialInertia:
+    """Return the inertia of the drum about Do in D, in a plant Context."""
+    drum = plant.GetBodyByName(DRUM)
+    return moved_to(drum.CalcSpatialInertiaInBodyFrame(context), axis_pose(plant))
+
+
+def set_drum(
+    plant: MultibodyPlant, context: Any, inertia: SpatialInertia, loads: Iterable[Load]
+) -> None:
+    """Set the inertia of the drum, about Do in D, with loads in it, in a plant Context."""
+    for load in loads:
+        inertia = with_load(inertia, load)
+    drum = plant.GetBodyByName(DRUM)
+    drum.SetSpatialInertiaInBodyFrame(context, moved_to(inertia, axis_pose(plant).inverse()))
 
 
 def moved_to(inertia: SpatialInertia, pose: RigidTransform) -> SpatialInertia:

@@ -27,6 +27,7 @@ from wm_drake.systems.sensors import DRUM_OUTPUTS, Sensors
 from wm_drake.systems.speed_source import MotorTorque, SpeedSource
 from wm_drake.systems.spin_profile_source import SpinProfileSource
 from wm_drake.systems.tub_force import TubForce
+from wm_drake.systems.water import Water
 
 AnyMachine: TypeAlias = Machine | MachineParameters | str | Path
 """A built machine, parameters, the name of a shipped machine, or a machine file."""
@@ -103,6 +104,11 @@ def add_washing_machine(
     outputs["motor_torque"] = torque
     if friction:
         outputs["drum_friction_torque"] = friction.GetOutputPort("torque")
+    water = None
+    if parameters.most_wet:
+        water = wiring.add("water", Water(parameters.most_wet))
+        builder.Connect(sensors.GetOutputPort("drum_speed"), water.GetInputPort("drum_speed"))
+        outputs["water_left"] = water.GetOutputPort("left")
     if feet:
         outputs["tub_in_cabinet"] = seen
         outputs["feet_floor_force"] = feet.GetOutputPort("floor_force")
@@ -119,6 +125,7 @@ def add_washing_machine(
         **_by_kind(placed, by_label),
         cabinet=cabinet,
         feet=feet,
+        water=water,
         inputs=Inputs(inputs),
         outputs=Outputs(outputs),
     )
@@ -249,6 +256,7 @@ OF_OTHER_DRIVES = {
     "drum_friction_torque": "it needs a drive with a motor, as in load_machine('motor')",
     "tub_in_cabinet": "it needs a cabinet that moves",
     "feet_floor_force": "it needs a cabinet that moves",
+    "water_left": "it needs a load with water",
 }
 """Why a machine may lack a port."""
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.framework import Context, Diagram, InputPort, OutputPort
 
 from wm_drake.elements.bearing import DrumBearingParameters
@@ -15,8 +16,9 @@ from wm_drake.elements.friction_damper import FrictionDamperParameters
 from wm_drake.elements.motor import packed_controller, packed_friction, packed_limit
 from wm_drake.elements.spring import SpringStrutParameters
 from wm_drake.elements.telescopic_damper import TelescopicDamperParameters
+from wm_drake.elements.water import packed_water
 from wm_drake.errors import check_known, input_error
-from wm_drake.model.bodies import add_load, set_bodies
+from wm_drake.model.bodies import add_load, drum_inertia, set_bodies, set_drum
 from wm_drake.model.cabinet import cabinet_at_rest
 from wm_drake.model.equilibrium import force_as_drawn, preloaded, put_to_rest, rest_pose
 from wm_drake.model.frame_poses import FramePoses, TubPoints, measured_points, tub_points
@@ -34,6 +36,7 @@ from wm_drake.systems.motor import Belt, Motor, SpeedController
 from wm_drake.systems.sensors import Sensors
 from wm_drake.systems.speed_source import SpeedSource
 from wm_drake.systems.spin_profile_source import SpinProfileSource
+from wm_drake.systems.water import Water
 
 
 class SetUpCache:
@@ -90,6 +93,8 @@ class Setup:
         cabinet: The cabinet on its feet if it moves, else None. Its frame then takes the place of W
             for the tub; at rest they coincide.
         measured_points: The measured points as packed numbers, from the function of this name.
+        load: Point masses in the drum; None for the empty machine.
+        drum: Inertia of the drum without load, about Do in D; None if it is not known.
     """
 
     machine: "MachineSystems"
@@ -103,6 +108,8 @@ class Setup:
     carrier_rest: FloatArray
     cabinet: CabinetOnFeet | None
     measured_points: FloatArray
+    load: Load | None = None
+    drum: SpatialInertia | None = None
 
     def __repr__(self) -> str:
         """Return the machine and its rest position in one line."""
@@ -113,6 +120,40 @@ class Setup:
     def plant_context(self) -> Context:
         """Return the plant's part of the Context."""
         return self.machine.plant.GetMyContextFromRoot(self.context)
+
+    def follow_water(self, ahead: float = 0.0) -> None:
+        """Set the masses of a load that dries in the Context, from the water that is left in it.
+
+        Drake has masses as parameters of a Context. A simulation calls this from time to time, such
+        as at each sample. The engines do so.
+
+        Args:
+            ahead: Time for which to look ahead; half the time until the next call makes the error
+                of the masses of second order in that time. [s]
+
+        Raises:
+            InputError: the load has more wet masses than any load of the built machine.
+        """
+        water, wet = self.machine.water, len(self.load.wet) if self.load else 0
+        if not wet:
+            return
+        if water is None or wet > water.count:
+            raise input_error(
+                f"this load has {wet} masses with water; those of the built machine have at most "
+                f"{water.count if water else 0}: add the load to those of the machine, and build "
+                "it again, or use the compiled engine",
+                key="loads",
+            )
+        assert self.load is not None
+        assert self.drum is not None  # the systems have been set
+        context = water.GetMyContextFromRoot(self.context)
+        left = context.get_continuous_state_vector().CopyToVector()
+        if ahead:
+            left = left + ahead * water.EvalTimeDerivatives(context).CopyToVector()
+        masses = self.load.masses(left[: len(self.load.wet)])
+        imbalance = self.parameters.imperfections.residual_imbalance
+        loads = self.load.with_masses(masses), Load(unbalances=(imbalance,))
+        set_drum(self.machine.plant, self.plant_context, self.drum, loads)
 
     @property
     def sensors(self) -> dict[str, Sensor]:
@@ -212,6 +253,7 @@ class MachineSystems:
             of the section `elements` of a machine file.
         bearing: System of the compliant bearing; None for a rigid one.
         cabinet, feet: Systems of a cabinet that moves; None if it is fixed.
+        water: System of the water in the laundry; None if no load of the machine is wet.
         inputs: By name. "drum_acceleration" (1) [rad/s^2] replaces the acceleration of the spin
             profile if a value is connected or fixed; with a motor, "drum_speed_reference" (1)
             [rad/s] replaces its speed, and "drum_torque" (1) [N m] the torque on the drum in place
@@ -240,6 +282,7 @@ class MachineSystems:
     bearing: ElementSystem | None
     cabinet: Cabinet | None
     feet: ElementSystem | None
+    water: Water | None
     inputs: dict[str, InputPort]
     outputs: dict[str, OutputPort]
     cache: SetUpCache = field(default_factory=SetUpCache, repr=False, compare=False, kw_only=True)
@@ -304,17 +347,20 @@ class MachineSystems:
         parts = parameters.sensors, parameters.clearance_frame, parameters.accelerometers
         points = poses.placed("points", parts, lambda: tub_points(poses, parameters))
         measured = measured_points(points, q[layout.tub])
-        cabinet = None
+        cabinet, drum = None, None
         if systems:
             self.plant.SetPositions(plant_context, q)
             cabinet = cabinet_at_rest(self.plant, plant_context, layout, parameters)
+            drum = drum_inertia(self.plant, plant_context)
             self._add_load(plant_context, parameters, load)
+            self._set_water(context, load)
             self._set_systems(context, elements, measured)
             self._set_drive(context, parameters)
             self._set_feet(context, cabinet)
             self.set_profile(context, profile or parameters.profile, elements)
         rest = q[layout.tub], residual, q[layout.tubes], q[layout.carrier]
-        return Setup(self, parameters, context, elements, points, *rest, cabinet, measured)
+        placed = elements, points, *rest, cabinet, measured
+        return Setup(self, parameters, context, *placed, load, drum)
 
     def new_context(self) -> Context:
         """Return a new root Context at time 0; only a machine with a diagram of its own has one."""
@@ -406,6 +452,12 @@ class MachineSystems:
             add_load(self.plant, plant_context, load)
             imbalance = parameters.imperfections.residual_imbalance
             add_load(self.plant, plant_context, Load(unbalances=(imbalance,)))
+
+    def _set_water(self, context: Context, load: Load | None) -> None:
+        """Set the wet masses of a load in a root Context, with all their water."""
+        if self.water is not None:
+            packed = packed_water(load) if load else []
+            self.water.set_load(self.water.GetMyContextFromRoot(context), packed)
 
     def _weight(self, parameters: MachineParameters, context: Context) -> Weight | None:
         """Return the weight on the springs, maybe that of the last set-up; changes the Context.

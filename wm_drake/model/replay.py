@@ -27,7 +27,7 @@ from wm_drake.parameters.units import Unit
 SPRING_COLOUR = Rgba(0.0, 0.447, 0.698, 1.0)
 DAMPER_COLOUR, ROD_COLOUR = Rgba(0.90, 0.62, 0.0, 1.0), Rgba(0.25, 0.25, 0.25, 1.0)
 GASKET_COLOUR, RING_COLOUR = Rgba(0.0, 0.62, 0.45, 0.35), Rgba(0.0, 0.45, 0.33, 1.0)
-UNBALANCE_COLOUR = Rgba(0.835, 0.369, 0.0, 1.0)
+UNBALANCE_COLOUR, WATER_COLOUR = Rgba(0.835, 0.369, 0.0, 1.0), Rgba(0.0, 0.32, 0.80, 1.0)
 
 COILS, COIL_RADIUS, WIRE_RADIUS = 9, 0.017, 0.0028
 """Coils of a drawn spring, radius of the coil and of the wire. [m] For drawing only."""
@@ -63,12 +63,14 @@ class Motion:
         speed: (n,) Drum speed. [rad/s]
         cabinet: (n, 6) Roll, pitch, yaw and position of a cabinet that moves; the positions are
             seen from it. None for a fixed one. [rad, m]
+        left: (wet,) Share of water that is left in each wet mass of the load; None for all of it.
     """
 
     time: FloatArray
     positions: FloatArray
     speed: FloatArray
     cabinet: FloatArray | None = None
+    left: FloatArray | None = None
 
 
 def replay_page(
@@ -106,7 +108,7 @@ def _drawn_page(
     meshcat.SetCameraPose(camera_in_world=[0.5, -1.15, 0.34], target_in_world=[0.0, 0.0, -0.04])
     parameters = with_fixed_cabinet(parameters)
     scene = Scene(parameters, meshcat)
-    parts = list(_parts(scene, parameters, load, gasket))
+    parts = [*_parts(scene, parameters, gasket), *_unbalances(load, motion.left)]
     for part in parts:
         part.add(meshcat)
 
@@ -250,18 +252,17 @@ class _Unbalance(_Part):
     path: str
     p_DoU_D: FloatArray
     radius: float
+    colour: Rgba
     kind = "unbalance"
 
     def add(self, meshcat: Meshcat) -> None:
-        meshcat.SetObject(self.path, Sphere(self.radius), UNBALANCE_COLOUR)
+        meshcat.SetObject(self.path, Sphere(self.radius), self.colour)
 
     def move(self, meshcat: Meshcat, frame: _Frame) -> None:
         meshcat.SetTransform(self.path, frame.X_WD @ RigidTransform(self.p_DoU_D), frame.moment)
 
 
-def _parts(
-    scene: Scene, parameters: MachineParameters, load: Load | None, gasket: bool
-) -> Iterator[_Part]:
+def _parts(scene: Scene, parameters: MachineParameters, gasket: bool) -> Iterator[_Part]:
     """Yield the drawn parts of a machine; damper tubes that are bodies are shapes of the SDF."""
     elements = placed_elements(scene.plant, FramePoses(scene.plant, parameters), parameters)
     for kind, of_kind, placed in (
@@ -284,9 +285,21 @@ def _parts(
             for point, rotation in (poses("tub", law.tub_frame), poses("world", law.housing_frame))
         )
         yield _Gasket("/elements/gasket", tub, housing)
-    for index, unbalance in enumerate(load.unbalances if load else ()):
-        radius = (3.0 * unbalance.mass / (4.0 * np.pi * DENSITY)) ** (1.0 / 3.0)
-        yield _Unbalance(f"/elements/unbalance/{index}", np.array(unbalance.position()), radius)
+
+
+def _unbalances(load: Load | None, left: FloatArray | None) -> Iterator[_Part]:
+    """Yield the masses of a load: the more water is in one, the larger and bluer it is."""
+    if load is None:
+        return
+    left = np.ones(len(load.wet)) if left is None else left
+    water = dict(zip(load.wet, left.tolist(), strict=True))
+    for index, (unbalance, mass) in enumerate(zip(load.unbalances, load.masses(left), strict=True)):
+        radius = (3.0 * mass / (4.0 * np.pi * DENSITY)) ** (1.0 / 3.0)
+        wet = water.get(index, 0.0)
+        ends = zip(UNBALANCE_COLOUR.rgba, WATER_COLOUR.rgba, strict=True)
+        colour = Rgba(*(dry + wet * (blue - dry) for dry, blue in ends))
+        place = np.array(unbalance.position())
+        yield _Unbalance(f"/elements/unbalance/{index}", place, radius, colour)
 
 
 def _stretch(meshcat: Meshcat, path: str, factor: float, moment: float) -> None:

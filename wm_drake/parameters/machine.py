@@ -221,6 +221,12 @@ class Imperfections(Frozen):
     phase_error: u.Angle = 0.0
     bearing: Bearing | None = None
 
+    @model_validator(mode="after")
+    def _imbalance_is_dry(self) -> "Imperfections":
+        if self.residual_imbalance.water:
+            raise ValueError("residual_imbalance.water: only masses of a load have water")
+        return self
+
 
 class MachineParameters(Frozen):
     """A machine: the name of its SDF model and all other parameters, in SI units.
@@ -396,6 +402,11 @@ class MachineParameters(Frozen):
         """
         first = next(iter(self.sensors.values()))
         return self.clearance.detergent_frame if self.clearance else first.frame
+
+    @property
+    def most_wet(self) -> int:
+        """Largest number of wet masses of a load."""
+        return max(len(load.wet) for load in self.loads.values())
 
     def accelerometer_frames(self) -> dict[str, str]:
         """Return the frame of each vibration sensor, by name.

@@ -17,6 +17,38 @@ from wm_drake.errors import shortened
 from wm_drake.parameters import units as u
 from wm_drake.parameters.elements import Frozen
 from wm_drake.parameters.problems import problems_of
+from wm_drake.parameters.types import FloatArray
+
+
+class Water(Frozen):
+    """Water in a mass of laundry, which leaves it while the drum spins.
+
+    Water above the share that a speed leaves goes with a time constant. None comes back.
+
+    Attributes:
+        share: Share of the mass that is water at the start.
+        speed: Drum speeds, in either direction, rising from 0.
+        left: Share of this water that is left after a long time at each speed, never rising.
+        time_constant: Time constant with which the water leaves.
+    """
+
+    share: Annotated[u.Ratio, Field(gt=0.0, lt=1.0)]
+    speed: u.Speeds
+    left: u.Ratios
+    time_constant: Annotated[u.Duration, Field(gt=0.0)]
+
+    @model_validator(mode="after")
+    def _left_falls_with_speed(self) -> "Water":
+        if len(self.speed) != len(self.left) or len(self.speed) < 2:
+            raise ValueError(
+                "needs as many values of left as of speed, at least two; "
+                f"has {len(self.left)} and {len(self.speed)}"
+            )
+        if self.speed[0] != 0.0 or np.any(np.diff(self.speed) <= 0.0):
+            raise ValueError("speed must rise from point to point and begin at 0")
+        if np.any(np.diff(self.left) > 0.0) or not 0.0 <= self.left[-1] <= self.left[0] <= 1.0:
+            raise ValueError("left must be between 0 and 1 and never rise from point to point")
+        return self
 
 
 class Unbalance(Frozen):
@@ -29,12 +61,14 @@ class Unbalance(Frozen):
         radius: Distance r from the drum axis.
         y: Position along the drum axis, to the rear, from mid-depth of the drum.
         phase: Angle from the top, positive as the drum turns.
+        water: Water in the mass, which leaves while the drum spins; None if the mass stays.
     """
 
     mass: Annotated[u.Mass, Field(ge=0.0)]
     radius: Annotated[u.Length, Field(ge=0.0)]
     y: u.Length
     phase: u.Angle = 0.0
+    water: Water | None = None
 
     def position(self) -> tuple[float, float, float]:
         """Return the position in D. [m]"""
@@ -100,8 +134,35 @@ class Load(Frozen):
 
     @property
     def mass(self) -> float:
-        """Mass of the laundry. [kg]"""
+        """Mass of the laundry, with all its water. [kg]"""
         return sum(unbalance.mass for unbalance in self.unbalances)
+
+    @property
+    def wet(self) -> tuple[int, ...]:
+        """Numbers of the masses whose water leaves."""
+        return tuple(k for k, unbalance in enumerate(self.unbalances) if unbalance.water)
+
+    def masses(self, left: FloatArray) -> FloatArray:
+        """Return the masses with the water that is left.
+
+        Args:
+            left: Share of the water of each wet mass. (..., wet)
+
+        Returns:
+            (..., masses) [kg]
+        """
+        masses = np.tile([unbalance.mass for unbalance in self.unbalances], (*left.shape[:-1], 1))
+        for column, k in enumerate(self.wet):
+            water = self.unbalances[k].water
+            assert water is not None  # it is wet
+            masses[..., k] *= 1.0 - water.share * (1.0 - left[..., column])
+        return np.asarray(masses)
+
+    def with_masses(self, masses: FloatArray) -> "Load":
+        """Return the load with other masses (masses,), which stay. [kg]"""
+        pairs = zip(self.unbalances, masses.tolist(), strict=True)
+        each = tuple(u.model_copy(update={"mass": mass, "water": None}) for u, mass in pairs)
+        return self.model_copy(update={"unbalances": each})
 
 
 class _Step(Frozen):

@@ -83,7 +83,8 @@ class UncertainQuantity(Spread):
     """An uncertain quantity of the machine file, the SDF or the load.
 
     Attributes:
-        keys: Key paths of its numbers.
+        keys: Key paths of its numbers; * stands for any characters of one part of a path, as in
+            `bodies.*.mass` (`wm_drake.model.key_patterns`).
         draws: "one" draw for all numbers and all parts of a type, or one draw "each".
         about: Description.
     """

@@ -37,6 +37,8 @@ LARGEST_NUMBER = 1e15
 """Largest size of a number in SI units: far above any of a machine, and products stay finite."""
 
 _POWER = r"(?:\^|\*\*)\s*-?[0-9]{1,2}(?![0-9.]|\s*(?:\^|\*\*))"
+_LIST = re.compile(r"\([^()]{0,10000}\)")
+"""A list of numbers without a unit."""
 _UNIT = re.compile(rf"(?:1\s*/)?(?:[^\W\d]\w*|[°%]|[\s*/().·-]|{_POWER})*")
 """A unit: words, products and quotients; a power is one whole number of at most two digits."""
 
@@ -181,7 +183,8 @@ class Unit:
         """Return a regular expression of texts of the field; it knows no dimensions of units."""
         number = r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?"
         if not self.si:
-            return rf"^\s*{number}\s*$"
+            numbers = rf"\(\s*{number}\s*(,\s*{number}\s*)*\)" if is_list else number
+            return rf"^\s*{numbers}\s*$"
         unit = r"(\s*(?![eE][+-]?[0-9])[A-Za-z\u00b0\u00b5\u03bc%]|\s+1\s*/)"
         numbers = rf"\(\s*{number}\s*(,\s*{number}\s*)*\)" if is_list else number
         return rf"^\s*{numbers}{unit}"
@@ -458,6 +461,8 @@ def to_si_vector(value: Any, info: ValidationInfo, unit: Unit) -> tuple[float, .
         unit: Unit of the field.
     """
     example = unit.example(is_list=True)
+    if isinstance(unit, PureNumber) and isinstance(value, str) and _LIST.fullmatch(value.strip()):
+        return tuple(unit.number(part.strip()) for part in value.strip()[1:-1].split(","))
     if isinstance(value, str):
         match = _matched(_VECTOR, value, LONGEST_LIST)
         parts = [] if match is None else [part.strip() for part in match[1].split(",")]
@@ -539,6 +544,7 @@ class Share(PureNumber):
 
 
 Ratio = Annotated[float, PureNumber()]
+Ratios = Annotated[tuple[float, ...], PureNumber()]
 Mass = Annotated[float, Unit("kg", "kg")]
 Inertia = Annotated[float, Unit("kg*m^2", "kg*m^2")]
 StaticMoment = Annotated[float, Unit("kg*m", "g*mm")]

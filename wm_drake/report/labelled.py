@@ -10,7 +10,7 @@ import xarray as xr
 
 from wm_drake.report.formatting import plain
 from wm_drake.report.quantity import HIDDEN, quantity_of, shown, units_of
-from wm_drake.report.table import Table, line, table_of
+from wm_drake.report.table import Table, table_of
 
 if TYPE_CHECKING:
     from rich.table import Table as TerminalTable
@@ -111,36 +111,6 @@ def _with_unit(data: xr.Dataset) -> xr.Dataset:
     for dim, quantities in filter(None, map(units_of, numbers)):
         return data.assign_coords(unit=(dim, [quantity.reading.label for quantity in quantities]))
     return data
-
-
-@dataclass(frozen=True)
-class TurnedTable(LabelledTable):
-    """A table with a line for each variable, in its own unit, and a column for each label.
-
-    The variables have one dimension, the same for all.
-    """
-
-    def frame(self) -> pd.DataFrame:
-        """Return the numbers in units for reading, with name and unit of each variable."""
-        rows = [
-            [str(name), quantity_of(array).unit.label, *quantity_of(array).values(array.values)]
-            for name, array in self.data.items()
-        ]
-        return pd.DataFrame(rows, columns=["quantity", "unit", *self._labels])
-
-    def table(self) -> Table:
-        """Return the table for page and terminal."""
-        rows = (
-            line(q.words, [q.unit_text, *map(q.number, array.values)])
-            for q, array in ((quantity_of(array), array) for array in self.data.values())
-        )
-        heads = [self.words.get(label, label) for label in self._labels]
-        return Table(self.caption, ("quantity", "unit", *heads), tuple(rows), text_columns=2)
-
-    @property
-    def _labels(self) -> list[str]:
-        (dim,) = self.data.dims
-        return [str(label) for label in self.data[dim].values.tolist()]
 
 
 def _rows(data: xr.Dataset) -> pd.DataFrame:

@@ -1,4 +1,4 @@
-"""Balance of a drum with rings of balls: what remains of the unbalance of load and balls.
+"""Balance of a drum with rings of balls or liquid: what remains of the unbalance of the load.
 
 A load has first moments S = sum m r and S_y = sum m r y, r across the drum axis, in the frame D of
 the drum. Both are those of two unbalances in planes at y_1 and y_2 (ISO 21940-11):
@@ -6,15 +6,17 @@ the drum. Both are those of two unbalances in planes at y_1 and y_2 (ISO 21940-1
     U_1 = (S y_2 - S_y)/(y_2 - y_1),    U_2 = (S_y - S y_1)/(y_2 - y_1)
 
 The planes are those of the foremost and the rearmost ring. One ring has one plane: U = S, and no
-place of its balls cancels S_y.
+place of its balls cancels S_y. A ring is an element on the drum whose kind has the output `moment`.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from wm_drake.elements.ball_ring import BallRing
+from wm_drake.elements.kind import element_kind
 from wm_drake.parameters import MachineParameters
+from wm_drake.parameters.element_kinds import DrumElement
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.records import Record
@@ -22,7 +24,7 @@ from wm_drake.simulation.records import Record
 
 @dataclass(frozen=True)
 class Balance:
-    """Unbalance of load and balls in each plane, over the samples of a run.
+    """Unbalance of load and rings in each plane, over the samples of a run.
 
     Attributes:
         planes: Positions of the planes along the drum axis. (p,) [m]
@@ -31,7 +33,9 @@ class Balance:
         speed: Drum speed. (n,) [rad/s]
         angle: Angle of the drum. (n,) [rad]
         load: Unbalance of the load alone, x and z in D. (p, 2) [kg m]
-        remaining: Unbalance of load and balls. (n, p, 2) [kg m]
+        remaining: Unbalance of load and rings. (n, p, 2) [kg m]
+        angles: Angle of each ball of a ring, or of the first moment of a ring without balls, from
+            the top of the drum, by the name of the ring. (n, balls or 1) [rad]
     """
 
     planes: FloatArray
@@ -41,6 +45,7 @@ class Balance:
     angle: FloatArray
     load: FloatArray
     remaining: FloatArray
+    angles: Mapping[str, FloatArray]
 
     @property
     def load_size(self) -> FloatArray:
@@ -49,7 +54,7 @@ class Balance:
 
     @property
     def size(self) -> FloatArray:
-        """Return the size of the unbalance of load and balls. (n, p) [kg m]"""
+        """Return the size of the unbalance of load and rings. (n, p) [kg m]"""
         return np.asarray(np.linalg.norm(self.remaining, axis=-1))
 
     @property
@@ -60,7 +65,7 @@ class Balance:
 
     @property
     def balanced_from(self) -> float:
-        """Return the speed from which the balls make the sum over the planes smaller; else NaN.
+        """Return the speed from which the rings make the sum over the planes smaller; else NaN.
 
         That is the drum speed at the last sample at which it is not smaller than that of the load
         alone. [rad/s]
@@ -104,13 +109,42 @@ def moments_of_load(case: Case, parameters: MachineParameters) -> tuple[FloatArr
     return static, with_y
 
 
-def rings_of(parameters: MachineParameters) -> dict[str, BallRing]:
-    """Return the rings of balls of a machine by name."""
-    return {n: e for n, e in parameters.elements.items() if isinstance(e, BallRing)}
+MOMENT, ANGLE = "moment", "angle"
+"""Output of a kind of element on the drum that acts as an unbalance: first moment in D [kg m]; and
+of a kind that consists of balls: angle of each from the top of the drum [rad]."""
+
+
+def rings_of(parameters: MachineParameters) -> dict[str, DrumElement]:
+    """Return the elements on the drum that act as an unbalance, such as rings of balls, by name."""
+    return {
+        name: element
+        for name, element in parameters.elements.items()
+        if isinstance(element, DrumElement) and MOMENT in element_kind(element.kind).output_parts
+    }
+
+
+def moment_of(record: Record, parameters: MachineParameters, ring: str) -> FloatArray:
+    """Return the first moment of a ring over a run, x and z in D. (n, 2) [kg m]"""
+    kind = parameters.elements[ring].kind
+    return np.asarray(record[f"{kind}_{MOMENT}"].sel({kind: ring}).values[:, [0, 2]])
+
+
+def angles_of(record: Record, parameters: MachineParameters, ring: str) -> FloatArray:
+    """Return the angle of each ball of a ring, or of the first moment of one without balls.
+
+    Returns:
+        (n, balls or 1) [rad]
+    """
+    kind = parameters.elements[ring].kind
+    if ANGLE not in element_kind(kind).output_parts:
+        x, z = moment_of(record, parameters, ring).T
+        return np.asarray(np.arctan2(x, z)[:, None])
+    angles = record[f"{kind}_{ANGLE}"].sel({kind: ring}).values
+    return np.asarray(angles[:, ~np.isnan(angles[0])])
 
 
 def balance_of(case: Case, parameters: MachineParameters, record: Record) -> Balance | None:
-    """Return the unbalance of load and balls over a run; None for a machine without balls.
+    """Return the unbalance of load and rings over a run; None for a machine without rings.
 
     Args:
         parameters: The machine, unless the case has parameters of its own.
@@ -122,10 +156,10 @@ def balance_of(case: Case, parameters: MachineParameters, record: Record) -> Bal
     order = sorted(rings, key=lambda name: rings[name].y)
     ends = order[:1] if rings[order[0]].y == rings[order[-1]].y else [order[0], order[-1]]
     planes = np.array([rings[name].y for name in ends])
-    moments = record.ball_ring_moment.sel(ball_ring=order).values[..., [0, 2]]
+    moments = np.stack([moment_of(record, parameters, name) for name in order], axis=1)
     positions = np.array([rings[name].y for name in order])
     static, with_y = moments_of_load(case, parameters)
-    of_balls = moments.sum(axis=1), np.einsum("r,nrk->nk", positions, moments)
+    of_rings = moments.sum(axis=1), np.einsum("r,nrk->nk", positions, moments)
     return Balance(
         planes,
         tuple(ends),
@@ -133,5 +167,6 @@ def balance_of(case: Case, parameters: MachineParameters, record: Record) -> Bal
         record.drum_speed.values,
         record.drum_angle.values,
         in_planes(static, with_y, planes),
-        in_planes(static + of_balls[0], with_y + of_balls[1], planes),
+        in_planes(static + of_rings[0], with_y + of_rings[1], planes),
+        {name: angles_of(record, parameters, name) for name in rings},
     )

@@ -7,6 +7,7 @@ from wm_drake.elements.bearing import drum_bearing_history
 from wm_drake.elements.telescopic_damper import FORCE_SIZE, telescopic_damper_history
 from wm_drake.engines.trajectory import Trajectory
 from wm_drake.model.machine import Setup
+from wm_drake.parameters import Load
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cabinet import cabinet_variables
 from wm_drake.simulation.histories import output_history, position_history
@@ -110,6 +111,13 @@ def _current(setup: Setup, trajectory: Trajectory) -> Variables:
     if factor is None:
         return {}
     return declared(motor_current=factor * trajectory.motor_torque)
+
+
+def masses_of(load: Load, trajectory: Trajectory) -> Variables:
+    """Return the masses of a load that dries; none for one that stays."""
+    if trajectory.water is None:
+        return {}
+    return declared(mass_left=load.masses(trajectory.water))
 
 
 def _forces(

@@ -5,6 +5,7 @@ measured is corrected: gravity, axes that turn with the tub, AC coupling and fil
 """
 
 import json
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -59,6 +60,24 @@ def recorded_signal(record: Record, sensor: RecordedSensor, point: FloatArray) -
     true = np.einsum("ni,ni->n", vectors, sensor_axis(sensor, motion[:, :3], rest[:3]))
     sign = -1.0 if sensor.polarity == "negative" else 1.0
     return sign * sensor.gain * _through_recorder(true, sample_period(record), sensor)
+
+
+def turned_signals(
+    record: Record, sensors: Mapping[str, RecordedSensor], points: Mapping[str, FloatArray]
+) -> FloatArray:
+    """Return the signals of sensors, and those of sensors along two other axes. (n, sensor, 3)
+
+    A sensor that is off by small angles records the first one, and the others times these angles.
+
+    Args:
+        points: Positions of the sensors in T, (3,) each. [m]
+    """
+    columns = [
+        recorded_signal(record, sensor.model_copy(update={"axis": axis}), points[name])
+        for name, sensor in sensors.items()
+        for axis in (sensor.axis, *(other for other in "xyz" if other != sensor.axis))
+    ]
+    return np.stack(columns, axis=1).reshape(len(record.time), len(sensors), 3)
 
 
 def gravity_of(record: Record) -> float:

@@ -15,12 +15,12 @@ from wm_drake.elements.bushing import AXES
 from wm_drake.engines.trajectory import COORDINATES, Trajectory, divergence_text
 from wm_drake.errors import input_error
 from wm_drake.model.machine import Setup
-from wm_drake.parameters import SpinProfile
+from wm_drake.parameters import Load, SpinProfile
 from wm_drake.parameters.cabinet import Cabinet
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.mounts import mount_names
 from wm_drake.simulation.netcdf import netcdf_bytes
-from wm_drake.simulation.outputs import branch_names, others_by_kind, variables_of
+from wm_drake.simulation.outputs import branch_names, masses_of, others_by_kind, variables_of
 
 Record: TypeAlias = xr.Dataset
 """Outputs of one run over time, in SI units.
@@ -38,9 +38,10 @@ def as_record(setup: Setup, case: Case, trajectory: Trajectory) -> Record:
     All displacements are in W and count from the rest pose of the empty machine. If the cabinet
     moves, all but `cabinet_angle` to `foot_slip` are seen from it, in its frame in place of W.
     """
+    outputs = variables_of(setup, trajectory) | masses_of(case.load, trajectory)
     variables: dict[str, Any] = {
         name: (dims, values, {"units": unit, "long_name": text})
-        for name, (dims, values, unit, text) in variables_of(setup, trajectory).items()
+        for name, (dims, values, unit, text) in outputs.items()
     }
     labels = {
         "axis": AXES,
@@ -57,6 +58,7 @@ def as_record(setup: Setup, case: Case, trajectory: Trajectory) -> Record:
         **({"tube": setup.telescopes} if setup.telescopes else {}),
         **({"branch": branches} if (branches := branch_names(setup)) else {}),
         **others_by_kind(setup),
+        **({"unbalance": _numbered(case)} if case.load.wet else {}),
         **({"foot": setup.cabinet.cabinet.corners} if setup.cabinet else {}),
     }
     label_coordinates = _label_coordinates(**{name: tuple(of) for name, of in labels.items()})
@@ -75,6 +77,11 @@ def as_record(setup: Setup, case: Case, trajectory: Trajectory) -> Record:
     return xr.Dataset(variables, label_coordinates, attributes)
 
 
+def _numbered(case: Case) -> list[str]:
+    """Return the numbers of the masses of a load, from 1, as texts."""
+    return [str(k) for k in range(1, 1 + len(case.load.unbalances))]
+
+
 @functools.lru_cache(maxsize=16)  # building them takes 2 % of the time of a run
 def _label_coordinates(**labels: tuple[str, ...]) -> xr.Coordinates:
     """Return the coordinates of all dimensions except time."""
@@ -87,9 +94,20 @@ def sample_period(record: Record) -> float:
     return float(time[1] - time[0]) if len(time) > 1 else 1.0
 
 
+def load_of_record(record: Record) -> Load:
+    """Return the load of the run of a record, with all its water."""
+    return Load.model_validate_json(record.attrs["load_parameters"])
+
+
 def profile_of(record: Record) -> SpinProfile:
     """Return the spin profile of the run of a record."""
-    return SpinProfile.model_validate_json(record.attrs["profile"])
+    return _profile_in(record.attrs["profile"])
+
+
+@functools.lru_cache(maxsize=64)
+def _profile_in(text: str) -> SpinProfile:
+    """Return the profile of its JSON text."""
+    return SpinProfile.model_validate_json(text)
 
 
 def cabinet_in(record: Record) -> tuple[Cabinet, float] | None:

@@ -70,6 +70,7 @@ DECLARED = {
         "N m",
         f"moment of the drum on the tub in the bearing, {IN_BEARING}",
     ),
+    "mass_left": ("time unbalance", "kg", "mass of each unbalance with the water left in it"),
     "motor_current": ("time", "A", "current of the motor"),
     "motor_torque": ("time", "N m", "torque of the motor on the drum"),
     "spring_tension": ("time spring", "N", "spring tension"),

@@ -23,7 +23,8 @@ from typing import Any, TypeAlias
 import numpy as np
 import xarray as xr
 
-from wm_drake.batch import RunResult, simulate_many
+from wm_drake.batch import RunResult, simulate_many, simulate_remembered
+from wm_drake.batch.ledger import Ledger
 from wm_drake.engines.compiled.step_check import check_step
 from wm_drake.errors import InputError
 from wm_drake.model.machine import Machine
@@ -63,15 +64,35 @@ class CountedCases:
 
 
 def run_here(
-    machine: Machine, measures: tuple[str, ...], cases: Iterable[Case], what: str
+    machine: Machine,
+    measures: tuple[str, ...],
+    cases: Iterable[Case],
+    what: str,
+    workers: int | None = None,
 ) -> xr.Dataset:
     """Run cases on the cores of this computer, without a ledger and a progress bar."""
     del what
-    return simulate_many(machine, cases, measures=measures)
+    return simulate_many(machine, cases, measures=measures, workers=workers)
+
+
+def kept_in(ledger: Ledger, workers: int | None = None) -> Simulate:
+    """Return a function that runs cases on this computer if a ledger does not have them."""
+
+    def simulate(
+        machine: Machine, measures: tuple[str, ...], cases: Iterable[Case], what: str
+    ) -> xr.Dataset:
+        del what
+        return simulate_remembered(machine, cases, ledger, measures=measures, workers=workers)
+
+    return simulate
 
 
 def record_here(
-    machine: Machine, cases: Iterable[Case], keep: Callable[[int, Record], None], what: str
+    machine: Machine,
+    cases: Iterable[Case],
+    keep: Callable[[int, Record], None],
+    what: str,
+    workers: int | None = None,
 ) -> None:
     """Run cases on the cores of this computer and pass number and record of each on."""
     del what
@@ -80,7 +101,14 @@ def record_here(
         assert run.record is not None
         keep(run.number, run.record)
 
-    simulate_many(machine, cases, measures=("extremes",), histories=True, finished=collect)
+    simulate_many(
+        machine,
+        cases,
+        measures=("extremes",),
+        histories=True,
+        workers=workers,
+        finished=collect,
+    )
 
 
 @dataclass(frozen=True)
@@ -177,15 +205,22 @@ class Experiment:
             changes: New values by key path, by name.
         """
         parameters, machines = self.machine.parameters, dict[str, MachineParameters]()
-        step = checked_step(parameters, None)
         for name, change in changes.items():
             try:
                 changed = with_values(parameters, change)
-                check_step(self.machine.set_up(parameters=changed), step)
             except InputError:
                 continue
-            machines[name] = changed
+            if self.can_run(changed):
+                machines[name] = changed
         return machines
+
+    def can_run(self, machine: MachineParameters) -> bool:
+        """Return whether a changed machine has an equilibrium, and a step that is short enough."""
+        try:
+            check_step(self.machine.set_up(parameters=machine), checked_step(machine, None))
+        except InputError:
+            return False
+        return True
 
 
 def placed(table: xr.Dataset, labels: PlaceLabels) -> xr.Dataset:

@@ -327,6 +327,7 @@ class Study:
 SHIPPED = (
     "balancer.options:BALANCER",
     "calibrate.options:CALIBRATE",
+    "cycle.options:CYCLE",
     "design.options:DESIGN",
     "drive.options:DRIVE",
     "gasket.options:GASKET",
@@ -334,6 +335,7 @@ SHIPPED = (
     "gasket_damping.options:GASKET_DAMPING",
     "gasket_geometry.options:GASKET_GEOMETRY",
     "modes.options:MODES",
+    "next.options:NEXT",
     "response.options:RESPONSE",
     "spin.options:SPIN",
     "spin_cycle.options:SPIN_CYCLE",
@@ -344,7 +346,7 @@ SHIPPED = (
 """Studies of this package: module below `wm_drake.studies`, and name."""
 
 SI_ONLY = (
-    *("calibrate", "spin", "verdict"),
+    *("spin", "verdict"),
     *("study gasket-damping", "study gasket-geometry", "study response"),
     *("rig bushing", "rig damper", "rig gasket"),
     *("study design", "study gasket", "study spin-cycle", "study spin-identify", "study tolerance"),

@@ -64,7 +64,7 @@ def picture_runner_of(machine: OpenMachine) -> Runner:
 
 def runner_of(machine: OpenMachine) -> Runner:
     """Return the runner of the numbers of a machine: the first run of a batch has a history."""
-    return Runner(machine.parameters, shown_measures(), histories={0})
+    return Runner(machine.parameters, shown_measures(machine.parameters), histories={0})
 
 
 def picture(machine: OpenMachine, runner: Runner, state: PageState) -> dict[str, Any]:
@@ -197,7 +197,7 @@ def _rows_of(machine: OpenMachine, run: RunResult) -> list[dict[str, Any]]:
     """Return the rows of the table of measures, in units for reading."""
     return [
         row
-        for name in shown_measures()
+        for name in shown_measures(machine.parameters)
         for variable in MEASURES[name].variables
         if variable.studio is not None
         for row in _rows(machine, run, variable)

@@ -4,6 +4,7 @@ Each study has a folder of its own with the machine file, the output and the res
 starts finds the studies of earlier ones there.
 """
 
+import html
 import json
 import re
 import signal
@@ -73,7 +74,8 @@ class Jobs:
             identifier = self._new_folder(study)
             folder = self.folder / identifier
             write_machine(folder / "machine.yaml", base, parameters, machine)
-            command = ["study", study, "--machine", "machine.yaml", "--out", "results", *words]
+            given = ["machine.yaml"] if _takes_machine(study) else ["--machine", "machine.yaml"]
+            command = ["study", study, *given, "--out", "results", *words]
             about = {"study": study, "command": command, "started": now(), "machine": state.machine}
             (folder / "job.json").write_text(json.dumps(about, indent=1) + "\n", encoding="utf-8")
             self._enqueue(identifier, command)
@@ -131,6 +133,7 @@ class Jobs:
             "place": place,
             "progress": progress[-1] if progress else None,
             "output": output,
+            "answer": _answer_of(folder / "results" / "report.html") if has_report else "",
             "report": has_report and not runs and not place,
         }
 
@@ -218,6 +221,19 @@ class Jobs:
         except (OSError, ValueError, KeyError, TypeError):
             pass
         raise input_error(f"no study '{identifier}'", key="study")
+
+
+def _takes_machine(study: str) -> bool:
+    """Return whether the command of a study has the machine as an argument, without an option."""
+    extra = STUDIES[study].options.model_fields["machine"].json_schema_extra
+    return isinstance(extra, dict) and extra.get("flag") == "argument"
+
+
+def _answer_of(report: Path) -> str:
+    """Return the answer of a report, which is the first paragraph of its page; "" without one."""
+    text = report.read_text(encoding="utf-8", errors="replace")
+    summary = re.search(r'<p class="summary">(.*?)</p>', text, re.DOTALL)
+    return html.unescape(summary[1]) if summary else ""
 
 
 def _state(runs: bool, place: int | None, has_report: bool) -> str:

@@ -10,24 +10,26 @@ from wm_drake.parameters import Load, MachineParameters, SpinProfile, load_machi
 from wm_drake.simulation.balance import moments_of_load, rings_of
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.balancer.page import diverged
+from wm_drake.studies.balancer.rings import (
+    capacities_of,
+    capacity_of,
+    is_within,
+    locked,
+    picked_up_from,
+    with_factors,
+    without_rings,
+)
 from wm_drake.studies.balancer.study import (
     HOLD,
     MASS,
     PLACE,
     base_of,
-    capacities_of,
-    capacity_of,
     compared,
     curves_of,
     from_release,
-    is_within,
     lock_below,
-    locked,
-    picked_up_from,
     released,
     run_up,
-    with_factors,
-    without_rings,
 )
 
 RPM = np.pi / 30.0

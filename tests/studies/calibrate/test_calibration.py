@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from linear_fits import fit_at
 
 from wm_drake.batch.ledger import open_ledger
 from wm_drake.errors import InputError
@@ -14,14 +15,14 @@ from wm_drake.parameters import load_machine, measured_amplitudes
 from wm_drake.parameters.files import yaml_text
 from wm_drake.parameters.free import Measured, load_free
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.studies.calibrate.computed import Evaluation, PointRunner
+from wm_drake.studies.calibrate.computed import Evaluation
 from wm_drake.studies.calibrate.parameter_map import parameter_map_of
 from wm_drake.studies.calibrate.prediction import predict
 from wm_drake.studies.calibrate.results import amplitudes_of, predictions_of, quantities_of
 from wm_drake.studies.calibrate.solutions import Solution, distinct, solved_machine
 from wm_drake.studies.calibrate.study import SearchPlan, calibrate, identity_of
 from wm_drake.studies.calibrate.targets import Targets, targets_of
-from wm_drake.studies.fitting.posterior import Posterior
+from wm_drake.studies.experiment import Experiment, kept_in
 
 FREE = """
 quantities:
@@ -84,7 +85,9 @@ def planted(
     """Return the amplitudes of the machine at a point as targets."""
     shape = len(loads), len(machine.parameters.sensors)
     empty = Targets(loads, tuple(machine.parameters.sensors), np.ones(shape), np.ones(shape))
-    amplitude = Evaluation(machine, parameter_map, empty)(np.array([point])).amplitude[0]
+    amplitude = Evaluation(Experiment(machine, ()), parameter_map, empty)(
+        np.array([point])
+    ).amplitude[0]
     return replace(empty, amplitude=amplitude)
 
 
@@ -198,7 +201,7 @@ def test_point_without_a_machine_is_nan_and_does_not_change_others(short, tmp_pa
     ).replace("(4, 6)", "(-6, 6)")
     parameter_map = parameter_map_of(short, free_file(tmp_path, text))
     points = np.array([[30.0, 0.0, 5.0], [30.0, 0.0, -5.0], [30.0, 0.0, 5.0]])
-    values = Evaluation(short, parameter_map, one_case(short))(points)
+    values = Evaluation(Experiment(short, ()), parameter_map, one_case(short))(points)
     for array in (values.amplitude, values.power_mean, values.preload):
         assert np.isnan(array[1]).all()
         assert np.array_equal(array[0], array[2])
@@ -212,18 +215,14 @@ def test_point_whose_step_is_too_long_is_nan_and_the_first_start_is_refused(shor
         " sets: damper_types.friction.damping}}\n"
     )
     parameter_map = parameter_map_of(short, load_free(path))
-    evaluation = Evaluation(short, parameter_map, one_case(short))
+    evaluation = Evaluation(Experiment(short, ()), parameter_map, one_case(short))
     values = evaluation(np.array([[50.0], [200e3], [100.0]]))
     assert np.isfinite(values.amplitude).all(axis=(1, 2)).tolist() == [True, False, True]
     assert np.array_equal(values.amplitude[2], evaluation(np.array([[100.0]])).amplitude[0])
     targets = planted(short, parameter_map, [50.0], loads=(("middle", True),))
-    with (
-        open_ledger(tmp_path / "ledger.sqlite", {}) as ledger,
-        pytest.raises(InputError, match="is too long for the tub"),
-    ):
-        calibrate(
-            PointRunner(short, ledger), load_free(path), targets, SearchPlan(starts=1, iterations=1)
-        )
+    plan = SearchPlan(starts=1, iterations=1)
+    with pytest.raises(InputError, match="is too long for the tub"):
+        calibrate(Experiment(short, ()), load_free(path), targets, plan)
 
 
 def test_point_that_only_the_gasket_holds_is_nan_for_loads_without_it(short, tmp_path):
@@ -239,7 +238,7 @@ def test_point_that_only_the_gasket_holds_is_nan_for_loads_without_it(short, tmp
     without = replace(with_gasket, loads=(("middle", False),))
     points = np.array([[0.0], [0.01]])
     for targets, finite in ((with_gasket, [True, True]), (without, [True, False])):
-        amplitude = Evaluation(short, parameter_map, targets)(points).amplitude
+        amplitude = Evaluation(Experiment(short, ()), parameter_map, targets)(points).amplitude
         assert np.isfinite(amplitude).all(axis=(1, 2)).tolist() == finite
 
 
@@ -264,7 +263,7 @@ def one_case(machine):
 
 
 def known_residuals(machine, parameter_map, points):
-    found = Evaluation(machine, parameter_map, one_case(machine))(points)
+    found = Evaluation(Experiment(machine, ()), parameter_map, one_case(machine))(points)
     return parameter_map.prior_residuals(points, found.preload, found.elongation)
 
 
@@ -273,12 +272,15 @@ def test_expected_preload_is_prior_not_data(short, tmp_path):
     targets = Targets((("middle", True),), ("Xr",) * 6, np.full((1, 6), 0.01), np.ones((1, 6)))
     with open_ledger(tmp_path / "ledger.sqlite", {"study": "test"}) as ledger:
         (found,) = calibrate(
-            PointRunner(short, ledger), free, targets, SearchPlan(starts=1, iterations=1)
+            Experiment(short, (), kept_in(ledger)),
+            free,
+            targets,
+            SearchPlan(starts=1, iterations=1),
         ).ended
-    assert found.posterior.slopes.shape == (6, 3)
+    assert found.fit.linear.count == 6
     parameter_map = parameter_map_of(short, free)
     rows = known_residuals(short, parameter_map, found.point[None])[0]
-    assert found.posterior.all_slopes.shape == (6 + 3, 3)
+    assert found.fit.linear.slopes.shape == (6 + len(rows) + 3, 3)
     assert found.prior_cost == pytest.approx(0.5 * (np.sum(rows**2) + np.sum(found.coordinates**2)))
 
 
@@ -344,7 +346,7 @@ def test_search_keeps_a_limit_that_the_cost_alone_does_not(short, tmp_path):
     for number, limits in enumerate(({}, {"Xr": 0.03})):
         with open_ledger(tmp_path / f"{number}.sqlite", {"study": "test"}) as ledger:
             (found,) = calibrate(
-                PointRunner(short, ledger),
+                Experiment(short, (), kept_in(ledger)),
                 free,
                 targets.limited(limits),
                 SearchPlan(starts=1, iterations=20),
@@ -376,8 +378,9 @@ def recovered(short, tmp_path_factory):
         SearchPlan(starts=2, seed=4, iterations=12, deviation=0.002, resolution=0.0),
     )
     with open_ledger(folder / "ledger.sqlite", identity_of(short, free, targets, plan)) as ledger:
-        calibration = calibrate(PointRunner(short, ledger), free, targets, plan)
-        predictions = predict(PointRunner(short, ledger), free, calibration, [["middle"]])
+        experiment = Experiment(short, (), kept_in(ledger))
+        calibration = calibrate(experiment, free, targets, plan)
+        predictions = predict(experiment, free, calibration, [["middle"]])
         ledger.mark_finished()
     return truth, free, targets, plan, calibration, predictions, folder
 
@@ -386,12 +389,12 @@ def test_known_machine_is_recovered_within_its_standard_deviations(recovered):
     truth, _, _, _, calibration, _, _ = recovered
     best = calibration.solutions[0]
     parameter_map = calibration.parameter_map
-    posterior = best.posterior.spread() * parameter_map.deviation
+    posterior = best.fit.remaining * parameter_map.deviation
     assert np.all(np.abs(best.point - truth) < 3.0 * posterior + 0.02 * parameter_map.deviation)
     assert np.nanmax(np.abs(best.errors)) < 0.01
     # friction and lean change the amplitudes; the mass of the motor hardly does
-    assert np.all(best.posterior.spread()[:2] < 0.2)
-    assert np.sum(best.posterior.directions() > 1.0) >= 2
+    assert np.all(best.fit.remaining[:2] < 0.2)
+    assert np.sum(best.fit.linear.directions() > 1.0) >= 2
 
 
 def test_start_values_of_the_free_file_are_not_used_for_predictions(short, recovered, tmp_path):
@@ -406,7 +409,8 @@ def test_start_values_of_the_free_file_are_not_used_for_predictions(short, recov
     assert np.array_equal(parameter_map_of(short, started).start, truth)
     identity = identity_of(short, started, targets, plan)
     with open_ledger(tmp_path / "ledger.sqlite", identity) as ledger:
-        (again,) = predict(PointRunner(short, ledger), started, calibration, [["middle"]])
+        experiment = Experiment(short, (), kept_in(ledger))
+        (again,) = predict(experiment, started, calibration, [["middle"]])
     assert np.array_equal(again.amplitude, predictions[0].amplitude)
 
 
@@ -425,16 +429,19 @@ def test_interrupted_calibration_continues_where_it_stopped(short, tmp_path, rec
     _, free, targets, plan, calibration, _, _ = recovered
     identity = identity_of(short, free, targets, plan)
 
-    def stop(_start, evaluations, _best):
-        if evaluations > 9:
+    steps = []
+
+    def stop(_fraction, _least):
+        steps.append(1)
+        if len(steps) > 2:
             raise KeyboardInterrupt
 
     path = tmp_path / "ledger.sqlite"
     with pytest.raises(KeyboardInterrupt), open_ledger(path, identity) as ledger:
-        calibrate(PointRunner(short, ledger, report=stop), free, targets, plan)
+        calibrate(Experiment(short, (), kept_in(ledger)), free, targets, plan, stop)
     with open_ledger(path, identity, resume=True) as ledger:
         assert len(ledger) > 5
-        resumed = calibrate(PointRunner(short, ledger, workers=1), free, targets, plan)
+        resumed = calibrate(Experiment(short, (), kept_in(ledger, 1)), free, targets, plan)
     # also: any number of workers
     assert quantities_of(resumed).identical(quantities_of(calibration))
 
@@ -468,11 +475,9 @@ def test_table_of_amplitudes_is_a_file_of_measured_amplitudes(recovered, short, 
 ONE_VALUE = Targets((("a", True),), ("X",), np.array([[1.0]]), np.ones((1, 1)))
 
 
-def solution(coordinates, amplitude, slopes, cost=1.0, targets=ONE_VALUE):
-    posterior = Posterior(np.array(coordinates), np.array(slopes), len(slopes))
-    computed = np.array([amplitude]), np.empty(0)
-    at = np.array(coordinates)
-    return Solution(None, targets, 0, at, *computed, cost, 0.0, posterior, 1)
+def solution(coordinates, amplitude, slopes, cost=1.0, targets=ONE_VALUE, unknowns=None):
+    fit = fit_at(coordinates, slopes, unknowns)
+    return Solution(None, targets, 0, fit, np.array([amplitude]), np.empty(0), cost, 0.0)
 
 
 def test_distinct_solutions_are_good_and_far_apart():
@@ -502,8 +507,8 @@ def test_known_quantities_enter_like_free_ones(short, tmp_path):
     parameter_map = parameter_map_of(short, free_file(tmp_path, KNOWN + FREE + hardening))
     made = parameter_map.parameters_at(np.array([40.0, 0.03, 5.5, 10.0]))
     assert made.gasket.stiffness_x.force == pytest.approx((-100.0, 0.0, 100.0))
-    found = solution([0.0] * 4, [1.0], np.zeros((1, 4)))
-    found = replace(found, parameter_map=parameter_map, point=parameter_map.expected)
+    found = solution([0.0] * 4, [1.0], np.zeros((1, 4)), unknowns=parameter_map.unknowns)
+    found = replace(found, parameter_map=parameter_map)
     text = solved_machine(found).sources["gasket.stiffness_x.force"]
     assert text.startswith("fit: hardening 20 ± 20 N (expected 20 ± 20 N); assumption: ")
     assert text.endswith("slope 3 N/mm (data sheet)")
@@ -527,7 +532,9 @@ def test_slack_springs_are_residuals(short, tmp_path):
     limits = "spring_elongation: {at_least: '(100, 2) mm', source: test}\n"
     parameter_map = parameter_map_of(short, free_file(tmp_path, limits + FREE))
     points = parameter_map.expected[None]
-    elongation = Evaluation(short, parameter_map, one_case(short))(points).elongation
+    elongation = Evaluation(Experiment(short, ()), parameter_map, one_case(short))(
+        points
+    ).elongation
     assert ((elongation > -0.02) & (elongation < 0.05)).all()
     residuals = known_residuals(short, parameter_map, points)
     assert residuals == pytest.approx((0.1 - elongation) / 0.002)

@@ -18,6 +18,7 @@ from wm_drake.studies.calibrate.response_targets import (
     with_deviations,
 )
 from wm_drake.studies.calibrate.targets import targets_of
+from wm_drake.studies.experiment import Experiment
 
 HEAD = "load,gasket,source,of,Fx [N],My [N*mm]\n"
 ROWS = "middle,yes,test,machine,50,4000\ncounter,yes,test,machine,30,2000\n"
@@ -76,7 +77,7 @@ def test_a_wrong_file_is_refused(short, tmp_path, text, message):
 
 def test_a_response_of_the_machine_is_that_of_a_run(short, tmp_path):
     targets = response_targets_of(short.parameters, named(short, tmp_path, HEAD + ROWS))
-    computed = ComputedResponses(short, targets)([short.parameters])[0]
+    computed = ComputedResponses(Experiment(short, ()), targets)([short.parameters])[0]
     p = short.parameters
     cases = [Case(load, p.loads[load], p.profile, True) for load in ("middle", "counter")]
     table = simulate_many(short, cases, measures=("extremes",))
@@ -191,7 +192,7 @@ def test_an_evaluation_has_amplitudes_and_responses(short, tmp_path):
         " sets: damper_types.friction.friction_force}}\n"
     )
     ratios = parameter_map_of(short, load_free(path))
-    values = Evaluation(short, ratios, targets)(np.array([[30.0], [50.0]]))
+    values = Evaluation(Experiment(short, ()), ratios, targets)(np.array([[30.0], [50.0]]))
     assert values.amplitude.shape == (2, 6, 6)
     assert values.responses.shape == (2, 4)
     assert np.isfinite(values.responses).all()

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from linear_fits import fit_at
 
 from wm_drake.parameters.free import load_free
 from wm_drake.studies.calibrate.page import certainty
@@ -19,7 +20,6 @@ from wm_drake.studies.calibrate.results import (
 from wm_drake.studies.calibrate.solutions import Solution
 from wm_drake.studies.calibrate.study import Calibration, SearchPlan
 from wm_drake.studies.calibrate.targets import Targets
-from wm_drake.studies.fitting.posterior import Posterior
 
 FREE = """
 quantities:
@@ -44,11 +44,12 @@ def calibration(machine, tmp_path_factory):
     slopes = np.zeros((18, 3))
     slopes[:2] = [[10.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
     coordinates = (point - parameter_map.expected) / parameter_map.deviation
-    at, none = Posterior(coordinates, slopes, 18, parameter_map.unknowns), np.empty(0)
-    best = Solution(parameter_map, targets, 0, point, computed, none, 20.0, 2.0, at, 123)
-    mirrored = replace(at, coordinates=-coordinates)
-    other = replace(best, start=1, data_cost=21.0, posterior=mirrored, evaluations=77)
-    bad = replace(best, start=2, amplitude=2.0 * computed, data_cost=2000.0, evaluations=55)
+    at, mirrored = (
+        fit_at(sign * coordinates, slopes, parameter_map.unknowns) for sign in (1.0, -1.0)
+    )
+    best = Solution(parameter_map, targets, 0, at, computed, np.empty(0), 20.0, 2.0)
+    other = replace(best, start=1, data_cost=21.0, fit=mirrored)
+    bad = replace(best, start=2, amplitude=2.0 * computed, data_cost=2000.0)
     return Calibration(
         parameter_map, targets, SearchPlan(starts=3), (best, other), (best, other, bad)
     )

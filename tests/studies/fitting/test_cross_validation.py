@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wm_drake.studies.fitting.assessment import left_out_errors
+from wm_drake.studies.fitting.left_out import left_out_errors
 from wm_drake.studies.fitting.methods import identify
 from wm_drake.studies.fitting.problem import FitProblem, Measurement, Unknown
 

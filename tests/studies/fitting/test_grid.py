@@ -4,25 +4,16 @@ import numpy as np
 import pytest
 
 from wm_drake.studies.fitting.grid import grid_search
-from wm_drake.studies.fitting.problem import CostProblem, Residuals, Unknown
+from wm_drake.studies.fitting.problem import FAILED, FitProblem, Measurement, Unknown
 
 LOWER, UPPER = np.array([0.0, -1.0]), np.array([4.0, 7.0])
 
 
-class FunctionProblem(CostProblem):
-    """A problem whose cost at a point (2,) is that of a function."""
-
+def problem_of(cost):
+    """Return a problem whose cost at a point (2,) is that of a function, >= 0."""
     unknowns = tuple(Unknown(name, *ends) for name, *ends in zip("xy", LOWER, UPPER, strict=True))
-
-    def __init__(self, cost):
-        self.cost = cost
-
-    def evaluated(self, coordinates):
-        values = np.array([[self.cost(point)] for point in self.points_at(coordinates)])
-        return Residuals(values, values)
-
-    def costs_of(self, rows):
-        return np.where(np.isnan(rows[:, 0]), np.inf, rows[:, 0])
+    data = Measurement("cost", np.zeros(1))
+    return FitProblem(unknowns, (data,), lambda points: np.array([[cost(x)] for x in points]))
 
 
 def bowl(best):
@@ -31,7 +22,7 @@ def bowl(best):
         return np.sum(((point - best) / (UPPER - LOWER)) ** 2)
 
     evaluated = []
-    return FunctionProblem(cost), evaluated
+    return problem_of(cost), evaluated
 
 
 @pytest.mark.parametrize("best", [(1.3, 2.9), (0.0, -1.0), (3.99, 0.1), (2.0, 3.0)])
@@ -72,7 +63,7 @@ def valley(best, angle, ratio, noise=0.0):
             np.sqrt((w * d @ along / ratio) ** 2 + (d @ across) ** 2 + noise**2) for w in (1, 3)
         )
 
-    return FunctionProblem(cost)
+    return problem_of(cost)
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.05])
@@ -99,12 +90,12 @@ def test_each_grid_finds_a_better_point_or_is_halved():
 
 
 def test_points_that_diverge_are_not_a_minimum():
-    partly = FunctionProblem(lambda point: np.nan if point[0] < 1.0 else point @ point)
+    partly = problem_of(lambda point: np.nan if point[0] < 1.0 else point @ point)
     end, _ = grid_search(partly, 1e-3)
     assert partly.points_at(end.point) == pytest.approx([1.0, 0.0], abs=0.01)
 
 
 def test_search_ends_where_every_point_diverges():
-    end, rounds = grid_search(FunctionProblem(lambda point: np.nan), 0.05)
-    assert end.cost == np.inf
+    end, rounds = grid_search(problem_of(lambda point: np.nan), 0.05)
+    assert end.cost == FAILED
     assert rounds[-1].spacing <= 0.05

@@ -265,24 +265,26 @@ def test_correlated_samples_claim_less():
     noise = np.convolve(rng.normal(size=2040), np.ones(40) / 40.0, "valid")[:2000]
     values = 3.0 + noise
     widths = {}
-    for correlated in (False, True):
+    for errors in ("alike", "correlated"):
         problem = FitProblem(
             (Unknown("mean", 0.0, 10.0),),
-            (Measurement("m", values, correlated=correlated),),
+            (Measurement("m", values, errors=errors),),
             lambda x: np.repeat(x, 2000, 1),
         )
         fit = identify(problem)
-        widths[correlated] = fit["mean"].upper - fit["mean"].lower
-    assert 4.0 < widths[True] / widths[False] < 9.0  # root of 40 samples that move together
+        widths[errors] = fit["mean"].upper - fit["mean"].lower
+    assert (
+        4.0 < widths["correlated"] / widths["alike"] < 9.0
+    )  # root of 40 samples that move together
 
 
-def coverage_of_line(heteroscedastic, repeats=300):
+def coverage_of_line(errors, repeats=300):
     """Return how often the interval of a slope holds it, with an error of 2 % of each value."""
     x = np.geomspace(0.02, 2.0, 60)  # a few large values, which determine the slope
     rng, hits = np.random.default_rng(8), 0
     for _ in range(repeats):
         values = 1.5 * x * (1.0 + 0.02 * rng.standard_normal(x.size))
-        test = Measurement("line", values, heteroscedastic=heteroscedastic)
+        test = Measurement("line", values, errors=errors)
         problem = FitProblem((Unknown("slope", 1.0, 2.0),), (test,), lambda points: points * x)
         slope = float(values @ x / (x @ x))
         fit = assess(problem, problem.coordinates_of(np.array([slope])), SearchLog("by hand"))
@@ -291,8 +293,8 @@ def coverage_of_line(heteroscedastic, repeats=300):
 
 
 def test_errors_that_grow_with_the_values_widen_the_interval_so_that_it_holds():
-    assert 0.92 < coverage_of_line(heteroscedastic=True) < 0.98
-    assert coverage_of_line(heteroscedastic=False) < 0.85
+    assert 0.92 < coverage_of_line("each") < 0.98
+    assert coverage_of_line("alike") < 0.85
 
 
 def test_correlation_time_of_white_noise_is_one():

@@ -3,9 +3,15 @@
 import numpy as np
 import pytest
 
-from wm_drake.studies.fitting.problem import PriorProblem, Residuals, Unknown
+from wm_drake.studies.fitting.problem import (
+    KINKED,
+    FitProblem,
+    Measurement,
+    ModelValues,
+    Unknown,
+)
 from wm_drake.studies.fitting.search import Search, descended
-from wm_drake.studies.fitting.starts import start_number
+from wm_drake.studies.fitting.starts import starts_of
 
 TRUTH = np.array([0.8, -0.5, 0.3])
 
@@ -23,14 +29,15 @@ def searched(residuals=curved, bound=3.0, size=3, smooth=None, report=lambda *_:
     unknowns = tuple(
         Unknown(f"x{k}", -bound, bound, start=0.0, prior=(0.0, 1.0)) for k in range(size)
     )
-    evaluate = lambda points: Residuals(residuals(points), (smooth or residuals)(points))  # noqa: E731
-    return Search(PriorProblem(unknowns, evaluate), report)
+    evaluate = lambda points: ModelValues(residuals(points), (smooth or residuals)(points))  # noqa: E731
+    data = Measurement("m", np.zeros(residuals(np.zeros((1, size))).shape[1]), errors="known")
+    return Search(FitProblem(unknowns, (data,), evaluate, KINKED), report)
 
 
 def test_known_point_is_end_from_a_distant_start():
     end = descended(searched(), np.array([-2.0, 2.0, -2.0]), 50)
     assert end.point == pytest.approx(TRUTH, abs=1e-3)
-    assert end.cost == pytest.approx(0.5 * np.sum(TRUTH**2), rel=1e-2)
+    assert end.cost == pytest.approx(np.sqrt(np.sum(TRUTH**2) / 6.0), rel=1e-2)
 
 
 def test_prior_determines_a_quantity_without_data():
@@ -69,10 +76,10 @@ def test_search_avoids_points_without_a_machine():
 
 
 def test_starts_are_the_expected_point_and_points_that_the_seed_determines():
-    starts = [start_number(searched(), number, 5) for number in range(4)]
+    starts = list(starts_of(searched(), 5, 4, 24))
     assert not starts[0].any()
-    assert np.array_equal(starts[2], start_number(searched(), 2, 5))
-    assert not np.array_equal(starts[2], start_number(searched(), 2, 6))
+    assert np.array_equal(starts[2], list(starts_of(searched(), 5, 3, 24))[2])
+    assert not np.array_equal(starts[2], list(starts_of(searched(), 6, 3, 24))[2])
     assert len({tuple(start) for start in starts}) == 4
 
 

@@ -3,13 +3,7 @@
 import numpy as np
 import pytest
 
-from wm_drake.studies.fitting.problem import (
-    FitProblem,
-    Measurement,
-    PriorProblem,
-    Residuals,
-    Unknown,
-)
+from wm_drake.studies.fitting.problem import FAILED, FitProblem, Measurement, Unknown
 
 PLAIN = (
     Unknown("a", -1.0, 3.0, start=0.5),
@@ -25,13 +19,9 @@ def model(points):
     return np.stack([a, b, c, a + b * c], axis=1)
 
 
-def differences(points):
-    return model(points) - TARGET
-
-
 PROBLEMS = {
     "least squares": FitProblem(PLAIN, (Measurement("m", TARGET),), model),
-    "priors": PriorProblem(WITH_PRIORS, lambda points: Residuals(*(differences(points),) * 2)),
+    "priors": FitProblem(WITH_PRIORS, (Measurement("m", TARGET, errors="known"),), model),
 }
 
 
@@ -65,21 +55,23 @@ def test_a_restricted_problem_is_the_whole_one_with_the_others_held(problem, fre
     moved = np.random.default_rng(2).uniform(0.1, 0.3, (4, len(free)))
     whole = np.tile(held, (4, 1))
     whole[:, free] = moved
-    assert np.array_equal(part.residuals(moved), problem.residuals(whole))
+    assert part.residuals(moved) == pytest.approx(problem.residuals(whole), rel=1e-12)
     assert [unknown.name for unknown in part.unknowns] == [problem.unknowns[k].name for k in free]
     assert np.array_equal(part.upper, problem.upper[free])
 
 
-def test_costs_are_those_of_the_definitions():
+def test_costs_are_root_mean_squares_with_the_distances_from_expected_values():
     point = np.array([[0.3, 0.6, 0.2]])
-    for name, cost in {
-        "least squares": lambda r: np.sqrt(np.mean(r**2)),
-        "priors": lambda r: 0.5 * (np.sum(r**2) + np.sum(point**2)),
-    }.items():
-        residuals = PROBLEMS[name].residuals(point)
-        assert PROBLEMS[name].costs(residuals, point)[0] == pytest.approx(cost(residuals[0]))
+    for name, problem in PROBLEMS.items():
+        rows = problem.residuals(point)[0]
+        if name == "priors":
+            rows = np.concatenate([rows, point[0]])
+        cost = problem.costs_of(problem.evaluated(point).exact)[0]
+        assert cost == pytest.approx(np.sqrt(np.mean(rows**2)))
 
 
-def test_a_model_that_fails_costs_infinitely_much():
-    residuals = np.array([[1.0, np.nan, 0.0, 0.0]])
-    assert PROBLEMS["priors"].costs(residuals, np.zeros((1, 3)))[0] == np.inf
+def test_a_model_that_fails_costs_more_than_any_other_and_has_no_slope():
+    problem = FitProblem(PLAIN, (Measurement("m", TARGET),), lambda x: np.full((len(x), 4), np.nan))
+    rows = problem.evaluated(np.full((1, 3), 0.5))
+    assert problem.costs_of(rows.exact)[0] == FAILED * TARGET.max()
+    assert np.isnan(rows.smooth).all()

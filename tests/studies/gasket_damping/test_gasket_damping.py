@@ -83,7 +83,7 @@ def distance(short_problem, records):
 
     def at(points):
         coordinates = problem.coordinates_of(np.array(points))
-        return 1e3 * problem.costs(problem.residuals(coordinates), coordinates)
+        return 1e3 * problem.costs_of(problem.residuals(coordinates))
 
     return at
 
@@ -97,11 +97,11 @@ def test_distance_is_the_sum_over_the_loads_of_norms_over_both_envelopes():
     )  # fmt: skip
     here = np.zeros((1, 1))
     norms = np.sqrt(2.0) * (5.0 + 1.0)
-    assert problem.costs(problem.residuals(here), here)[0] == pytest.approx(norms)
+    assert problem.costs_of(problem.residuals(here))[0] == pytest.approx(norms)
     failed = DistanceProblem(
         problem.unknowns, problem.measurements, lambda points: np.full((len(points), 6), np.nan)
     )
-    assert failed.costs(failed.residuals(here), here)[0] == np.inf
+    assert failed.costs_of(failed.residuals(here))[0] == np.inf
 
 
 def test_distance_is_zero_at_the_true_damping_and_grows_away_from_it(distance):

@@ -7,21 +7,26 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+from lab_writers import write_mdf
 from made_up_runs import made_up
 
 from wm_drake.errors import InputError
-from wm_drake.parameters import SpinProfile, load_machine, with_value
+from wm_drake.model.build import build_machine
+from wm_drake.parameters import SpinProfile, load_machine, load_profile, with_value
+from wm_drake.parameters.recorded_sensors import recorded_test_of
 from wm_drake.parameters.spin import Region
 from wm_drake.parameters.unbalance_cases import load_unbalance_cases
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.recorded_signal import recorded_signal
+from wm_drake.simulation.runs import simulate
+from wm_drake.studies.fitting.sought import at_point, sought_of
 from wm_drake.studies.spin_cycle.study import labels_of
 from wm_drake.studies.spin_identify.page import warnings_of
 from wm_drake.studies.spin_identify.study import (
     SpinModel,
-    at_point,
     identified_machine,
     identify_from_spin,
     planted_values,
-    sought_of,
     virtual_experiment,
 )
 
@@ -203,3 +208,48 @@ def test_command_recovers_the_true_numbers(identify):
     for entry, other in zip(told["parameters"], shown["parameters"], strict=True):
         assert "planted" not in entry
         assert entry["value"] == pytest.approx(other["value"], rel=1e-3)
+
+
+CYCLE = """time: (0, 16) s
+speed: (80, 300) rpm
+regions: [{name: A, begin: 2 s, end: 6 s}, {name: B, begin: 6 s, end: 10 s}, {name: C, begin: 10 s, end: 14 s}]
+"""
+
+
+@pytest.mark.slow
+def test_a_recorded_case_gives_the_planted_number(wm_drake):
+    Path("p.yaml").write_text(CYCLE)
+    Path("linear.yaml").write_text(LINEAR)
+    parameters = load_machine("linear.yaml")
+    machine = build_machine(with_value(parameters, "gasket.stiffness_y", 4800.0))
+    load = next(case for case in load_unbalance_cases() if case.name == "2").load(parameters)
+    record = simulate(machine, Case("2", load, load_profile("p.yaml")))
+    points = machine.set_up().accelerometer_points
+    channels = {
+        name: (recorded_signal(record, sensor, points[name[:2]]), "m/s^2")
+        for name, sensor in recorded_test_of(parameters).sensors.items()
+        if name[:2] in points
+    }
+    write_mdf(Path("run_2.mf4"), record.time.values, channels)
+    words = [
+        "study",
+        "spin-identify",
+        "--machine",
+        "linear.yaml",
+        "--profile",
+        "p.yaml",
+        "--out",
+        "out",
+        "--json",
+    ]
+    sought = ("--unknown", "gasket.stiffness_y=(3, 6) N/mm")
+    ended = wm_drake(*words, "--record", "2=run_2.mf4", *sought)
+    assert ended.code == 0, ended.err
+    estimate = json.loads(ended.out)["estimates"][0]
+    assert estimate["value"] == pytest.approx(4.8, rel=0.03)
+    assert load_machine("out/identified.yaml").gasket.stiffness_y == pytest.approx(
+        1e3 * estimate["value"], rel=1e-3
+    )
+    other = wm_drake(*words, "--record", "9q=run_2.mf4", *sought, "--overwrite")
+    assert other.code == 2
+    assert "--record: unknown case '9q'" in other.err

@@ -97,11 +97,11 @@ def test_split_laundry_is_two_lumps(machine):
 
 
 def test_shipped_files_fit_the_reference_machine(machine):
-    for name in TOLERANCES.listed():
+    for name in set(TOLERANCES.listed()) - {"unmeasured"}:
         found = uncertain(machine, load_tolerances(name).model_dump())
         assert all(variable.source for variable in found.variables)
         found.check(lambda case: None)
-    assert len(found.variables) == 12
+        assert name != "laundry_and_parts" or len(found.variables) == 12
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import numpy as np
 from wm_drake.compiler.lane_memory import aligned, fill_lanes
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.engines.compiled.integration import derivative_lanes
-from wm_drake.engines.compiled.packing import pack
+from wm_drake.engines.compiled.water import pack_run
 from wm_drake.model.machine import Setup
 from wm_drake.parameters.types import FloatArray
 
@@ -25,7 +25,7 @@ class StateDerivative:
         Raises:
             InputError: the machine has something that the compiled engine does not represent.
         """
-        packed, self.layout = pack(setup)
+        packed, self.layout, _ = pack_run(setup)
         self._elements = self.layout.elements
         self._p = fill_lanes(aligned(len(packed) * WIDTH), [packed])
 

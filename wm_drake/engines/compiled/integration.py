@@ -21,6 +21,7 @@ from wm_drake.engines.compiled.mechanics import (
 )
 from wm_drake.engines.compiled.multistep import PAST_INPUTS, PAST_RATES, multistep_step, remember
 from wm_drake.engines.compiled.rubber import follow_paths, write_paths
+from wm_drake.engines.compiled.water import hold_masses
 
 Work = namedtuple("Work", ("rate", "inputs", "stage", "total", "past_rates", "past_inputs"))
 """Arrays to work in. The past of a step with one derivative must stay from call to call."""
@@ -62,6 +63,7 @@ def integrate_lanes(steps, begin, end, p, elements, x, work, history):
     zero, begins = 0.0 * state[0], elements.begins
     for i in range(begin, end):
         sample_controller(state, drum[2 * i, 0], controls[i], numbers, elements.motor, begins.motor)
+        hold_masses(numbers, state, begins.water, elements.water)
         masses = mass_properties(numbers, zero + drum[2 * i, 1], zero + drum[2 * i, 2])
         speed, speed_rate = zero + drum[2 * i, 0], zero + acceleration[i]
         state_derivative(state, rate, inputs, masses, speed, speed_rate, numbers, elements)
@@ -134,6 +136,7 @@ def derivative_lanes(x, dx, inputs, reference, acceleration, p, elements):
     """
     align_stack()
     state, numbers = lane_array(x), lane_array(p)
+    hold_masses(numbers, state, elements.begins.water, elements.water)
     sine, cosine = sine_cosine(state[DRUM_ANGLE])
     masses, zero = mass_properties(numbers, cosine, sine), 0.0 * state[0]
     state_derivative(

@@ -46,6 +46,7 @@ from wm_drake.elements.mount import add_others, torque_on_drum
 from wm_drake.elements.rubber import bushing_wrench
 from wm_drake.elements.spring import spring_strut_wrench
 from wm_drake.elements.state_map import RATES_SIZE
+from wm_drake.elements.water import write_water_rates
 from wm_drake.engines.compiled.bearing import (
     carrier_motion,
     read_tub_and_bearing,
@@ -100,13 +101,13 @@ assert RATES.fixed_size == RATES_SIZE
 read_first_harmonic, read_second_harmonic = FIRST_HARMONIC.read, SECOND_HARMONIC.read
 read_bodies, read_rates, write_rates_of = BODIES.read, RATES.read, RATES.write
 
-Elements = namedtuple("Elements", ("mounts", "begins", "tubes", "bearing", "motor", "cabinet"))
+Elements = namedtuple("Elements", "mounts begins tubes bearing motor cabinet water")
 """Indices at which the parts of a machine begin in the packed numbers.
 
 mounts: `Mounts`; begins: `Begins`, indices in the state; tubes: array of indices of the bodies of
 telescopic dampers (`TUBES`), None if there are none; bearing: index of the drum's bearing, None if
 it is rigid; motor: index of the motor, None if the speed of the drum is prescribed; cabinet: index
-of the cabinet, None if it is fixed.
+of the cabinet, None if it is fixed; water: `Water`, None for a load that stays.
 """
 
 MassProperties = namedtuple(
@@ -262,6 +263,7 @@ def state_derivative(x, dx, inputs, masses, rate, acceleration, p, elements):
     gravity = read_bodies(p, 0).gravity
     total = add_telescopic_dampers(x, dx, motion, gravity, p, elements.tubes, mounts, total)
     total = add_others(x, dx, motion, p, mounts.others, total)
+    write_water_rates(x, dx, rate, p, elements.water, begins.water)
     wrench_input = begins.wrench_input
     total = with_cabinet(x, dx, inputs, wrench_input, in_world, total, gravity, p, cabinet, first)
     bodies = in_world, masses, rate, acceleration, total, p

@@ -36,6 +36,7 @@ from wm_drake.engines.compiled.mechanics import (
     state_derivative,
     write_sample,
 )
+from wm_drake.engines.compiled.water import hold_masses
 
 BODY, TUBES = 6, 7
 """Degrees of freedom of a floating body, and of the tubes of a damper."""
@@ -77,6 +78,7 @@ def integrate_midpoint_lanes(steps, begin, end, p, elements, relaxation, x, work
     length, acceleration, drum, row = steps
     zero = 0.0 * state[0]
     for i in range(begin, end):
+        hold_masses(numbers, state, elements.begins.water, elements.water)
         if row[i] >= 0 or i == 0:
             masses = mass_properties(numbers, zero + drum[2 * i, 1], zero + drum[2 * i, 2])
             speed, speed_rate = zero + drum[2 * i, 0], zero + acceleration[i]

@@ -3,6 +3,7 @@
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
@@ -16,6 +17,7 @@ from wm_drake.elements.motor import motor_structure, packed_motor
 from wm_drake.elements.mount import Mounts, mounts_at
 from wm_drake.elements.state_map import CARRIER as CARRIER_STATES
 from wm_drake.elements.state_map import ELEMENT, PLACES, TUBES, StateMap
+from wm_drake.elements.water import Water
 from wm_drake.engines.compiled.bearing import TUB, TUB_AND_BEARING
 from wm_drake.engines.compiled.mechanics import (
     BODIES,
@@ -50,6 +52,7 @@ class Layout:
         structure: Number of each damper's law and number of points of every table, in order.
         states: Order of the states.
         others, kinds: Index and kind of each element of another package.
+        water: Indices of the wet masses of a load, as the fields of `Water`; None if it stays.
     """
 
     springs: tuple[int, ...]
@@ -67,6 +70,7 @@ class Layout:
     states: StateMap
     others: tuple[int, ...] = ()
     kinds: tuple[ElementKind, ...] = ()
+    water: tuple[tuple[int, ...], tuple[int, ...], int] | None = None
 
     @functools.cached_property
     def mounts(self) -> Mounts:
@@ -77,14 +81,18 @@ class Layout:
     def elements(self) -> Elements:
         """Return the indices in the form that compiled functions use.
 
-        Without telescopic dampers, a compliant bearing or a motor their index is None, and the
-        functions are compiled without them.
+        Without telescopic dampers, a compliant bearing, a motor or wet masses their index is None,
+        and the functions are compiled without them.
         """
         tubes = np.array(self.tubes, dtype=np.int64) if self.tubes else None
         bearing, motor, cabinet = (
             at if at >= 0 else None for at in (self.bearing, self.motor, self.cabinet)
         )
-        return Elements(self.mounts, self.states.begins, tubes, bearing, motor, cabinet)
+        water = None
+        if self.water is not None:
+            draining, masses, dry = self.water
+            water = Water(np.array(draining), np.array(masses), dry)
+        return Elements(self.mounts, self.states.begins, tubes, bearing, motor, cabinet, water)
 
 
 def pack(setup: Setup) -> tuple[FloatArray, Layout]:
@@ -96,13 +104,19 @@ def pack(setup: Setup) -> tuple[FloatArray, Layout]:
         InputError: the machine has something that the compiled engine does not represent.
     """
     elements, layout = pack_elements(setup)
-    bodies = pack_bodies(setup.machine.plant, setup.plant_context, setup.parameters.drive.joint)
-    return np.concatenate([bodies, elements]), layout
+    return np.concatenate([drawn_bodies(setup).packed(), elements]), layout
+
+
+def drawn_bodies(setup: Setup) -> "DrawnBodies":
+    """Return the bodies of a machine as it is set up, with its load."""
+    drive = setup.parameters.drive
+    return DrawnBodies(setup.machine.plant, setup.plant_context, drive.joint)
 
 
 def pack_elements(setup: Setup) -> tuple[FloatArray, Layout]:
     """Return the packed numbers behind the bodies, which no load changes, and the layout of all."""
-    on_tub, indices = setup.elements.packed_on_tub(BODIES_SIZE)
+    on_tub, begins = setup.elements.packed_on_tub(BODIES_SIZE)
+    indices: dict[str, Any] = dict(begins)
     parts, structure = [on_tub], list(setup.elements.structure_on_tub)
     size = BODIES_SIZE + len(on_tub)
 
@@ -227,11 +241,6 @@ def pack_rigid(setup: Setup, name: str) -> FloatArray:
     q, moment, six = 1.0 / inertia.get_mass(), _moment(inertia), _six(_matrix(inertia))
     central = about_centre(tuple(six), tuple(moment), q)
     return TUB.pack(inverse_mass=q, moment=moment, inertia=six, inverse_inertia=inverse(central))
-
-
-def pack_bodies(plant: MultibodyPlant, context: Context, drive: str) -> FloatArray:
-    """Return the packed bodies (`BODIES`) of a plant Context with its load; see `DrawnBodies`."""
-    return DrawnBodies(plant, context, drive).packed()
 
 
 class DrawnBodies:

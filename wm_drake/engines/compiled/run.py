@@ -9,9 +9,10 @@ from wm_drake.compiler.lane_memory import aligned, fill_lanes
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.engines.compiled.integration import integrate_lanes, work_arrays
 from wm_drake.engines.compiled.midpoint import integrate_midpoint_lanes, midpoint_work
-from wm_drake.engines.compiled.packing import Layout, initial_state, pack
+from wm_drake.engines.compiled.packing import Layout, initial_state
 from wm_drake.engines.compiled.samples import trajectory_of
 from wm_drake.engines.compiled.stepping import Stepping
+from wm_drake.engines.compiled.water import pack_run
 from wm_drake.engines.memory import check_size
 from wm_drake.engines.schedule import Schedule, schedule_of
 from wm_drake.engines.trajectory import Trajectory, diverging_coordinate
@@ -72,8 +73,8 @@ def run_compiled(
     """
     period = period or profile.sample_period(setup.parameters.output_period)
     check_size(profile, step, period)
-    p, layout = pack(setup)
-    begin = initial_state(setup, profile)
+    p, layout, water = pack_run(setup)
+    begin = np.concatenate([initial_state(setup, profile), water])
     schedule = schedule_of(profile, step, period, layout.control_period)
     rows, size = len(schedule.time), len(begin) + layout.states.begins.rates
     relaxed = None
@@ -108,7 +109,7 @@ def integrate_runs(
     Yields:
         The fraction done, after each `PAUSE_STEPS` steps.
     """
-    advance = _advance(schedule, one_derivative, layout, lanes)
+    advance = advance_of(schedule, one_derivative, layout, lanes)
     by_sample = lanes.samples.reshape(len(schedule.time), -1, WIDTH)
     done, steps, last, diverged = 0, len(schedule.step), 0, False
     while done < steps and not diverged:
@@ -120,7 +121,7 @@ def integrate_runs(
     by_sample[last + 1 :] = float("nan")
 
 
-def _advance(
+def advance_of(
     schedule: Schedule, one_derivative: np.ndarray, layout: Layout, lanes: RunLanes
 ) -> Callable[[int, int], None]:
     """Return the function that integrates from one number of a step to another.

@@ -8,7 +8,7 @@ from wm_drake.compiler.lanes import WIDTH, align_stack, keep, lane_array
 from wm_drake.elements.cabinet import motion_with, rates_with
 from wm_drake.elements.motion import BODY_STATE_SIZE, POSE, tub_motion
 from wm_drake.elements.mount import torque_on_drum
-from wm_drake.elements.state_map import CARRIER, ELEMENT, RATES_SIZE, STRETCHES, TUB
+from wm_drake.elements.state_map import CARRIER, ELEMENT, RATES_SIZE, STRETCHES, TUB, WATER
 from wm_drake.engines.cabinet_frame import seen_from_cabinet
 from wm_drake.engines.compiled.bearing import carrier_motion
 from wm_drake.engines.compiled.drum import motor_torque_history
@@ -21,6 +21,7 @@ from wm_drake.engines.compiled.mechanics import (
     read_rates,
 )
 from wm_drake.engines.compiled.packing import Layout
+from wm_drake.engines.compiled.water import hold_masses
 from wm_drake.engines.schedule import Schedule
 from wm_drake.engines.trajectory import Trajectory, cut_at_divergence
 from wm_drake.parameters.types import FloatArray
@@ -55,7 +56,9 @@ def trajectory_of(
         torque = torque_of_motor(states, schedule, p, layout)
     else:
         drum_acceleration = schedule.acceleration[schedule.row >= 0, None]
-        torque_history(turning, of_carrier, drum_acceleration, p, moving, torque)
+        left = np.ascontiguousarray(layout.states.take(states, WATER))
+        motions = turning, of_carrier, drum_acceleration, left
+        torque_history(*motions, p, moving, layout.elements.water, torque)
         if any(kind.on_drum for kind in layout.kinds):
             subtract_torque_of_elements(states, p, layout.mounts.others, torque)
     trajectory = Trajectory(
@@ -69,6 +72,7 @@ def trajectory_of(
         stretches,
         cabinet=cabinet,
         element_states=layout.states.take(states, ELEMENT) if layout.kinds else None,
+        water=layout.states.take(states, WATER) if layout.water else None,
     )
     return cut_at_divergence(trajectory)
 
@@ -135,7 +139,7 @@ def subtract_torque_of_elements(states, p, others, torque):
 
 
 @long_running
-def torque_history(motions, rates, acceleration, p, cabinet, torque):
+def torque_history(motions, rates, acceleration, left, p, cabinet, water, torque):
     """Evaluate the torque of the motor on the drum at samples.
 
     Args:
@@ -144,9 +148,11 @@ def torque_history(motions, rates, acceleration, p, cabinet, torque):
         rates: (n, 6) angular acceleration and acceleration of the origin of that body, in W.
             [rad/s^2, m/s^2]
         acceleration: (n, 1) acceleration of the drum. [rad/s^2]
+        left: (n, wet) share of water that is left in each wet mass.
         p: Packed numbers of the bodies.
         cabinet: (n, 18) motion and accelerations of the cabinet in W, if motions and rates are seen
             from it; None if they are in W.
+        water: `Water`; None for a load that stays.
         torque: (n, 1), written. [N m]
     """
     align_stack()
@@ -156,10 +162,14 @@ def torque_history(motions, rates, acceleration, p, cabinet, torque):
     answer, q = lane_array(numbers), lane_array(p_numbers)
     cabinet_numbers = np.empty((BODY_STATE_SIZE + RATES_SIZE) * WIDTH)
     c = lane_array(cabinet_numbers)
+    left_numbers = np.empty(max(left.shape[1], 1) * WIDTH)
+    of_water = lane_array(left_numbers)
     for begin in range(0, len(torque), WIDTH):
         rows_to_lanes(motions, begin, x_numbers)
         rows_to_lanes(rates, begin, rates_numbers)
         rows_to_lanes(acceleration, begin, drum_numbers)
+        rows_to_lanes(left, begin, left_numbers)
+        hold_masses(q, of_water, 0, water)
         sine, cosine = sine_cosine(x[DRUM_ANGLE])
         masses, rate, motion = mass_properties(q, cosine, sine), read_rates(dx, 0), tub_motion(x)
         w_rate, v_rate = rate.angular_acceleration, rate.acceleration

@@ -13,6 +13,7 @@ export class Studies {
     byId('study').replaceChildren(...Object.keys(forms).map((name) => make('option', {value: name}, name)));
     byId('study').addEventListener('change', () => this.choose());
     byId('start').addEventListener('click', () => this.start());
+    byId('ask-next').addEventListener('click', () => this.askNext());
     this.choose();
     this.update();
   }
@@ -29,6 +30,19 @@ export class Studies {
       if (text) options[input.dataset.option] = text;
     }
     await this.act(() => post('studies', {state: this.state(), study: byId('study').value, options}));
+  }
+
+  /** Start the study of what to measure next with few samples; its answer stands beside the sliders. */
+  async askNext() {
+    await this.act(() => post('studies', {state: this.state(), study: 'next', options: {quick: 'true'}}));
+  }
+
+  /** Show the answer of the latest study of what to measure next, or that it runs. */
+  showNext(studies) {
+    const latest = studies.find(({study}) => study === 'next');
+    const path = latest && `reports/${latest.id}/report.html`;
+    byId('next').replaceChildren(...(!latest ? [] : isUnderWay(latest) ? [`${latest.state} …`]
+      : [`${latest.answer || latest.state} `, latest.report ? make('a', {href: path, target: '_blank', rel: 'noopener'}, latest.id) : '']));
   }
 
   async act(request) {
@@ -51,6 +65,7 @@ export class Studies {
       return;
     }
     byId('studies').replaceChildren(...studies.map((study) => this.row(study)));
+    this.showNext(studies);
     if (studies.some(isUnderWay)) this.timer = setTimeout(() => this.update(), PERIOD);
   }
 
@@ -66,6 +81,7 @@ export class Studies {
       study.state === 'not finished' ? make('button', {onclick: () => this.act(() => post(`${path}/resume`, {}))}, 'continue') : null,
       study.report ? make('a', {href: `reports/${study.id}/report.html`, target: '_blank', rel: 'noopener'}, 'report') : null,
       make('div', {}, make('code', {}, study.command)),
+      study.answer ? make('p', {}, study.answer) : null,
       study.output ? make('pre', {}, study.output.trim()) : null);
   }
 }

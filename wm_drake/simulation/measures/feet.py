@@ -1,5 +1,6 @@
 """Loads of the feet, and margins against lift-off, sliding, turning and tilting of the cabinet."""
 
+from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.units import Unit
 from wm_drake.simulation.feet import BY_FOOT, MARGINS
 from wm_drake.simulation.measures.kind import Evaluate, Measure, Variable, each_run
@@ -42,6 +43,10 @@ def _evaluate(names: tuple[str, ...]) -> Evaluate:
     return each_run(lambda run: [run.foot_measures[name] for name in names])
 
 
+def _has_cabinet(machine: MachineParameters) -> bool:
+    return machine.cabinet is not None
+
+
 FEET = Measure(
     "feet",
     (
@@ -74,6 +79,7 @@ FEET = Measure(
     _evaluate((*BY_FOOT, *MARGINS)),
     ("feet",),
     has_table=False,
+    applies=_has_cabinet,
 )
 
 IN_REGIONS = Measure(
@@ -93,4 +99,5 @@ IN_REGIONS = Measure(
     _evaluate(tuple(f"region_{name}" for name in MARGINS)),
     ("feet",),
     has_table=False,
+    applies=_has_cabinet,
 )

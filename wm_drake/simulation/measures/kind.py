@@ -7,6 +7,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
+from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.simulation.measures.run import Need, Run
@@ -97,6 +98,8 @@ class Measure:
         needs: What it reads of a run beyond time, drum and motor, names in
             `wm_drake.simulation.measures.run.Need`.
         has_table: Whether the page of `spin` has a table of it that is made from this declaration.
+        applies: Whether a machine has what it measures. Of others it has no responses, and pages
+            do not show it.
     """
 
     name: str
@@ -104,6 +107,7 @@ class Measure:
     evaluate: Evaluate
     needs: tuple[Need, ...] = ()
     has_table: bool = True
+    applies: Callable[[MachineParameters], bool] = lambda machine: True
 
     @property
     def names(self) -> tuple[str, ...]:

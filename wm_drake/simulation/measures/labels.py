@@ -6,6 +6,7 @@ from typing import TypeAlias
 from wm_drake.elements.bushing import AXES
 from wm_drake.parameters import MachineParameters, SpinProfile
 from wm_drake.simulation.mounts import mount_names
+from wm_drake.simulation.stops import stop_names
 
 Labels: TypeAlias = Callable[[MachineParameters, SpinProfile], Sequence[str]]
 
@@ -15,6 +16,7 @@ LABELS: dict[str, Labels] = {
     "accelerometer": lambda machine, profile: tuple(machine.accelerometer_frames()),
     "mount": lambda machine, profile: mount_names(machine),
     "spring": lambda machine, profile: tuple(machine.springs),
+    "stop": lambda machine, profile: stop_names(machine),
     "foot": lambda machine, profile: machine.cabinet.corners if machine.cabinet else (),
     "order": lambda machine, profile: ("cosine", "sine"),
     "region": lambda machine, profile: tuple(region.name for region in profile.regions),

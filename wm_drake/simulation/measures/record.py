@@ -21,7 +21,13 @@ from wm_drake.simulation.measures.run import FeetLoaded, Need, Run
 from wm_drake.simulation.mount_forces import speed_ranges
 from wm_drake.simulation.mount_histories import sum_mounts_history
 from wm_drake.simulation.mounts import sums_size
-from wm_drake.simulation.records import Record, cabinet_in, profile_of, sample_period
+from wm_drake.simulation.records import (
+    Record,
+    cabinet_in,
+    load_of_record,
+    profile_of,
+    sample_period,
+)
 from wm_drake.simulation.spring_tension import smallest_tensions
 from wm_drake.simulation.vibration import tub_motion_of
 
@@ -34,6 +40,7 @@ _VARIABLES: dict[Need, tuple[str, ...]] = {
     "mounts": ("mount_force", "cabinet_force", "cabinet_moment"),
     "feet": ("cabinet_force", "cabinet_moment"),
     "springs": ("spring_tension",),
+    "stops": ("stop_compression", "stop_closing_velocity"),
 }
 """Variables of a record that hold what a measure needs."""
 
@@ -205,7 +212,7 @@ class RecordedRun(Run):
     @functools.cached_property
     def labels(self) -> dict[str, list[str]]:
         """Return the labels along each dimension of a measure."""
-        dims = ("sensor", "spring", "mount", "accelerometer")
+        dims = ("sensor", "spring", "mount", "accelerometer", "stop")
         parts = speed_ranges(self.record, self.profile)
         return {
             "axis": list(AXES),
@@ -306,6 +313,16 @@ class RecordedRun(Run):
     @property
     def smallest_elongations(self) -> FloatArray:
         return np.full(self._values["spring_tension"].shape[1], np.nan)  # no record has lengths
+
+    @property
+    def approaches(self) -> tuple[FloatArray, FloatArray]:
+        return self._values["stop_compression"], self._values["stop_closing_velocity"]
+
+    @property
+    def mass_left(self) -> FloatArray:
+        if "mass_left" in self._values:
+            return np.asarray(self._values["mass_left"].sum(axis=1))
+        return np.full(len(self.time), load_of_record(self.record).mass)
 
 
 def wrenches_on_cabinet(record: Record) -> FloatArray:

@@ -1,5 +1,6 @@
 """All measures by name: those of this package, then those that users register."""
 
+from wm_drake.parameters import MachineParameters
 from wm_drake.registry import Registry
 from wm_drake.simulation.measures.kind import Measure, Variable
 
@@ -18,6 +19,8 @@ SHIPPED = (
     "mounts:CABINET",
     "springs:TENSIONS",
     "radial:RADIAL",
+    "stops:STOPS",
+    "water:WATER",
 )
 """Measures of this package: module of this folder, and name. Files of results have their order."""
 
@@ -27,9 +30,9 @@ MEASURES: Registry[Measure] = Registry(
 """Measures by name."""
 
 
-def tabulated() -> list[Variable]:
-    """Return the variables of every spin run that pages and terminal show by their declaration."""
-    shown = (measure for measure in MEASURES.values() if measure.has_table)
+def tabulated(parameters: MachineParameters) -> list[Variable]:
+    """Return the variables of a machine's spin runs that are shown by their declaration."""
+    shown = (one for one in MEASURES.values() if one.has_table and one.applies(parameters))
     return [one for measure in shown for one in measure.variables if one.is_in_spin]
 
 

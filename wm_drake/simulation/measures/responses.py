@@ -98,7 +98,7 @@ def known_responses(parameters: MachineParameters, profile: SpinProfile) -> tupl
     return tuple(
         response
         for measure in MEASURES.values()
-        if parameters.cabinet or "feet" not in measure.needs
+        if measure.applies(parameters)
         for variable in measure.variables
         if variable.is_response
         for response in _responses_of(measure.name, variable, parameters, profile)

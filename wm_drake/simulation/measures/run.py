@@ -15,7 +15,7 @@ from wm_drake.simulation.band import pass_band
 from wm_drake.simulation.displacements import amplitudes, filtered
 from wm_drake.simulation.feet import foot_measures
 
-Need: TypeAlias = Literal["sensors", "shapes", "tub", "mounts", "feet", "springs"]
+Need: TypeAlias = Literal["sensors", "shapes", "tub", "mounts", "feet", "springs", "stops"]
 """Groups of inputs that cost time, so that a batch computes them only for measures that name them:
 
     sensors   `Run.displacement`, `Run.filtered` and `Run.amplitudes`
@@ -24,6 +24,7 @@ Need: TypeAlias = Literal["sensors", "shapes", "tub", "mounts", "feet", "springs
     mounts    `Run.mount_sums`
     feet      `Run.feet`
     springs   `Run.smallest_tensions` and `Run.smallest_elongations`
+    stops     `Run.approaches`
 """
 
 
@@ -173,3 +174,16 @@ class Run(ABC):
     @abstractmethod
     def smallest_elongations(self) -> FloatArray:
         """Return the smallest elongation of each spring; NaN if it is unknown. (springs,) [m]"""
+
+    @property
+    @abstractmethod
+    def approaches(self) -> tuple[FloatArray, FloatArray]:
+        """Return compression of each stop, below 0 without contact, and its rate.
+
+        (n, stops) [m, m/s]
+        """
+
+    @property
+    @abstractmethod
+    def mass_left(self) -> FloatArray:
+        """Return the mass of the load with the water left in it. (n,) [kg]"""

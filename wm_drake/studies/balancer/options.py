@@ -1,13 +1,21 @@
-"""Options of the study of rings of balls, and its declaration."""
+"""Options of the study of balancers, and its declaration."""
 
 from wm_drake.studies.study import Options, Study, imported, option
 
 
 class BalancerOptions(Options):
-    """Options of the study of rings of balls."""
+    """Options of the study of balancers."""
 
-    machine: str = option(
-        "ball_rings", "Name of a shipped machine with rings of balls, or machine file.", "NAME|FILE"
+    machine: str = option("ball_rings", "Name of a shipped machine, or machine file.", "NAME|FILE")
+    balls: str = option(
+        "ball_rings",
+        "Machine whose rings of balls are fitted if that of --machine has none.",
+        "NAME|FILE",
+    )
+    liquid: str = option(
+        "liquid_rings",
+        "Machine whose rings of liquid are fitted if that of --machine has none.",
+        "NAME|FILE",
     )
     mass: str = option("0.15,0.3,0.5,0.7 kg", "Unbalance masses at the wall.", "MASSES")
     place: str = option(
@@ -34,7 +42,7 @@ class BalancerOptions(Options):
 
 BALANCER = Study(
     "balancer",
-    "Say from which speed rings of balls pay, and where they hurt.",
+    "Say which balancer to fit: none, rings of balls or of liquid; where balls hurt and pay.",
     BalancerOptions,
     imported("wm_drake.studies.balancer.task:BalancerTask"),
     quick={

@@ -1,16 +1,18 @@
-"""Show the study of rings of balls: the answer in words, curves and tables."""
+"""Show the study of balancers: the answer in words, curves and tables."""
 
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 import xarray as xr
 
 from wm_drake.parameters import MachineParameters
 from wm_drake.report import figure as fig
+from wm_drake.report.formatting import listed
 from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.quantity import SPEED, Quantity, shown, text_of
 from wm_drake.studies.answer import Answer, Part, Plot
+from wm_drake.studies.balancer.candidates import RESPONSES, WORDS
 from wm_drake.studies.balancer.study import (
     AMPLITUDE,
     BALL_MASS,
@@ -22,9 +24,12 @@ from wm_drake.studies.balancer.study import (
     SWING,
     base_of,
 )
+from wm_drake.studies.proposal_page import proposal_part, proposal_text
 
 MODEL = (
-    "Free and locked balls have the same mass; locked ones are evenly spread around the drum and "
+    "The machine without a balancer, with rings of balls and with rings of liquid runs up with the "
+    "same loads; what is fitted may raise no response of the worst load by more than 10 %. Free "
+    "and locked balls have the same mass; locked ones are evenly spread around the drum and "
     "balance each other. Amplitudes are the largest of all sensors in ranges of 25 rpm of a run-up "
     "from standstill. Free balls pay from the speed on from which their amplitude is smaller up to "
     "the highest speed."
@@ -33,22 +38,22 @@ MODEL = (
 
 
 def balancer_answer(
-    parameters: MachineParameters,
-    numbers: xr.Dataset,
-    loads: xr.Dataset,
-    rings: xr.Dataset,
-    releases: xr.Dataset,
+    parameters: MachineParameters, data: Mapping[str, xr.Dataset], runs: xr.DataArray
 ) -> Answer:
     """Return the answer of the study.
 
     Args:
-        numbers: As of `numbers_of` in `wm_drake.studies.balancer.study`.
-        loads: As of `Trials.loads` there, with the amplitudes `without_rings` of the load with
-            which rings are varied.
-        rings, releases: As of the methods of `Trials`.
+        data: `numbers`, as of `numbers_of` in `wm_drake.studies.balancer.study`; `loads`, as of
+            `BalancerTrials.loads` there, with the amplitudes `without_rings` and `liquid` of the
+            load with which rings are varied; `rings` and `releases`, as of the methods there;
+            `proposal`, as of `candidate_proposal` in `wm_drake.studies.balancer.candidates`.
+        runs: As of `responses_of` there.
     """
-    base = base_of(loads)
-    load, curve = load_text(base), base[["free", "locked", "without_rings"]]
+    numbers, loads, rings, releases = (
+        data[name] for name in ("numbers", "loads", "rings", "releases")
+    )
+    base, proposal = base_of(loads), data["proposal"]
+    load, curve = load_text(base), base[["free", "locked", "without_rings", "liquid"]]
     worse = ("is_larger_at_highest_speed", "alarm")
     each = LabelledTable(
         "loads",
@@ -71,7 +76,23 @@ def balancer_answer(
         "starts at rest; its first swing is left out.",
         marked=("is_larger", "alarm"),
     )
+    of_candidates = xr.Dataset(
+        {
+            name: quantity.variable(("load", "candidate"), runs.sel(response=name).values.T)
+            for name, quantity in RESPONSES.items()
+        },
+        {"load": runs["load"].values, "candidate": runs.candidate.values},
+    )
+    each_candidate = LabelledTable(
+        "candidates",
+        of_candidates,
+        "Which balancer",
+        "Each load without a balancer, with free balls and with liquid.",
+        across="candidate",
+        words=WORDS,
+    )
     parts = (
+        Part("Which balancer to fit", (each_candidate,)),
         Part("Over the drum speed", (curve_plot(base), LabelledTable("curve", curve))),
         Part("Unbalance and its place", (loads_plot(loads),)),
         Part("Mass of the balls and damping", (rings_plot(loads, rings, numbers),)),
@@ -80,15 +101,38 @@ def balancer_answer(
         Part("Release of locked balls", (release, LabelledTable("numbers", numbers))),
     )
     return Answer(
-        f"Rings of balls of machine {parameters.name}",
-        summary(numbers, loads),
+        f"Balancers of machine {parameters.name}",
+        f"{proposal_text(proposal, MACHINE)} {summary(numbers, loads)}",
         parameters,
         parts,
         (("Run-up", f"{text_of(numbers.rate)} to {text_of(numbers.highest_speed)}"),),
         MODEL,
-        short=Part("In short", facts=facts_of(numbers, loads, rings, releases)),
+        short=proposal_part(
+            proposal,
+            why(runs),
+            {name: quantity.words for name, quantity in RESPONSES.items()},
+            facts_of(numbers, loads, rings, releases),
+            machine=MACHINE,
+        ),
         diverged=diverged(loads, rings, releases),
     )
+
+
+MACHINE = "the machine without a balancer"
+"""What the candidates are compared with, in words."""
+
+
+def why(runs: xr.DataArray) -> str:
+    """Return both responses of each candidate, of its worst load, in a sentence."""
+    texts = []
+    for name, quantity in RESPONSES.items():
+        worst = runs.sel(response=name).max("load", skipna=False)
+        sizes = [
+            f"{quantity.text(worst.sel(candidate=one))} with {WORDS[one]}"
+            for one in runs.candidate.values.tolist()
+        ]
+        texts.append(f"{quantity.words}: {listed(sizes)}")
+    return f"of the worst load, {'; '.join(texts)}"
 
 
 def diverged(loads: xr.Dataset, rings: xr.Dataset, releases: xr.Dataset) -> tuple[str, ...]:
@@ -259,6 +303,7 @@ def curve_plot(base: xr.Dataset) -> Plot:
         "free": ("free balls", fig.OURS, ""),
         "locked": ("locked balls", fig.MEASURED, ""),
         "without_rings": ("without rings", fig.QUIET, "dashed"),
+        "liquid": ("liquid", fig.COLOURS[2], ""),
     }
     speeds = shown(base["from"])
     marks: list[fig.Mark] = [

@@ -17,17 +17,25 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from wm_drake.elements.ball_ring import BallRing
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
-from wm_drake.parameters import Load, MachineParameters, SpinProfile, Unbalance, with_values
+from wm_drake.parameters import Load, SpinProfile, Unbalance, with_values
 from wm_drake.parameters.spin import Region
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Share, Unit
 from wm_drake.report.formatting import number
 from wm_drake.report.quantity import HIDDEN, SPEED, Quantity
-from wm_drake.simulation.balance import in_planes, rings_of
 from wm_drake.simulation.cases import Case
+from wm_drake.studies.balancer.rings import (
+    balls_of,
+    capacities_of,
+    is_within,
+    locked,
+    picked_up_from,
+    spread,
+    with_factors,
+    without_rings,
+)
 from wm_drake.studies.experiment import Experiment, Simulate
 
 MEASURES = ("amplitudes in regions",)
@@ -87,88 +95,6 @@ def _held(points: list[tuple[float, float]], regions: list[Region]) -> SpinProfi
     last = Region(name="highest_speed", begin=end + 0.5 * HOLD, end=end + HOLD)
     times, speeds = zip(*points, (end + HOLD, speed), strict=True)
     return SpinProfile(time=times, speed=speeds, regions=(*regions, last))
-
-
-def without_rings(parameters: MachineParameters) -> MachineParameters:
-    """Return the machine without its rings of balls."""
-    others = {n: e for n, e in parameters.elements.items() if not isinstance(e, BallRing)}
-    return parameters.model_copy(update={"elements": others})
-
-
-def locked(load: Load, parameters: MachineParameters) -> Load:
-    """Return a load with all balls of a machine as point masses, evenly spread in their races."""
-    balls = [
-        Unbalance(mass=r.ball_mass, radius=r.race_radius, y=r.y, phase=angle)
-        for r in rings_of(parameters).values()
-        for angle in spread(r)
-    ]
-    return load.model_copy(update={"unbalances": (*load.unbalances, *balls)})
-
-
-def spread(ring: BallRing) -> tuple[float, ...]:
-    """Return the angles of balls that are evenly spread in their race. [rad]"""
-    return tuple((2.0 * np.pi / ring.balls * np.arange(ring.balls)).tolist())
-
-
-def capacity_of(ring: BallRing) -> float:
-    """Return the first moment of the balls of a ring, side by side. [kg m]"""
-    touching = 2.0 * np.arcsin(0.5 * ring.ball_diameter / ring.race_radius)
-    angles = touching * (np.arange(ring.balls) - 0.5 * (ring.balls - 1))
-    return float(ring.ball_mass * ring.race_radius * np.cos(angles).sum())
-
-
-def capacities_of(parameters: MachineParameters) -> dict[float, float]:
-    """Return the first moment of the balls in the planes of the outermost rings. [kg m by m]
-
-    The balls of a ring between them count in both, by the lever rule.
-    """
-    rings = rings_of(parameters).values()
-    planes = np.unique([min(r.y for r in rings), max(r.y for r in rings)])
-    total = np.zeros(len(planes))
-    for ring in rings:
-        moment = np.array([capacity_of(ring), 0.0])
-        total += np.abs(in_planes(moment, ring.y * moment, planes)[:, 0])
-    return dict(zip(planes.tolist(), total.tolist(), strict=True))
-
-
-def is_within(capacities: dict[float, float], moment: float, y: float) -> bool:
-    """Return whether the share of an unbalance in each plane is below the capacity there.
-
-    Args:
-        capacities: As of `capacities_of`.
-        moment, y: Mass times radius, and its place. [kg m, m]
-    """
-    size, planes = np.array([moment, 0.0]), np.array(list(capacities))
-    shares = np.abs(in_planes(size, y * size, planes)[:, 0])
-    return bool((shares <= list(capacities.values())).all())
-
-
-def picked_up_from(parameters: MachineParameters) -> float:
-    """Return the speed from which the drum carries all balls round, m g R/d. [rad/s]
-
-    Below it, a ball whose drag against the drum is d W stays in the lower half of its race, at
-    rest. It is infinite without damping.
-    """
-    speeds = [
-        r.ball_mass * parameters.gravity * r.race_radius / r.damping if r.damping else np.inf
-        for r in rings_of(parameters).values()
-    ]
-    return float(max(speeds))
-
-
-def with_factors(
-    parameters: MachineParameters, ball_mass: float, damping: float
-) -> MachineParameters:
-    """Return a machine with factors on the mass of all balls and on the damping of all races."""
-    values = {
-        key: value
-        for name, ring in rings_of(parameters).items()
-        for key, value in (
-            (f"elements.{name}.ball_mass", ball_mass * ring.ball_mass),
-            (f"elements.{name}.damping", damping * ring.damping),
-        )
-    }
-    return with_values(parameters, values)
 
 
 def curves_of(runs: xr.Dataset, profile: SpinProfile) -> xr.Dataset:
@@ -318,25 +244,32 @@ class BalancerTrials:
             names.append(f"{name}, locked {ball_mass:g}")
             held[names[-1]] = Case(names[-1], locked(load, changed), profile)
         plain = build_machine(without_rings(parameters))
-        curves = self._curves(self.machine, free, f"{what}, free balls")
-        of_held = self._curves(plain, [*held.values()], f"{what}, locked balls")
+        curves = self.curves(self.machine, free, f"{what}, free balls")
+        of_held = self.curves(plain, [*held.values()], f"{what}, locked balls")
         place = {name: at for at, name in enumerate(held)}
         of_locked = of_held.isel(run=[place[name] for name in names])
         return compared(curves, of_locked).assign(free=curves.amplitude, locked=of_locked.amplitude)
 
-    def _curves(self, machine: Machine, cases: Sequence[Case], what: str) -> xr.Dataset:
+    def curves(self, machine: Machine, cases: Sequence[Case], what: str) -> xr.Dataset:
         """Return the curves of cases whose profiles have the same ranges, as of `curves_of`."""
         experiment = Experiment(machine, MEASURES, self.simulate)
         runs = experiment.over({"run": range(len(cases))}, cases, what)
         return curves_of(runs, cases[0].profile)
 
-    def plain(self, load: xr.Dataset) -> xr.Dataset:
-        """Return the curve of one of `loads` in the machine without rings, as of `curves_of`."""
+    def of(self, machine: Machine, loads: xr.Dataset, what: str) -> xr.Dataset:
+        """Return the curves of `loads` in another machine, as of `curves_of`.
+
+        Args:
+            loads: As of `loads`.
+            what: Words beside the progress bar.
+        """
         profile = run_up(self.high, self.rate)
-        machine = build_machine(without_rings(self.machine.parameters))
-        at = self.load(load.mass.item(), load.place.item())
-        cases = [Case("without rings", at, profile)]
-        return self._curves(machine, cases, "without rings").isel(run=0)
+        pairs = zip(loads.mass.values.tolist(), loads.place.values.tolist(), strict=True)
+        cases = [
+            Case(f"{mass:g} kg at {PLACE.values(y):g} mm, {what}", self.load(mass, y), profile)
+            for mass, y in pairs
+        ]
+        return self.curves(machine, cases, what)
 
     def releases(self, load: xr.Dataset, speeds: Sequence[float]) -> xr.Dataset:
         """Return runs that begin at a speed, at which balls locked before are released.
@@ -353,7 +286,7 @@ class BalancerTrials:
         parameters, at = self.machine.parameters, self.load(load.mass.item(), load.place.item())
         angles = {
             f"elements.{name}.start_angles": spread(ring)
-            for name, ring in rings_of(parameters).items()
+            for name, ring in balls_of(parameters).items()
         }
         begun = with_values(parameters, angles)
         plain = build_machine(without_rings(parameters))
@@ -363,8 +296,8 @@ class BalancerTrials:
         }
         free = [Case(f"released {s:g}", at, p, True, begun) for s, p in profiles.items()]
         held = [Case(f"locked {s:g}", locked(at, parameters), p) for s, p in profiles.items()]
-        of_free = self._curves(self.machine, free, "releases")
-        return released(speeds, of_free, self._curves(plain, held, "still locked"))
+        of_free = self.curves(self.machine, free, "releases")
+        return released(speeds, of_free, self.curves(plain, held, "still locked"))
 
 
 def released(speeds: Sequence[float], free: xr.Dataset, held: xr.Dataset) -> xr.Dataset:
@@ -387,18 +320,23 @@ def released(speeds: Sequence[float], free: xr.Dataset, held: xr.Dataset) -> xr.
     return data.assign(is_larger=("run", after[0] > after[1]))
 
 
-def base_of(loads: xr.Dataset) -> xr.Dataset:
-    """Return the load with which rings are varied.
+def number_of_base(loads: xr.Dataset) -> int:
+    """Return the number of the load with which rings are varied.
 
     It is the largest mass that the balls can balance in the middle of the places; the smallest one
     if they can balance none.
     """
     places = np.unique(loads.place)
-    middle = loads.isel(run=loads.place.values == places[len(places) // 2])
-    possible = middle.isel(run=middle.is_within_capacity.values)
-    if possible.sizes["run"]:
-        return possible.isel(run=int(possible.mass.values.argmax()))
-    return middle.isel(run=int(middle.mass.values.argmin()))
+    is_middle, mass = loads.place.values == places[len(places) // 2], loads.mass.values
+    possible = is_middle & loads.is_within_capacity.values
+    if possible.any():
+        return int(np.where(possible, mass, -np.inf).argmax())
+    return int(np.where(is_middle, mass, np.inf).argmin())
+
+
+def base_of(loads: xr.Dataset) -> xr.Dataset:
+    """Return the load with which rings are varied."""
+    return loads.isel(run=number_of_base(loads))
 
 
 def lock_below(loads: xr.Dataset) -> float:
@@ -414,7 +352,8 @@ def numbers_of(trials: BalancerTrials, loads: xr.Dataset, plain: xr.Dataset) -> 
     """Return the run-up, what the balls can do, and the machine without rings, as single numbers.
 
     Args:
-        loads, plain: As of `BalancerTrials.loads` and `BalancerTrials.plain`.
+        loads: As of `BalancerTrials.loads`.
+        plain: Run of `base_of(loads)` in the machine without rings, as of `curves_of`.
 
     Returns:
         `rate` [rad/s^2], `highest_speed`, `picked_up_from`, `lock_below` [rad/s], `capacity`

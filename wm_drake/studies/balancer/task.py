@@ -1,26 +1,38 @@
-"""Check the options of the study of rings of balls, and run it."""
+"""Check the options of the study of balancers, and run it."""
 
 from typing import Any
 
 from wm_drake.engines.compiled.step_check import check_step
 from wm_drake.errors import input_error
+from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
+from wm_drake.parameters import load_machine
 from wm_drake.parameters.units import Unit
 from wm_drake.report.quantity import SPEED
-from wm_drake.simulation.balance import rings_of
 from wm_drake.simulation.steps import checked_step
 from wm_drake.studies.answer import Answer
+from wm_drake.studies.balancer.candidates import (
+    BALLS,
+    KINDS,
+    LIQUID,
+    NONE,
+    WORDS,
+    candidate_proposal,
+    is_machine,
+    responses_of,
+    with_rings,
+)
 from wm_drake.studies.balancer.options import BalancerOptions
-from wm_drake.studies.balancer.page import balancer_answer
+from wm_drake.studies.balancer.page import balancer_answer, load_text
+from wm_drake.studies.balancer.rings import with_factors, without_rings
 from wm_drake.studies.balancer.study import (
     MASS,
     PLACE,
     RATE,
     WINDOW,
     BalancerTrials,
-    base_of,
+    number_of_base,
     numbers_of,
-    with_factors,
 )
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import quantities_of
@@ -36,15 +48,15 @@ class BalancerTask(Task):
 
     def __init__(self, options: BalancerOptions, machine: Machine) -> None:
         """Check the rings, the values and the speeds."""
-        self.options, self.machine = options, machine
-        parameters = machine.parameters
-        self.rings = rings_of(parameters)
-        if not self.rings:
-            raise input_error(
-                f"machine '{parameters.name}' has no element of kind ball_ring; allowed is a "
-                "machine with rings of balls, such as the shipped machine 'ball_rings'",
-                key="elements",
-            )
+        self.options, parameters = options, machine.parameters
+        self.sources = {BALLS: load_machine(options.balls), LIQUID: load_machine(options.liquid)}
+        self.candidates = {
+            kind: with_rings(parameters, kind, source) for kind, source in self.sources.items()
+        }
+        self.machine = machine
+        if self.candidates[BALLS] != parameters:
+            self.machine = machine = build_machine(self.candidates[BALLS])
+            parameters = machine.parameters
         radii = [u.radius for load in parameters.loads.values() for u in load.unbalances]
         if not radii:
             raise input_error("has no load with a point mass, whose radius is used", key="loads")
@@ -75,19 +87,42 @@ class BalancerTask(Task):
     def identity(self) -> dict[str, Any]:
         """Return what determines the runs beside the machine."""
         high, rate = SPEED.unit.reading(self.high), RATE.unit.reading(self.rate)
-        return {"run-up": f"to {high} at {rate}"}
+        rings = {kind: repr(self.candidates[kind].elements) for kind in KINDS}
+        return {"run-up": f"to {high} at {rate}", **rings}
 
     def run(self, executor: Executor) -> Answer:
-        """Run loads, rings and releases."""
+        """Run loads, rings and releases, and the machine without balls."""
         trials = BalancerTrials(self.machine, executor.simulate, self.high, self.rate, self.radius)
         loads = trials.loads(self.masses, self.places)
-        base = base_of(loads)
-        rings = trials.rings(base, self.ball_masses, self.dampings)
-        releases = trials.releases(base, self.release)
-        plain = trials.plain(base)
-        numbers = numbers_of(trials, loads, plain)
-        loads = loads.assign(without_rings=plain.amplitude)
-        return balancer_answer(self.machine.parameters, numbers, loads, rings, releases)
+        without = {
+            NONE: without_rings(self.machine.parameters),
+            LIQUID: self.candidates[LIQUID],
+        }
+        curves = {
+            name: trials.of(build_machine(one), loads, WORDS[name]) for name, one in without.items()
+        }
+        at = number_of_base(loads)
+        of_balls = loads.rename(free="amplitude", level_free="level")[["amplitude", "level"]]
+        names = [load_text(loads.isel(run=run)) for run in range(loads.sizes["run"])]
+        runs = responses_of({NONE: curves[NONE], BALLS: of_balls, LIQUID: curves[LIQUID]}, names)
+        loads = loads.assign(
+            without_rings=curves[NONE].amplitude.isel(run=at),
+            liquid=curves[LIQUID].amplitude.isel(run=at),
+        )
+        data = {
+            "numbers": numbers_of(trials, loads, curves[NONE].isel(run=at)),
+            "loads": loads,
+            "rings": trials.rings(loads.isel(run=at), self.ball_masses, self.dampings),
+            "releases": trials.releases(loads.isel(run=at), self.release),
+            "proposal": candidate_proposal(runs, {kind: self._command(kind) for kind in KINDS}),
+        }
+        return balancer_answer(self.machine.parameters, data, runs)
+
+    def _command(self, kind: str) -> str:
+        """Return the command that runs the machine with rings of a kind; "" if there is none."""
+        files = {BALLS: self.options.balls, LIQUID: self.options.liquid}
+        is_source = is_machine(self.candidates[kind], self.sources[kind])
+        return f"wm-drake spin --machine {files[kind]}" if is_source else ""
 
 
 def _values(text: str, unit: Unit, option: str, is_place: bool = False) -> tuple[float, ...]:

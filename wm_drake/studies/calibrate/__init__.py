@@ -1,7 +1,8 @@
-"""Calibrate a machine: fit free quantities so that computed amplitudes approach measured ones.
+"""Calibrate a machine: fit free quantities to measured amplitudes, or to records of its sensors.
 
 Enters: a built machine, a free file (bounds and priors) and measured amplitudes. Leaves: a
 `Calibration` with the distinct solutions, and predictions of held-out loads.
-Search and solutions use no machine; `targets` runs it with `simulate_many`.
-May import: `batch` and the rooms before it.
+Or enters: a machine, unknowns, and recordings, `recorded`. Leaves: a fit of `records`.
+Both state a problem of `studies.fitting`, whose machines run in an experiment.
+May import: `studies.compare`, `studies.fitting` and the rooms before them.
 """

@@ -102,7 +102,7 @@ def quantities_figure(calibration: Calibration) -> fig.Figure:
         if rank:
             marks.append(fig.Points(at, places, symbol="line-ns", color=OTHER, size=11.0))
             continue
-        wide = solution.posterior.spread() * parameter_map.deviation / reach
+        wide = solution.fit.remaining * parameter_map.deviation / reach
         ends = (np.maximum(at - wide, 0.0), places), (np.minimum(at + wide, 1.0), places)
         marks += [fig.segments(*ends, width=3.0), fig.Points(at, places, size=7.5)]
     expected = (parameter_map.expected - parameter_map.lower) / reach

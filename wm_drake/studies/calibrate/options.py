@@ -1,14 +1,35 @@
 """Options of `wm-drake calibrate`, and its declaration."""
 
 from pathlib import Path
+from typing import Literal
 
-from wm_drake.studies.study import Options, Study, imported, option
+from wm_drake.studies.compare.options import CompareOptions
+from wm_drake.studies.study import Study, imported, option
 
 
-class CalibrateOptions(Options):
-    """Options of a calibration."""
+class CalibrateOptions(CompareOptions):
+    """Options of a calibration, to targets or to records."""
 
-    free: Path = option(..., "YAML file of the free quantities, bounds and priors.", "FILE")
+    records: tuple[Path, ...] = option(
+        (),
+        "Recorded files of one test: CSV, MDF, TDMS, UFF 58, MAT or HDF5. Several are repeats; "
+        "LOAD=RECORD is one of another load. Without: targets.",
+        "RECORD...",
+        "argument",
+    )
+    free: Path | None = option(None, "YAML file of the free quantities, bounds and priors.", "FILE")
+    unknown: tuple[str, ...] = option(
+        (),
+        "For records, in place of --free: number to find, with or without a range: "
+        "gasket.stiffness_y='(1, 4) N/mm'. KEY1+KEY2 are two keys with the same value. Repeatable.",
+        "KEYS[=RANGE]",
+    )
+    by: Literal["envelope", "order", "rms", "history"] = option(
+        "envelope",
+        "What is fitted of records: envelope (amplitudes over the drum speed), order (those of "
+        "order 1), rms (in the regions of the profile), or history (the signals over time).",
+        "NAME",
+    )
     targets: tuple[Path, ...] = option(
         (),
         "Measured amplitudes, or other responses (docs/how-to/calibrate.md). Repeatable. Default: "
@@ -49,9 +70,9 @@ class CalibrateOptions(Options):
 
 CALIBRATE = Study(
     "calibrate",
-    "Fit unknown numbers of a machine to measured amplitudes, within bounds and with priors.",
+    "Fit unknown numbers of a machine to measured amplitudes, or to records of its sensors.",
     CalibrateOptions,
-    imported("wm_drake.studies.calibrate.task:CalibrateTask"),
+    imported("wm_drake.studies.calibrate.task:calibrate_task"),
     quick={"starts": 1, "iterations": 3},
     has_cluster=False,
     group="",

@@ -83,7 +83,7 @@ def calibrate_answer(
             Part("Effect of the gasket", _effects(calibration)),
             _prediction(calibration, predictions, held_out),
             Part("Quantities", _quantity_tables(calibration)),
-            correlations_part(calibration.solutions[0].posterior),
+            correlations_part(calibration.solutions[0].fit),
             Part("Critical speeds and smallest gaps", _motion_tables(motion)),
             Part("Searches", (_searches(calibration),)),
         ),
@@ -98,7 +98,7 @@ def calibrate_answer(
 
 
 def _details(calibration: Calibration) -> tuple[tuple[str, str], ...]:
-    counted = sum(end.evaluations for end in calibration.ended)
+    counted = sum(end.fit.log.evaluations for end in calibration.ended)
     searches = f"{len(calibration.ended)} starts, seed {calibration.plan.seed}"
     return (
         ("Method", f"least squares, {searches}"),
@@ -141,7 +141,7 @@ def summary(calibration: Calibration, held_out: xr.Dataset) -> str:
     case, sensor = np.unravel_index(int(np.nanargmax(np.abs(errors))), errors.shape)
     count = len(calibration.solutions)
     searches, quantities = len(calibration.ended), len(calibration.parameter_map.names)
-    determined = int(np.sum(best.posterior.directions() > 1.0))
+    determined = int(np.sum(best.fit.linear.directions() > 1.0))
     text = (
         f"The best machine is compared with {np.isfinite(errors).sum()} measured amplitudes. "
         f"Absolute differences: {sizes_text(errors)}. The largest is "
@@ -192,7 +192,7 @@ def certainty(calibration: Calibration) -> list[tuple[str, str]]:
     """Return which quantities the data determine, and which only the priors: heading and text."""
     best, names = calibration.solutions[0], calibration.parameter_map.names
     verdicts = best.verdicts()
-    sizes = best.posterior.directions()
+    sizes = best.fit.linear.directions()
     rows = [
         (
             "Combinations",

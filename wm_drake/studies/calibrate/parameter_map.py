@@ -14,7 +14,6 @@ from wm_drake.parameters.free import FreeFile, FreeQuantity, KnownQuantity, Meas
 from wm_drake.parameters.keys import quantities
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit, dimension, from_base, with_base
-from wm_drake.studies.fitting.posterior import priors_of
 from wm_drake.studies.fitting.problem import Unknown
 
 COMPONENTS = {"x": 0, "y": 1, "z": 2}
@@ -127,12 +126,17 @@ class ParameterMap:
     @property
     def expected(self) -> FloatArray:
         """Expected values."""
-        return priors_of(self.unknowns)[0]
+        return self._priors[0]
 
     @property
     def deviation(self) -> FloatArray:
         """Standard deviations of the priors."""
-        return priors_of(self.unknowns)[1]
+        return self._priors[1]
+
+    @property
+    def _priors(self) -> FloatArray:
+        """Expected values and standard deviations (2, quantity)."""
+        return np.reshape([unknown.prior for unknown in self.unknowns], (-1, 2)).T
 
     def in_units(self, values: FloatArray) -> FloatArray:
         """Return values (quantity) in the units in which the quantities are written."""
@@ -153,13 +157,18 @@ class ParameterMap:
             (point, n) in standard deviations: preloads, relations, then elongations. An elongation
             above the smallest one gives 0.
         """
-        parts = [relation.residuals(points)[:, None] for relation in self.relations]
+        parts = [self.relation_residuals(points)]
         if self.elongation is not None:
             least, deviation = self.elongation
             parts.append(np.maximum(least - elongation, 0.0) / deviation)
         if self.preload is not None:
             expected, deviation = self.preload
             parts.insert(0, (preload - expected) / deviation)
+        return np.hstack(parts)
+
+    def relation_residuals(self, points: FloatArray) -> FloatArray:
+        """Return the residuals of the relations (point, n), in standard deviations."""
+        parts = [relation.residuals(points)[:, None] for relation in self.relations]
         return np.hstack([np.empty((len(points), 0)), *parts])
 
     def parameters_at(self, point: FloatArray) -> MachineParameters:

@@ -13,11 +13,12 @@ import numpy as np
 from wm_drake.errors import check_known, input_error
 from wm_drake.parameters.free import FreeFile
 from wm_drake.parameters.types import FloatArray
-from wm_drake.studies.calibrate.computed import Evaluation, PointRunner
+from wm_drake.studies.calibrate.computed import Evaluation
 from wm_drake.studies.calibrate.response_targets import ResponseTarget
 from wm_drake.studies.calibrate.solutions import Solution
 from wm_drake.studies.calibrate.study import Calibration, SearchPlan, calibrate
 from wm_drake.studies.calibrate.targets import AMPLITUDE, Targets
+from wm_drake.studies.experiment import Experiment
 
 FITS = ("calibrated", "predicted", "seen")
 """Errors of a kind of values in a prediction, by the names of its attributes."""
@@ -118,7 +119,7 @@ LEVEL = 0.95
 
 
 def predict(
-    runner: PointRunner,
+    experiment: Experiment,
     free: FreeFile,
     calibration: Calibration,
     held_out: Sequence[Sequence[str]],
@@ -130,7 +131,7 @@ def predict(
     used, because they may come from a calibration with all loads.
 
     Args:
-        runner: The machine, and the ledger of this calibration.
+        experiment: Runs of the machine.
         free: Quantities that may change, with bounds and priors.
         calibration: Calibration with all loads.
         held_out: Groups of names of loads.
@@ -145,8 +146,10 @@ def predict(
     check_held_out(calibration.targets, held_out)
     targets, plan, predictions = calibration.targets, plan or calibration.plan, []
     for loads in map(tuple, held_out):
-        others = calibrate(runner, free.without_starts(), targets.without(*loads), plan)
-        predicted = _predicted(others, runner.values(others.parameter_map, targets))
+        seen = targets.without(*loads)
+        others = calibrate(experiment, free.without_starts(), seen, plan)
+        values = Evaluation(experiment, others.parameter_map, targets)
+        predicted = _predicted(others, values)
         best = others.solutions[0]
         predictions.append(Prediction(loads, calibration.solutions[0], best, *predicted))
     return predictions
@@ -169,7 +172,7 @@ def _predicted(
         [
             generator.multivariate_normal(
                 solution.coordinates,
-                solution.posterior.spread_matrix(scatter / plan.deviation),
+                solution.fit.linear.covariance(scatter / plan.deviation),
                 each,
             )
             for solution in calibration.solutions

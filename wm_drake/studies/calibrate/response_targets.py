@@ -7,7 +7,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from wm_drake.batch import simulate_many
 from wm_drake.errors import InputError, Problem, check_known, nearest_names
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters
@@ -16,6 +15,7 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import dimension, from_base, to_base
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures.responses import Response, known_responses
+from wm_drake.studies.experiment import Experiment, response_of
 
 DEVIATION = 0.10
 """Default relative standard deviation of a response that is not an amplitude.
@@ -184,18 +184,17 @@ class ComputedResponses:
     """Function that computes the responses of machines for targets.
 
     Attributes:
+        experiment: Runs of the machine.
         targets: The targets; they say which cases are run.
-        workers: Number of threads; None for the number of cores.
     """
 
-    machine: Machine
+    experiment: Experiment
     targets: tuple[ResponseTarget, ...]
-    workers: int | None = None
 
     @cached_property
     def _runs(self) -> dict[type[ResponseRuns], ResponseRuns]:
         kinds = dict.fromkeys(target.kind_of_runs for target in self.targets)
-        return {kind: kind(self.machine) for kind in kinds}
+        return {kind: kind(self.experiment.machine) for kind in kinds}
 
     def __call__(self, machines: Sequence[MachineParameters]) -> FloatArray:
         """Return the responses (machine, target) of machines. [unit for reading]
@@ -220,11 +219,14 @@ class ComputedResponses:
             for trial in runs.trials(parameters)
             for load, gasket in loads
         )
-        measures = dict.fromkeys(target.response.measure for target in evaluated)
-        table = simulate_many(runs.machine, cases, measures=measures, workers=self.workers)
-        ended = table.diverged.values == ""
+        measures = tuple(dict.fromkeys(target.response.measure for target in evaluated))
+        trials = sum(1 for _ in runs.trials(machines[0]))
+        sizes = {"machine": len(machines), "trial": trials, "case": len(loads)}
+        data = replace(self.experiment, machine=runs.machine, measures=measures).over(
+            {name: range(size) for name, size in sizes.items()}, cases
+        )
         for place, target in zip(places, evaluated, strict=True):
-            values = np.where(ended, target.response.values(table), np.nan)
-            of_trials = values.reshape(len(machines), -1, len(loads))
-            of_load = of_trials[..., loads.index((target.load, target.gasket))]
-            result[:, place] = runs.statistic(target, of_load)
+            of_load = data.isel(case=loads.index((target.load, target.gasket)))
+            values = response_of(of_load, target.response).values
+            in_unit = target.response.unit.from_si(1.0) * values
+            result[:, place] = runs.statistic(target, in_unit)

@@ -16,7 +16,7 @@ from wm_drake.studies.calibrate.prediction import FITS, Prediction
 from wm_drake.studies.calibrate.solutions import COST, DIFFERENCE, VALUE, sizes_of
 from wm_drake.studies.calibrate.study import Calibration
 from wm_drake.studies.calibrate.targets import GASKET, MEASURED
-from wm_drake.studies.fitting.page import estimates_of
+from wm_drake.studies.fitting.page import estimates_of, of_unknowns
 
 CHANGE = Quantity("change by the gasket", Share(), form="{:+.0f}".format)
 COVERED = Quantity("in the 95 % intervals", Share(), 0)
@@ -26,19 +26,19 @@ COUNT = Quantity("number", decimals=0)
 
 
 def quantities_of(calibration: Calibration) -> xr.Dataset:
-    """Return the free quantities at the best solution, each in the unit that `unit` names.
+    """Return the free quantities at the best solution, each in its unit. [SI]
 
     Returns:
         Over `unknown`: `estimates_of` of `wm_drake.studies.fitting.page`, and what determines it,
         `held_by` (see `Solution.verdicts`); the prior, `expected` and `prior_deviation`.
     """
     best, m = calibration.solutions[0], calibration.parameter_map
-    data = estimates_of(best.posterior)
+    data = estimates_of(best.fit)
     held = xr.Variable("unknown", best.verdicts(), Quantity("determined by").attributes())
-    expected, deviation = map(m.in_units, (m.expected, m.deviation))
+    units = {unknown.name: unknown.unit for unknown in m.unknowns}
     return data.drop_vars("remark").assign(
-        expected=VALUE.named("expected").variable("unknown", expected),
-        prior_deviation=VALUE.named("± deviation").variable("unknown", deviation),
+        expected=of_unknowns("expected", units, m.expected),
+        prior_deviation=of_unknowns("± deviation", units, m.deviation),
         held_by=held,
     )
 
@@ -46,18 +46,14 @@ def quantities_of(calibration: Calibration) -> xr.Dataset:
 def solutions_of(calibration: Calibration) -> xr.Dataset:
     """Return `value`, standard `deviation` and what determines it of each solution (`held_by`).
 
-    Over `unknown` and `solution`, in the unit that the coordinate `unit` names.
+    Over `unknown` and `solution`, each in its unit. [SI]
     """
-    parts = [estimates_of(solution.posterior) for solution in calibration.solutions]
+    parts = [estimates_of(solution.fit) for solution in calibration.solutions]
     ranks = xr.Variable("solution", [str(n) for n in range(1, len(parts) + 1)])
     data = xr.concat(parts, ranks)
     held = [solution.verdicts() for solution in calibration.solutions]
     attributes = Quantity("determined by").attributes()
-    return (
-        data[["value", "deviation"]]
-        .assign(held_by=(("solution", "unknown"), held, attributes))
-        .assign_coords(unit=("unknown", parts[0].unit.values))
-    )
+    return data[["value", "deviation"]].assign(held_by=(("solution", "unknown"), held, attributes))
 
 
 def amplitudes_of(calibration: Calibration) -> xr.DataArray:
@@ -228,7 +224,8 @@ def searches_of(calibration: Calibration) -> xr.Dataset:
     if calibration.targets.responses:
         numbers["mean_of_responses"] = (DIFFERENCE.named("mean error of responses"), others[0])
         numbers["largest_of_responses"] = (DIFFERENCE.named("largest of responses"), others[1])
-    numbers["evaluations"] = (COUNT.named("machines tried"), [end.evaluations for end in ended])
+    tried = [end.fit.log.evaluations for end in ended]
+    numbers["evaluations"] = (COUNT.named("machines tried"), tried)
     return xr.Dataset(
         {name: q.variable("start", values) for name, (q, values) in numbers.items()},
         {"start": [end.start + 1 for end in ended]},

@@ -11,13 +11,40 @@ from wm_drake.parameters.units import Share, from_base, to_base
 from wm_drake.report.quantity import Quantity
 from wm_drake.studies.calibrate.parameter_map import ParameterMap
 from wm_drake.studies.calibrate.targets import Targets
-from wm_drake.studies.fitting.posterior import DETERMINED, UNDETERMINED, Posterior
+from wm_drake.studies.fitting.fit import DETERMINED, UNDETERMINED, Fit
+from wm_drake.studies.fitting.problem import Unknown
 
 GOOD = 1.25
 """Largest ratio of the mean error of a good solution to that of the best solution."""
 
 DISTINCT = 0.5
 """Least distance between distinct solutions: RMS over the quantities, in prior deviations."""
+
+
+@dataclass(frozen=True)
+class FreeQuantities:
+    """Quantities of a free file as the unknowns of a fit to recordings."""
+
+    parameter_map: ParameterMap
+
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """The unknowns."""
+        return self.parameter_map.unknowns
+
+    def parameters_at(self, point: FloatArray) -> MachineParameters:
+        """Return the machine at a point. [SI]"""
+        return self.parameter_map.parameters_at(point)
+
+    def known(self, points: FloatArray) -> FloatArray:
+        """Return the residuals of relations at points (k, p), in standard deviations. (k, m)"""
+        return self.parameter_map.relation_residuals(points)
+
+    def solved(self, fit: Fit, source: str) -> MachineParameters:
+        """Return the machine with the quantities of a fit, as `machine_of`."""
+        machine = machine_of(self.parameter_map, fit, "_calibrated")
+        about = f"{machine.about} Calibrated: {source}.".strip()
+        return machine.model_copy(update={"about": about})
 
 
 DIFFERENCE = Quantity("difference", Share(), 1)
@@ -49,24 +76,25 @@ class Solution:
     Attributes:
         parameter_map: Map from the free quantities to the machine.
         targets: Targets of the search.
-        point: (n) values of the free quantities, in SI units.
+        fit: Fit of the free quantities, at the end of the search.
         amplitude: (case, sensor) computed amplitudes. [m]
         responses: (response) other computed responses. [unit for reading]
         data_cost, prior_cost: Half the sums of squares of data and prior.
-        posterior: Normal distribution around the point, in units of the prior.
-        evaluations: Number of points that the search evaluated.
     """
 
     parameter_map: ParameterMap
     targets: Targets
     start: int
-    point: FloatArray
+    fit: Fit
     amplitude: FloatArray
     responses: FloatArray
     data_cost: float
     prior_cost: float
-    posterior: Posterior
-    evaluations: int
+
+    @property
+    def point(self) -> FloatArray:
+        """Values of the free quantities (n). [SI]"""
+        return self.fit.values
 
     @property
     def cost(self) -> float:
@@ -76,7 +104,7 @@ class Solution:
     @property
     def coordinates(self) -> FloatArray:
         """Point in units of the prior: (quantity - expected) / deviation. (n)"""
-        return self.posterior.coordinates
+        return self.fit.linear.point
 
     @property
     def errors(self) -> FloatArray:
@@ -90,8 +118,8 @@ class Solution:
 
     def verdicts(self) -> list[str]:
         """Return what determines each quantity: "data", "prior", "data and prior" or "bound"."""
-        at_bound = np.array([estimate.at_bound != "" for estimate in self.posterior.estimates])
-        spread = self.posterior.spread()
+        at_bound = np.array([estimate.at_bound != "" for estimate in self.fit.estimates])
+        spread = self.fit.remaining
         cases = [at_bound, spread < DETERMINED, spread > UNDETERMINED]
         return list(map(str, np.select(cases, ["bound", "data", "prior"], "data and prior")))
 
@@ -131,13 +159,24 @@ def distinct(solutions: list[Solution]) -> list[Solution]:
 def solved_machine(solution: Solution, number: int = 0) -> MachineParameters:
     """Return the machine of a solution.
 
+    Args:
+        number: Number of the solution, for the name of the machine; 0 keeps the name.
+    """
+    ending = f"_calibrated_{number}" if number else ""
+    return machine_of(solution.parameter_map, solution.fit, ending)
+
+
+def machine_of(parameter_map: ParameterMap, fit: Fit, ending: str = "") -> MachineParameters:
+    """Return the machine with the quantities of a fit.
+
     The source of each fitted number is "fit: " followed by the text of `fit_texts`, and
     "assumption: " followed by the known quantities that enter.
 
     Args:
-        number: Number of the solution, for the name of the machine; 0 keeps the name.
+        fit: Fit whose first unknowns are the quantities.
+        ending: End of the name of the machine.
     """
-    parameter_map, all_texts = solution.parameter_map, fit_texts(solution)
+    all_texts = fit_texts(parameter_map, fit)
     fits: dict[str, list[str]] = {}
     reasons: dict[str, list[str]] = {}
     for value in parameter_map.values:
@@ -146,7 +185,7 @@ def solved_machine(solution: Solution, number: int = 0) -> MachineParameters:
         for listed, new in ((fits, texts), (reasons, value.reasons)):
             kept = listed.setdefault(value.key, [])
             kept.extend(text for text in new if text not in kept)
-    parameters = parameter_map.parameters_at(_rounded(solution))
+    parameters = parameter_map.parameters_at(_rounded(parameter_map, fit))
     fitted = {
         key: "; ".join(
             kind + "; ".join(listed[key])
@@ -160,18 +199,18 @@ def solved_machine(solution: Solution, number: int = 0) -> MachineParameters:
         for key, text in parameters.sources.items()
         if not any(key.startswith(f"{k}.") for k in fitted)
     }
-    name = f"{parameters.name}_calibrated_{number}" if number else parameters.name
+    name = f"{parameters.name}{ending}"
     return parameters.model_copy(update={"name": name, "sources": {**others, **fitted}})
 
 
-def fit_texts(solution: Solution) -> list[str]:
+def fit_texts(parameter_map: ParameterMap, fit: Fit) -> list[str]:
     """Return for each quantity ``damper_friction 27.5 ± 2.1 N (expected 35 ± 9 N)``."""
-    parameter_map, texts = solution.parameter_map, []
-    values = parameter_map.in_units(_rounded(solution))
+    texts = []
+    values = parameter_map.in_units(_rounded(parameter_map, fit))
     expected, deviation = map(
         parameter_map.in_units, (parameter_map.expected, parameter_map.deviation)
     )
-    posterior = solution.posterior.spread() * deviation
+    posterior = fit.remaining[: len(deviation)] * deviation
     for index, unknown in enumerate(parameter_map.unknowns):
         after, before = (
             f"{n[index]:.10g} ± {_short(s[index])} {unknown.unit.shown}".rstrip()
@@ -181,16 +220,16 @@ def fit_texts(solution: Solution) -> list[str]:
     return texts
 
 
-def _rounded(solution: Solution) -> FloatArray:
-    """Return the point of a solution, rounded to about 0.1 % of the prior's standard deviation.
+def _rounded(parameter_map: ParameterMap, fit: Fit) -> FloatArray:
+    """Return the point of a fit, rounded to about 0.1 % of the prior's standard deviation.
 
     The rounding is decimal in the unit in which each quantity is written.
     """
-    parameter_map, point = solution.parameter_map, []
+    point = []
     for index, unknown in enumerate(parameter_map.unknowns):
         unit = unknown.unit.shown
         value, deviation = (
-            from_base(float(a[index]), unit) for a in (solution.point, parameter_map.deviation)
+            from_base(float(a[index]), unit) for a in (fit.values, parameter_map.deviation)
         )
         point.append(to_base(round(value, 3 - math.floor(math.log10(deviation))), unit))
     return np.clip(point, parameter_map.lower, parameter_map.upper)

@@ -1,4 +1,4 @@
-"""Calibrate a machine: search from several starts, store each evaluation."""
+"""Calibrate a machine: search from several starts."""
 
 from dataclasses import dataclass
 
@@ -9,14 +9,23 @@ from wm_drake.batch.remembered import model_version, sources_version
 from wm_drake.model.machine import Machine
 from wm_drake.parameters.free import FreeFile
 from wm_drake.parameters.types import FloatArray
-from wm_drake.studies.calibrate.computed import Evaluation, PointRunner
+from wm_drake.studies.calibrate.computed import Evaluation
 from wm_drake.studies.calibrate.parameter_map import ParameterMap, parameter_map_of
 from wm_drake.studies.calibrate.solutions import Solution, distinct
 from wm_drake.studies.calibrate.targets import Targets
-from wm_drake.studies.fitting.posterior import Posterior
-from wm_drake.studies.fitting.problem import PriorProblem, Residuals
-from wm_drake.studies.fitting.search import Search, descended, smooth_slopes
-from wm_drake.studies.fitting.starts import DRAWS, start_number
+from wm_drake.studies.experiment import Experiment
+from wm_drake.studies.fitting.assessment import assess
+from wm_drake.studies.fitting.fit import Fit, SearchLog
+from wm_drake.studies.fitting.methods import descents
+from wm_drake.studies.fitting.problem import (
+    KINKED,
+    FitProblem,
+    Measurement,
+    ModelValues,
+    Progress,
+)
+from wm_drake.studies.fitting.search import Optimum, Search, silent
+from wm_drake.studies.fitting.starts import DRAWS, starts_of
 
 RELATIVE_DEVIATION = 0.05
 """Relative standard deviation of a measured amplitude from the computed one.
@@ -35,9 +44,6 @@ that a limit gives way only where no machine within the bounds keeps it.
 RESOLUTION = 1e-4
 """Resolution of the published amplitudes. [m]"""
 
-ITERATIONS = 60
-"""Default limit of iterations of a search."""
-
 
 @dataclass(frozen=True)
 class SearchPlan:
@@ -46,7 +52,7 @@ class SearchPlan:
     Attributes:
         starts: Number of starts. The first is the one in the free file; the others are drawn at
             random around it.
-        iterations: Limit of iterations from each start; 0 for `ITERATIONS`.
+        iterations: Limit of iterations from each start; 0 for that of `KINKED`.
         deviation: Relative standard deviation of an amplitude.
         resolution: Resolution of the measured amplitudes. Rounding adds the standard deviation
             resolution / sqrt(12). [m]
@@ -106,94 +112,84 @@ def identity_of(
 
 
 def calibrate(
-    runner: PointRunner, free: FreeFile, targets: Targets, plan: SearchPlan
+    experiment: Experiment,
+    free: FreeFile,
+    targets: Targets,
+    plan: SearchPlan,
+    progress: Progress = silent,
 ) -> Calibration:
     """Search for machines with the measured amplitudes.
 
-    Each evaluation is stored in the ledger before it is used. A search that is started again takes
-    the same path, reads stored evaluations and continues where it stopped. The result does not
-    depend on the number of workers.
+    If the runs of the experiment are stored in a ledger, a search that is started again takes the
+    same path, reads stored runs and continues where it stopped. The result does not depend on the
+    number of workers.
 
     Args:
-        runner: The machine, and the ledger of this calibration. Numbers that the free file does not
-            name keep their values.
+        experiment: Runs of the machine. Numbers that the free file does not name keep their values.
         free: Quantities that may change, with bounds and priors.
         targets: Measured amplitudes.
         plan: Settings of the search.
+        progress: Called with the fraction done and the least misfit so far.
 
     Raises:
         InputError: the free file does not fit the machine, the machine of the first start cannot be
             run, or a setting of the plan is not allowed.
     """
-    parameter_map = parameter_map_of(runner.machine, free)
-    values = runner.values(parameter_map, targets)
-    if np.isnan(values(parameter_map.start[None]).amplitude).all():
-        values.check(parameter_map.start)
-    problem = calibration_problem(values, plan)
-    ended = []
-    for number in range(plan.starts):
-        search = Search(problem, runner.report_of(number))
-        start = start_number(search, number, plan.seed, plan.start_draws)
-        end = descended(search, start, plan.iterations or ITERATIONS)
-        ended.append(_solution(number, search, end.point, values))
+    parameter_map = parameter_map_of(experiment.machine, free)
+    values = Evaluation(experiment, parameter_map, targets)
+    values.check(parameter_map.start)
+    search = Search(calibration_problem(values, plan))
+    begins = starts_of(search, plan.seed, plan.starts, plan.start_draws)
+    ends = list(descents(search, begins, plan.starts, plan.iterations, progress))
+    ended = [
+        _solution(number, assess(search.problem, end.point, _log(plan, end)), values)
+        for number, end in enumerate(ends)
+    ]
     return Calibration(parameter_map, targets, plan, tuple(distinct(ended)), tuple(ended))
 
 
-def calibration_problem(values: Evaluation, plan: SearchPlan) -> PriorProblem:
+def _log(plan: SearchPlan, end: Optimum) -> SearchLog:
+    return SearchLog("least squares", plan.seed, end.evaluations)
+
+
+def calibration_problem(values: Evaluation, plan: SearchPlan) -> FitProblem:
     """Return the problem of the free quantities of an evaluation.
 
-    The first `targets.count` residuals are those of the data. Those of values that have a limit
-    follow, then those of what is known beside the priors of the quantities.
+    The measured values are the logarithms of ratios, so 0. What is known are preloads, relations
+    and elongations; a limit of a value is a wish.
     """
     parameter_map, targets = values.parameter_map, values.targets
     spread = plan.spread(targets.amplitude)
 
-    def residuals(points: FloatArray) -> Residuals:
+    def evaluate(points: FloatArray) -> ModelValues:
         computed = values(points)
-        known = parameter_map.prior_residuals(points, computed.preload, computed.elongation)
-        beyond = BEYOND_LIMIT * targets.excesses(computed.amplitude, computed.responses, spread)
         exact, smooth = (
-            np.hstack([targets.residuals(amplitude, computed.responses, spread), beyond, known])
+            targets.residuals(amplitude, computed.responses, spread)
             for amplitude in (computed.amplitude, computed.power_mean)
         )
-        return Residuals(exact, smooth)
+        return ModelValues(
+            exact,
+            smooth,
+            parameter_map.prior_residuals(points, computed.preload, computed.elongation),
+            BEYOND_LIMIT * targets.excesses(computed.amplitude, computed.responses, spread),
+        )
 
-    return PriorProblem(parameter_map.unknowns, residuals)
-
-
-def costs_at(problem: PriorProblem, point: FloatArray, targets: Targets) -> tuple[float, float]:
-    """Return half the sums of squares of the data and of the priors at a point, in coordinates."""
-    squares = problem.residuals(point[None])[0] ** 2
-    # the residuals after those of the data belong to the prior
-    return (
-        0.5 * float(np.sum(squares[: targets.count])),
-        0.5 * float(np.sum(squares[targets.count :]) + np.sum(point**2)),
-    )
+    data = Measurement("targets", np.zeros(targets.count), errors="known")
+    return FitProblem(parameter_map.unknowns, (data,), evaluate, KINKED)
 
 
-def _solution(
-    number: int, search: Search[PriorProblem], coordinates: FloatArray, values: Evaluation
-) -> Solution:
+def _solution(number: int, fit: Fit, values: Evaluation) -> Solution:
     """Return the end of a search as a solution."""
-    problem, targets = search.problem, values.targets
-    point = problem.points_at(coordinates)
-    data, prior = costs_at(problem, coordinates, targets)
-    computed = values(point[None])
-    # a limit is a wish: it does not make a quantity more certain
-    limited = int(np.isfinite(targets.limit_of_each()).sum())
-    limits = slice(targets.count, targets.count + limited)
-    here = search.evaluated(coordinates[None]).smooth
-    slopes = smooth_slopes(search, coordinates, here, problem.descent.steps[0])
-    slopes = np.delete(slopes[: here.shape[1]], limits, axis=0)
+    problem = fit.problem
+    squares = 0.5 * problem.evaluated(fit.linear.point[None]).exact[0] ** 2
+    computed = values(fit.values[None])
     return Solution(
         parameter_map=values.parameter_map,
-        targets=targets,
+        targets=values.targets,
         start=number,
-        point=point,
+        fit=fit,
         amplitude=computed.amplitude[0],
         responses=computed.responses[0],
-        data_cost=data,
-        prior_cost=prior,
-        posterior=Posterior(coordinates, slopes, targets.count, problem.unknowns),
-        evaluations=search.evaluations,
+        data_cost=float(np.sum(squares[: problem.count])),
+        prior_cost=float(np.sum(squares[problem.count :])),
     )

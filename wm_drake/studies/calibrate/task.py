@@ -1,8 +1,7 @@
 """Check the options of a calibration, and run it."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,24 +15,42 @@ from wm_drake.parameters.measured import measured_amplitudes, measured_responses
 from wm_drake.parameters.units import plain_number
 from wm_drake.simulation.cases import case_of
 from wm_drake.simulation.records import Record
-from wm_drake.studies.answer import Answer
-from wm_drake.studies.calibrate.computed import PointRunner
+from wm_drake.studies.answer import Answer, Part
 from wm_drake.studies.calibrate.options import CalibrateOptions
 from wm_drake.studies.calibrate.page import calibrate_answer
 from wm_drake.studies.calibrate.parameter_map import parameter_map_of
 from wm_drake.studies.calibrate.prediction import check_held_out, predict
+from wm_drake.studies.calibrate.records_task import CalibrateRecordsTask
 from wm_drake.studies.calibrate.response_targets import with_deviations
 from wm_drake.studies.calibrate.solutions import DIFFERENCE, solved_machine
-from wm_drake.studies.calibrate.study import RELATIVE_DEVIATION, SearchPlan, calibrate
+from wm_drake.studies.calibrate.study import (
+    RELATIVE_DEVIATION,
+    Calibration,
+    SearchPlan,
+    calibrate,
+)
 from wm_drake.studies.calibrate.targets import AMPLITUDE, MEASURED, Targets, targets_of
 from wm_drake.studies.executor import Executor
+from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.inputs import existing_file, pairs_of, with_measured
 from wm_drake.studies.modes.natural import natural_modes
+from wm_drake.studies.next.knowledge import Knowledge, of_calibration
+from wm_drake.studies.next.task import next_block
 from wm_drake.studies.study import Task
+
+OF_RECORDS = ("unknown", "by", "test", "load", "profile", "speed", "unit", "channels")
+"""Options that are about records, not about targets."""
+
+
+def calibrate_task(options: CalibrateOptions, machine: Machine) -> Task:
+    """Return the calibration to records, if there are any, or that to targets."""
+    if options.records:
+        return CalibrateRecordsTask(options, machine)
+    return CalibrateTask(options, machine)
 
 
 class CalibrateTask(Task):
-    """A calibration with checked options."""
+    """A calibration to targets with checked options."""
 
     def __init__(self, options: CalibrateOptions, machine: Machine) -> None:
         """Read targets and free file, and check the settings of the searches.
@@ -41,7 +58,12 @@ class CalibrateTask(Task):
         Raises:
             InputError: an option or a file is wrong.
         """
-        self.held_out = _groups(options.leave_out)
+        for name in OF_RECORDS:
+            if name in options.model_fields_set:
+                raise input_error("is about records, and none is given", where=f"--{name}")
+        if options.free is None:
+            raise input_error("is missing; name a file of free quantities", where="--free")
+        self.options, self.held_out = options, _groups(options.leave_out)
         measured = with_measured(machine.parameters, options.targets, "--targets")
         deviations = _fractions(options.deviation, "--deviation")
         amplitude = deviations.pop(AMPLITUDE, RELATIVE_DEVIATION)
@@ -73,12 +95,15 @@ class CalibrateTask(Task):
 
     def run(self, executor: Executor) -> Answer:
         """Calibrate, predict the held-out loads, and run the best machine."""
-        assert executor.ledger is not None  # the study is declared with runs
-        runner = PointRunner(self.machine, executor.ledger, executor.workers)
-        with _searches(executor, runner, self.plan.starts) as shown:
-            calibration = calibrate(shown, self.free, self.targets, self.plan)
-        with _searches(executor, runner, len(self.held_out) * self.plan.starts) as shown:
-            predictions = predict(shown, self.free, calibration, self.held_out)
+        experiment = Experiment(self.machine, (), executor.simulate)
+        with executor.fraction("searches") as report:
+            calibration = calibrate(
+                experiment, self.free, self.targets, self.plan, lambda done, least: report(done)
+            )
+        predictions = []
+        for group in self.held_out:
+            with executor.fraction(f"without {', '.join(group)}"):
+                predictions += predict(experiment, self.free, calibration, [group])
         best = build_machine(solved_machine(calibration.solutions[0]))
         parameters, records = best.parameters, dict[int, Record]()
         cases = [case_of(parameters, name, gasket=gasket) for name, gasket in self.targets.loads]
@@ -87,23 +112,22 @@ class CalibrateTask(Task):
         states = titles if parameters.gasket else {False: "modes"}
         modes = {title: natural_modes(best, gasket=gasket) for gasket, title in states.items()}
         runs = [records[number] for number in range(len(cases))]
-        return calibrate_answer(calibration, predictions, parameters, runs, modes)
+        answer = calibrate_answer(calibration, predictions, parameters, runs, modes)
+        part = self._next(executor, calibration)
+        return replace(answer, parts=(*answer.parts, part))
 
+    def _next(self, executor: Executor, calibration: Calibration) -> Part:
+        """Return what to measure next, given the best solution of a calibration."""
+        best, options = calibration.solutions[0], self.options
+        words = ["wm-drake study next", options.machine, f"--free {options.free}"]
+        words += [f"--calibrated {executor.out or 'FOLDER'}"]
 
-@contextmanager
-def _searches(executor: Executor, runner: PointRunner, searches: int) -> Iterator[PointRunner]:
-    """Yield the runner with a progress bar of searches, machines and the least cost."""
-    with executor.progress(searches, "searches") as bar:
-        ended, last = 0, (0, 0)
+        def known() -> Knowledge:
+            covariance = best.fit.covariance
+            return of_calibration(self.machine, calibration.parameter_map, best.point, covariance)
 
-        def report(search: int, evaluations: int, best: float) -> None:
-            nonlocal ended, last
-            if last[1] > evaluations or last[0] != search:  # another search has begun
-                ended += 1
-            last = search, evaluations
-            bar(ended, f"{evaluations} machines, least cost {best:.1f}")
-
-        yield replace(runner, report=report)
+        profile = self.machine.parameters.profile
+        return next_block(executor, known, " ".join(words), profile, self.targets.loads)
 
 
 def _targets(parameters: MachineParameters, deviations: Mapping[str, float]) -> Targets:

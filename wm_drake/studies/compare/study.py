@@ -5,11 +5,11 @@ corrected: the prediction has gravity, the axes of the sensors, and what the rec
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from scipy.sparse import csr_array
 from scipy.stats import t as student
 
 from wm_drake.parameters import SpinProfile
@@ -58,27 +58,29 @@ RATE = Quantity("clock slow by", Unit("", "ppm"), 0)
 INTEGRATED = Quantity("RMS displacement by integration", Unit("m", "mm"), 3)
 
 Signals = Callable[[FloatArray], FloatArray]
-"""Function of a signal without gaps (n,) that returns another one (n,)."""
+"""Function of signals without gaps (n, k) that returns others (n, k)."""
 
 
 def in_pieces(signals: FloatArray, change: Signals) -> FloatArray:
     """Return signals (n, k) whose pieces without gaps are changed by a function; NaN in gaps."""
     changed = np.full(signals.shape, np.nan)
-    for k, column in enumerate(signals.T):
-        valid = np.flatnonzero(np.isfinite(column))
+    # signals with the same gaps go together: filters take several at once
+    groups: dict[bytes, list[int]] = {}
+    for k, mask in enumerate(np.isfinite(signals).T):
+        groups.setdefault(mask.tobytes(), []).append(k)
+    for columns in map(np.array, groups.values()):
+        valid = np.flatnonzero(np.isfinite(signals[:, columns[0]]))
         for piece in np.split(valid, np.flatnonzero(np.diff(valid) > 1) + 1):
             if len(piece) >= LEAST_PIECE:
-                changed[piece, k] = change(column[piece])
+                changed[np.ix_(piece, columns)] = change(signals[np.ix_(piece, columns)])
     return changed
 
 
-def band_passed(pair: Pair, sides: slice = slice(None)) -> FloatArray:
-    """Return measured and predicted signals within the pass band of the run. (2, n, k)
-
-    Args:
-        sides: Which of both.
-    """
-    return np.stack([in_pieces(s, partial(_passed, pair=pair)) for s in pair.both[sides]])
+def band_passed(signals: FloatArray, run: Record) -> FloatArray:
+    """Return signals (n, k) within the pass band of a run."""
+    period = sample_period(run)
+    band = pass_band(profile_of(run), period)
+    return in_pieces(signals, lambda part: filtered(part, period, band))
 
 
 def envelopes_of(signals: FloatArray, time: FloatArray) -> FloatArray:
@@ -89,11 +91,12 @@ def envelopes_of(signals: FloatArray, time: FloatArray) -> FloatArray:
     """
     step = float(time[1] - time[0])
 
-    def upper(signal: FloatArray) -> FloatArray:
-        return peak_line(np.asarray(step * np.arange(len(signal), dtype=float)), signal)
+    def upper(part: FloatArray) -> FloatArray:
+        at = np.asarray(step * np.arange(len(part), dtype=float))
+        return np.stack([peak_line(at, np.ascontiguousarray(signal)) for signal in part.T], axis=1)
 
-    def lower(signal: FloatArray) -> FloatArray:
-        return -upper(-signal)
+    def lower(part: FloatArray) -> FloatArray:
+        return -upper(-part)
 
     return np.stack([in_pieces(signals, upper), in_pieces(signals, lower)])
 
@@ -137,11 +140,14 @@ def means_at(values: FloatArray, numbers: np.ndarray, count: int) -> FloatArray:
     Args:
         numbers: Number of the place of each sample. (n,)
     """
-    belongs = (numbers == np.arange(count)[:, None]).astype(float)
-    valid = np.isfinite(values)
-    totals = belongs @ valid
-    sums = belongs @ np.where(valid, values, 0.0)
-    return np.where(totals > 0.0, sums / np.maximum(totals, 1.0), np.nan)
+    samples = np.arange(len(numbers))
+    belongs = csr_array((np.ones(len(numbers)), (numbers, samples)), (count, len(numbers)))
+    columns = np.moveaxis(values, -2, 0)
+    flat = columns.reshape(len(numbers), -1)
+    valid = np.isfinite(flat)
+    totals, sums = belongs @ valid.astype(float), belongs @ np.where(valid, flat, 0.0)
+    means = np.where(totals > 0.0, sums / np.maximum(totals, 1.0), np.nan)
+    return np.moveaxis(means.reshape(count, *columns.shape[1:]), 0, -2)
 
 
 def signals_of(pair: Pair, places: xr.DataArray) -> xr.Dataset:
@@ -158,17 +164,17 @@ def signals_of(pair: Pair, places: xr.DataArray) -> xr.Dataset:
     """
     run, period = pair.run, sample_period(pair.run)
     time, count = run.time.values, places.size
-    passed = band_passed(pair)
+    passed = np.stack([band_passed(signals, run) for signals in pair.both])
     envelopes = np.stack([envelopes_of(signals, time) for signals in passed])  # source, side
     numbers = _place_numbers(run, places)
     at_places = means_at(envelopes, numbers, count)
     ranges = speed_ranges(run, profile_of(run))
     masks = [part.samples for part in ranges]
     integrated = [
-        in_pieces(s, lambda part: integrated_twice((part - part.mean())[:, None], period)[:, 0])
+        in_pieces(s, lambda part: integrated_twice(part - part.mean(axis=0), period))
         for s in pair.both
     ]
-    twice = np.stack([in_pieces(s, partial(_passed, pair=pair)) for s in integrated])
+    twice = np.stack([band_passed(signals, run) for signals in integrated])
     one = order_one(pair)
     turned = one.measured.values * np.conj(one.predicted.values) * np.exp(-1j * one.start.item())
     window = np.searchsorted(time, one.time.values).clip(0, len(time) - 1)
@@ -200,12 +206,6 @@ def signals_of(pair: Pair, places: xr.DataArray) -> xr.Dataset:
     )
 
 
-def _passed(signal: FloatArray, pair: Pair) -> FloatArray:
-    """Return a signal without gaps within the pass band of a run."""
-    period = sample_period(pair.run)
-    return filtered(signal[:, None], period, pass_band(profile_of(pair.run), period))[:, 0]
-
-
 def rms_of(signals: FloatArray, masks: Sequence[np.ndarray]) -> FloatArray:
     """Return the RMS of signals (2, n, k) in regions; NaN if less than half is there. (2, r, k)"""
     rows = []
@@ -228,25 +228,18 @@ def _largest_orders(signals: FloatArray, run: Record) -> FloatArray:
     return np.where(largest >= 0.0, largest, np.nan)
 
 
-def envelope_sizes(passed: FloatArray, run: Record, places: xr.DataArray) -> FloatArray:
-    """Return half the distances between the envelopes of signals at places. (2, places, k)
-
-    Args:
-        passed: As of `band_passed`.
-    """
-    time = run.time.values
-    sides = np.stack([envelopes_of(signals, time) for signals in passed])
-    halves = 0.5 * (sides[:, 0] - sides[:, 1])
-    return means_at(halves, _place_numbers(run, places), places.size)
+def envelope_sizes(signals: FloatArray, run: Record, places: xr.DataArray) -> FloatArray:
+    """Return half the distances between the envelopes of signals (n, k) at places. (places, k)"""
+    upper, lower = envelopes_of(band_passed(signals, run), run.time.values)
+    return means_at(0.5 * (upper - lower), _place_numbers(run, places), places.size)
 
 
-def order_one_sizes(pair: Pair, places: xr.DataArray) -> FloatArray:
-    """Return the sizes of order 1, measured and predicted, at places. (2, places, k)"""
-    one = order_one(pair)
-    time = pair.run.time.values
-    window = np.searchsorted(time, one.time.values).clip(0, len(time) - 1)
-    sizes = np.stack([np.abs(one.measured.values), np.abs(one.predicted.values)])
-    return means_at(sizes, _place_numbers(pair.run, places)[window], places.size)
+def order_one_sizes(signals: FloatArray, run: Record, places: xr.DataArray) -> FloatArray:
+    """Return the sizes of order 1 of signals (n, k) at places. (places, k)"""
+    angle, time = run.drum_angle.values, run.time.values
+    vectors = order_vectors(signals, angle, time, np.array([1.0])).isel(order=0)
+    window = np.searchsorted(time, vectors.time.values).clip(0, len(time) - 1)
+    return means_at(np.abs(vectors.values), _place_numbers(run, places)[window], places.size)
 
 
 def repeats_of(pairs: Sequence[Pair], places: xr.DataArray) -> xr.Dataset:

@@ -44,8 +44,12 @@ from wm_drake.studies.study import Task
 class CompareTask(Task):
     """The comparison with checked options."""
 
-    def __init__(self, options: CompareOptions, machine: Machine) -> None:
-        """Read test, recordings, load and profile."""
+    def __init__(self, options: CompareOptions, machine: Machine, case: Case | None = None) -> None:
+        """Read test, recordings, load and profile.
+
+        Args:
+            case: The load with its profile; None for that of the options or of the test.
+        """
         self.options, self.machine = options, machine
         parameters = machine.parameters
         if parameters.cabinet_moves:
@@ -58,7 +62,7 @@ class CompareTask(Task):
             self.test = load_recorded_test(existing_file(options.test, "--test"))
         with problems_of_file(options.test or Path("--machine")):
             self.points = sensor_points(machine, self.test)
-        self.case = self._case()
+        self.case = case or self._case()
         names, _ = channel_names(options, ("time", "speed", *self.test.sensors))
         paths = [existing_file(path, "RECORD") for path in options.records]
         for path in paths:

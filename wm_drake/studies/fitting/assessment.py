@@ -1,24 +1,25 @@
-"""Assessment of a fit: bounds that were hit, covariance, intervals, error of left-out tests."""
+"""Assessment of a fit: bounds that were hit, covariance, intervals."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from scipy.stats import t as student
 
 from wm_drake.parameters.types import FloatArray, IndexArray
-from wm_drake.studies.fitting.fit import Direction, Estimate, Fit, SearchLog, TestError
-from wm_drake.studies.fitting.problem import FitProblem, rmse
+from wm_drake.studies.fitting.fit import (
+    Direction,
+    Estimate,
+    Fit,
+    Linearized,
+    SearchLog,
+    TestError,
+)
+from wm_drake.studies.fitting.problem import FitProblem, Rows, Unknown, rmse
 from wm_drake.studies.fitting.profile import Profile
-from wm_drake.studies.fitting.search import Search, descended
+from wm_drake.studies.fitting.search import Search, smooth_slopes
 
 CONFIDENCE = 0.95
-
-AT_BOUND = 1e-3
-"""An unknown this near a bound, in ranges, has hit it."""
-
-DIFFERENCE = 1e-3
-"""Step of the central differences, in ranges."""
 
 FLAT_SIDE = 0.1
 """Effect of a step to one side by that of a step to the other, below which that side is flat."""
@@ -35,35 +36,28 @@ WIDEST = 0.25
 TAKES_PART = 0.3
 """Component of a unit direction from which on an unknown is named with it."""
 
-SEEN = 1e-10
-"""Smallest eigenvalue, by the largest, of the information in the other tests about a direction that
-is searched anew without a test. In other directions the fit to all tests is kept."""
-
-FAR = 0.05
-"""Change of an unknown, in ranges, above which one step is not trusted and the fit is repeated."""
-
-MOST_STEPS = 20
-"""Most steps of a search without one test."""
-
 
 def assess(problem: FitProblem, point: FloatArray, log: SearchLog) -> Fit:
     """Return the fit at the point (p,) where a search ended, in coordinates.
 
     The covariance is the sandwich of generalised least squares: each test has its own variance,
     larger by the correlation of its samples where they follow each other. So a densely sampled test
-    does not count for more than it contains. Values with errors of different size have a variance
-    each (`Measurement.heteroscedastic`). An interval that would leave the bounds ends by its
-    profile (`wm_drake.studies.fitting.profile`).
+    does not count for more than it contains. Errors of known deviations keep theirs, as priors and
+    what is known beside them do; with known ones alone, the covariance is that of the posterior
+    (Laplace). An interval that would leave the bounds ends by its profile
+    (`wm_drake.studies.fitting.profile`), that of an unknown with a prior at the bound.
 
     Args:
         point: Where the search ended.
         log: Course of the search; the evaluations of the assessment are added to it.
     """
-    residuals = problem.residuals(point[None])[0]
-    jacobian, evaluated = central_differences(problem, point, residuals)
-    bound = _bounds_hit(point, _spread(problem, residuals, jacobian))
-    free = np.flatnonzero(bound == 0)
-    spread = _spread(problem, residuals, jacobian[:, free])
+    rows = problem.evaluated(point[None])
+    residuals = rows.exact[0, : problem.count]
+    jacobian, evaluated = _derivatives(problem, point, rows)
+    jacobian = np.delete(jacobian, slice(problem.count, problem.count + rows.wished), axis=0)
+    bound = _bounds_hit(problem, point, _spread(problem, residuals, jacobian))
+    free = np.flatnonzero((bound == 0) | problem.has_prior)
+    spread = _spread(problem, residuals, jacobian, free)
     p = len(problem.unknowns)
     slope = _slopes(problem, point)[free]
     covariance = np.full((p, p), np.nan)
@@ -72,38 +66,25 @@ def assess(problem: FitProblem, point: FloatArray, log: SearchLog) -> Fit:
     return Fit(
         problem=problem,
         log=replace(log, evaluations=log.evaluations + evaluated + 2),
-        estimates=_estimates(problem, point, bound, spread),
+        estimates=_estimates(problem, point, bound, spread, free),
         rmse=float(rmse(residuals)),
         tests=_test_errors(problem, residuals),
         computed=computed,
         baselines=baselines,
         covariance=covariance,
         condition=spread.condition,
-        undetermined=spread.undetermined([problem.unknowns[k].name for k in free]),
+        undetermined=spread.undetermined([problem.unknowns[k] for k in free]),
+        linear=Linearized(point, jacobian, problem.count),
     )
 
 
 def evaluated(problem: FitProblem) -> Fit:
     """Return the fit of a problem without unknowns: its errors only."""
-    nowhere = np.zeros(0)
-    residuals = problem.residuals(nowhere[None])[0]
-    computed, baselines = _computed(problem, nowhere)
     note = "all numbers are given: nothing was searched"
-    return Fit(
-        problem=problem,
-        log=SearchLog("evaluation", evaluations=2, notes=(note,)),
-        estimates=(),
-        rmse=float(rmse(residuals)),
-        tests=_test_errors(problem, residuals),
-        computed=computed,
-        baselines=baselines,
-        covariance=np.zeros((0, 0)),
-        condition=1.0,
-        undetermined=(),
-    )
+    return assess(problem, np.zeros(0), SearchLog("evaluation", notes=(note,)))
 
 
-def _bounds_hit(point: FloatArray, spread: "_Spread") -> IndexArray:
+def _bounds_hit(problem: FitProblem, point: FloatArray, spread: "_Spread") -> IndexArray:
     """Return which unknowns are at their lower (-1) or upper (1) bound; 0 for undetermined ones.
 
     Args:
@@ -111,14 +92,34 @@ def _bounds_hit(point: FloatArray, spread: "_Spread") -> IndexArray:
         spread: Spread of all unknowns. What it does not determine is at a bound by chance: the
             search may end anywhere in a flat valley.
     """
-    bound = np.where(point < AT_BOUND, -1, np.where(point > 1.0 - AT_BOUND, 1, 0))
-    return np.where(spread.resolved_deviation > WIDEST, 0, bound)
+    place, near = (point - problem.lower) / problem.ranges, problem.descent.near
+    bound = np.where(place < near, -1, np.where(place > 1.0 - near, 1, 0))
+    by_chance = (spread.resolved_deviation > WIDEST) & ~problem.has_prior
+    return np.where(by_chance, 0, bound)
+
+
+def _derivatives(problem: FitProblem, point: FloatArray, rows: Rows) -> tuple[FloatArray, int]:
+    """Return the derivatives (m, p) of the rows by the unknowns, and how many points it took.
+
+    They are central differences, or those of the search where rows have kinks.
+
+    Args:
+        point: In coordinates (p,).
+        rows: Rows there.
+    """
+    step = problem.descent.difference
+    if not len(point):
+        return np.zeros((rows.exact.shape[1], 0)), 0
+    if step is None:
+        steps = problem.descent.steps[0]
+        return smooth_slopes(Search(problem), point, rows.smooth, steps), len(point)
+    return central_differences(problem, point, rows.exact[0], step)
 
 
 def central_differences(
-    problem: FitProblem, point: FloatArray, residuals: FloatArray
+    problem: FitProblem, point: FloatArray, rows: FloatArray, step: float = 1e-3
 ) -> tuple[FloatArray, int]:
-    """Return the derivatives of the residuals by the unknowns, in unit coordinates.
+    """Return the derivatives of the rows by the unknowns, in coordinates.
 
     They are one-sided at a bound. They are also one-sided at a corner, where a step to one side has
     nearly no effect that the other unknowns cannot take back: the friction force of a damper that
@@ -127,49 +128,56 @@ def central_differences(
     The step to that side is long, because a short one shows the errors of integration instead.
 
     Args:
-        point: In unit coordinates (p,).
-        residuals: Residuals at the point (n,).
+        point: In coordinates (p,).
+        rows: Rows at the point (m,).
+        step: As a part of the range.
 
     Returns:
-        Derivatives (n, p), and how many points were evaluated.
+        Derivatives (m, p), and how many points were evaluated.
     """
-    steps = DIFFERENCE * np.eye(len(point))
-    sides = np.clip(np.concatenate([point + steps, point - steps]), 0.0, 1.0)
-    above, below = np.split(problem.residuals(sides), 2)
-    width = np.diag(sides[: len(point)] - sides[len(point) :])
+    p = len(point)
+    steps = step * np.diag(problem.ranges)
+    sides = np.concatenate([point + steps, point - steps])
+    sides = np.clip(sides, problem.lower, problem.upper)
+    above, below = problem.evaluated(sides).exact.reshape(2, p, -1)
+    width = np.diag(sides[:p] - sides[p:])
     slopes = (above - below) / width[:, None]
-    flat = _flat_sides(point, residuals, above, below)
+    flat = _flat_sides(rows, above, below)
+    at_bound = (point - problem.lower < step * problem.ranges) | (
+        problem.upper - point < step * problem.ranges
+    )
+    flat = np.where(at_bound | problem.has_prior, 0.0, flat)
     corners = np.flatnonzero(flat)
     if len(corners):
-        far = point + WIDEST * np.diag(flat)[corners]
-        far = np.clip(far, 0.0, 1.0)
+        far = point + WIDEST * np.diag(flat * problem.ranges)[corners]
+        far = np.clip(far, problem.lower, problem.upper)
         length = np.sum(far - point, axis=1)
-        slopes[corners] = (problem.residuals(far) - residuals) / length[:, None]
+        slopes[corners] = (problem.evaluated(far).exact - rows) / length[:, None]
     return np.asarray(slopes.T), len(sides) + len(corners)
 
 
-def _flat_sides(
-    point: FloatArray, residuals: FloatArray, above: FloatArray, below: FloatArray
-) -> FloatArray:
+def _flat_sides(rows: FloatArray, above: FloatArray, below: FloatArray) -> FloatArray:
     """Return for each unknown the side, 1 or -1, where a step has nearly no effect; 0 if none.
 
     Of an effect only that part counts which no change of the other unknowns has.
     """
-    side = np.zeros(len(point))
-    for k in range(len(point)):
+    side = np.zeros(len(above))
+    for k in range(len(above)):
         others = np.delete(above - below, k, axis=0)
-        steps = np.stack([above[k], below[k]]) - residuals
+        steps = np.stack([above[k], below[k]]) - rows
         remainder = steps - steps @ np.linalg.pinv(others, rcond=SAME) @ others
         upwards, downwards = np.linalg.norm(remainder, axis=1)
         side[k] = float(upwards < FLAT_SIDE * downwards) - float(downwards < FLAT_SIDE * upwards)
-    at_bound = (point < DIFFERENCE) | (point > 1.0 - DIFFERENCE)
-    return np.where(at_bound, 0.0, side)
+    return side
 
 
 class _Spread:
-    """Spread of the free unknowns in unit coordinates, from the singular values of the Jacobian."""
+    """Spread of the free unknowns in ranges, from the singular values of the Jacobian."""
 
-    def __init__(self, jacobian: FloatArray, variance: FloatArray, resolution: FloatArray) -> None:
+    def __init__(
+        self, jacobian: FloatArray, variance: FloatArray, resolution: FloatArray, freedom: float
+    ) -> None:
+        self.freedom = freedom
         _, self.singular, rows = np.linalg.svd(jacobian, full_matrices=False)
         self.directions = rows
         smallest = 1e-12 * max(float(self.singular.max(initial=0.0)), 1e-300)
@@ -195,62 +203,77 @@ class _Spread:
             return 1.0
         return float(self.singular[0] / self.singular[-1]) if self.singular[-1] > 0.0 else np.inf
 
-    def undetermined(self, names: list[str]) -> tuple[Direction, ...]:
-        """Return the directions along which the data do not determine the unknowns."""
+    def undetermined(self, unknowns: Sequence[Unknown]) -> tuple[Direction, ...]:
+        """Return the directions along which neither data nor priors determine the unknowns."""
         undetermined = []
         for row, deviation in zip(self.directions, self.deviations, strict=True):
             if deviation > WIDEST:
-                taking = np.flatnonzero(np.abs(row) > TAKES_PART)
+                taking = np.flatnonzero(np.abs(row) > TAKES_PART).tolist()
                 parts = row[taking] / row[taking][np.argmax(np.abs(row[taking]))]
-                undetermined.append(
-                    Direction(
-                        tuple(names[k] for k in taking), tuple(map(float, parts)), float(deviation)
-                    )
-                )
+                if all(unknowns[k].prior for k in taking):
+                    continue
+                names = tuple(unknowns[k].name for k in taking)
+                undetermined.append(Direction(names, tuple(map(float, parts)), float(deviation)))
         return tuple(undetermined)
 
 
-def _spread(problem: FitProblem, residuals: FloatArray, jacobian: FloatArray) -> _Spread:
-    """Return the spread of the unknowns whose derivatives are given."""
-    variance = _variances(problem, residuals, jacobian)
-    return _Spread(jacobian, variance, np.maximum(variance, _resolution(problem) ** 2))
+def _spread(
+    problem: FitProblem,
+    residuals: FloatArray,
+    jacobian: FloatArray,
+    free: IndexArray | slice = slice(None),
+) -> _Spread:
+    """Return the spread of the free unknowns; all by default.
+
+    Args:
+        residuals: Of the measurements (n,).
+        jacobian: Derivatives (m, p) of all rows but those of what is wished, by coordinates.
+        free: Indices of the unknowns whose spread is wanted.
+    """
+    by_range = (jacobian * problem.ranges)[:, free]
+    leverages = _leverages(problem, by_range)
+    variance = np.ones(len(jacobian))
+    variance[: problem.count] = _variances(problem, residuals, leverages)
+    resolution = np.zeros(len(jacobian))
+    resolution[: problem.count] = _resolution(problem)
+    freedom = _freedom(problem, leverages)
+    return _Spread(by_range, variance, np.maximum(variance, resolution**2), freedom)
 
 
 def _estimates(
-    problem: FitProblem, point: FloatArray, bound: IndexArray, spread: _Spread
+    problem: FitProblem, point: FloatArray, bound: IndexArray, spread: _Spread, free: IndexArray
 ) -> tuple[Estimate, ...]:
-    """Return the estimate of each unknown; `bound` is 0 for those whose `spread` is known."""
-    free = np.flatnonzero(bound == 0)
+    """Return the estimate of each unknown; those of `free` have a `spread`."""
     resolved, wide = np.zeros((2, len(point)))
     resolved[free] = spread.resolved_deviation
-    wide[free] = np.sqrt(np.diag(spread.covariance))
-    quantile = float(
-        student.ppf(0.5 + 0.5 * CONFIDENCE, max(_degrees_of_freedom(problem, len(free)), 1))
-    )
+    wide[free] = np.sqrt(np.diag(spread.covariance)) * problem.ranges[free]
+    determined = (resolved <= WIDEST) | problem.has_prior
+    quantile = float(student.ppf(0.5 + 0.5 * CONFIDENCE, max(spread.freedom, 1.0)))
     with np.errstate(over="ignore", invalid="ignore"):
         lower, upper = (problem.points_at(point + sign * quantile * wide) for sign in (-1.0, 1.0))
     values, estimates = problem.points_at(point), []
     for k, unknown in enumerate(problem.unknowns):
-        determined = bool(resolved[k] <= WIDEST)
-        claims = determined and bound[k] == 0
         interval = (np.nan, np.nan)
-        if claims:
+        if unknown.prior is not None and bound[k] == 0:
+            interval = max(float(lower[k]), unknown.lower), min(float(upper[k]), unknown.upper)
+        elif determined[k] and bound[k] == 0:
             place = int(np.flatnonzero(free == k)[0])
             reach = quantile * wide[k]
             ends = point[k] - reach, point[k] + reach
-            rise = reach**2 / spread.inverse[place, place]
+            rise = (reach / problem.ranges[k]) ** 2 / spread.inverse[place, place]
             profile = Profile(problem, point, k, free)
             interval = (
                 profile.end(-1, rise) if ends[0] < 0.0 else float(lower[k]),
                 profile.end(1, rise) if ends[1] > 1.0 else float(upper[k]),
             )
         at_bound = {-1: "lower", 0: "", 1: "upper"}[int(bound[k])]
-        estimates.append(Estimate(unknown.name, float(values[k]), *interval, determined, at_bound))
+        known = bool(determined[k])
+        estimates.append(Estimate(unknown.name, float(values[k]), *interval, known, at_bound))
     return tuple(estimates)
 
 
 def _slopes(problem: FitProblem, point: FloatArray) -> FloatArray:
-    """Return the derivative of the SI value of each unknown by its unit coordinate."""
+    """Return the derivative of the SI value of each unknown by its place in the range."""
     values = problem.points_at(point)
     return np.array(
         [
@@ -260,31 +283,46 @@ def _slopes(problem: FitProblem, point: FloatArray) -> FloatArray:
     )
 
 
-def _degrees_of_freedom(problem: FitProblem, free: int) -> int:
-    return sum(len(m.values) - m.basis.shape[1] for m in problem.measurements) - free
+def _leverages(problem: FitProblem, jacobian: FloatArray) -> FloatArray:
+    """Return the part of the unknowns that each measured value determines (n,)."""
+    left = np.linalg.svd(jacobian, full_matrices=False)[0]
+    return np.asarray(np.sum(np.square(left), axis=1)[: problem.count])
 
 
-def _variances(problem: FitProblem, residuals: FloatArray, jacobian: FloatArray) -> FloatArray:
+def _freedom(problem: FitProblem, leverages: FloatArray) -> float:
+    """Return the degrees of freedom of the errors whose deviation is not known."""
+    estimated = [
+        len(m.values) - m.basis.shape[1] - float(np.sum(leverages[where]))
+        for where, m in zip(problem.slices, problem.measurements, strict=True)
+        if m.errors != "known"
+    ]
+    return sum(estimated) if estimated else np.inf
+
+
+def _variances(problem: FitProblem, residuals: FloatArray, leverages: FloatArray) -> FloatArray:
     """Return the variance of each scaled residual (n,).
 
     Samples of one test have a variance of their own; its degrees of freedom are less by its
-    baseline and by its share of the unknowns (its leverages). Of heteroscedastic values each has
-    the square of its residual over 1 - leverage: HC3 of MacKinnon and White, Journal of
+    baseline and by its share of the unknowns (its leverages). Of values with errors of their own,
+    each has the square of its residual over 1 - leverage: HC3 of MacKinnon and White, Journal of
     Econometrics 29 (1985) 305-325. Other values share one variance.
     """
-    leverage = np.sum(np.square(np.linalg.svd(jacobian, full_matrices=False)[0]), axis=1)
-    pooled = float(np.sum(np.square(residuals))) / max(
-        _degrees_of_freedom(problem, jacobian.shape[1]), 1e-12
+    alike = np.concatenate(
+        [np.full(len(m.values), m.errors != "known") for m in problem.measurements]
     )
+    freedom = max(_freedom(problem, leverages), 1e-12)
+    pooled = float(np.sum(np.square(residuals[alike]))) / freedom
     parts = []
     for where, m in zip(problem.slices, problem.measurements, strict=True):
         series = residuals[where]
         variance = np.full(len(series), pooled)
-        if m.correlated:
-            freedom = max(len(series) - m.basis.shape[1] - float(np.sum(leverage[where])), 1e-12)
+        if m.errors == "known":
+            variance[:] = 1.0
+        elif m.errors == "correlated":
+            freedom = max(len(series) - m.basis.shape[1] - float(np.sum(leverages[where])), 1e-12)
             variance[:] = float(np.sum(np.square(series))) / freedom * correlation_time(series)
-        elif m.heteroscedastic:
-            variance = np.square(series / np.maximum(1.0 - leverage[where], 1e-6))
+        elif m.errors == "each":
+            variance = np.square(series / np.maximum(1.0 - leverages[where], 1e-6))
         parts.append(variance)
     return np.concatenate(parts)
 
@@ -323,7 +361,7 @@ def _test_errors(problem: FitProblem, residuals: FloatArray) -> tuple[TestError,
 
 def _computed(problem: FitProblem, point: FloatArray) -> tuple[FloatArray, tuple[FloatArray, ...]]:
     """Return computed values with the best baselines added (n,), and the baselines' amounts."""
-    computed = problem.evaluate(problem.points_at(point)[None])[0].copy()
+    computed = problem.values(point[None]).values[0].copy()
     amounts = []
     for where, m in zip(problem.slices, problem.measurements, strict=True):
         if m.baseline is None:
@@ -333,39 +371,3 @@ def _computed(problem: FitProblem, point: FloatArray) -> tuple[FloatArray, tuple
         computed[where] += m.baseline @ amount
         amounts.append(amount)
     return computed, tuple(amounts)
-
-
-def left_out_errors(fit: Fit, part: Callable[[Sequence[int]], FitProblem]) -> FloatArray:
-    """Return the RMSE of each test at the fit to all the other tests (m,).
-
-    The fit without a test is one Gauss-Newton step away from the fit to all tests; for a model that
-    is linear in its unknowns this is exact. A step that is long is replaced by a search by least
-    squares. The error at its end is that of the model itself.
-
-    Args:
-        fit: Fit to all tests, at least two.
-        part: Function of the indices of some tests that returns the problem with these tests only.
-    """
-    problem = fit.problem
-    count = len(problem.measurements)
-    if not problem.unknowns:
-        return np.array([test.rmse for test in fit.tests])
-    point = np.clip(problem.coordinates_of(fit.values), 0.0, 1.0)
-    residuals = problem.residuals(point[None])[0]
-    jacobian, _ = central_differences(problem, point, residuals)
-    free = [k for k, estimate in enumerate(fit.estimates) if not estimate.at_bound]
-    jacobian = jacobian[:, free]
-    information, slope = jacobian.T @ jacobian, jacobian.T @ residuals
-    errors = np.empty(count)
-    for index, where in enumerate(problem.slices):
-        rows = jacobian[where]
-        inverse = np.linalg.pinv(information - rows.T @ rows, rcond=SEEN, hermitian=True)
-        moved = point.copy()
-        moved[free] -= inverse @ (slope - rows.T @ residuals[where])
-        if np.max(np.abs(moved - point)) > FAR:
-            rest = part([k for k in range(count) if k != index])
-            moved = descended(Search(rest), point, MOST_STEPS).point
-        left_out = part([index])
-        error = rmse(left_out.residuals(np.clip(moved, 0.0, 1.0)[None])[0])
-        errors[index] = float(error) * left_out.measurements[0].scale
-    return errors

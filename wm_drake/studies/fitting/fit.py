@@ -1,7 +1,7 @@
 """Result of an identification."""
 
 from dataclasses import dataclass, replace
-from typing import Literal, Protocol, TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -9,6 +9,10 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.fitting.problem import FitProblem, Unknown
 
 FitVerdict: TypeAlias = Literal["good", "fair", "poor"]
+
+DETERMINED, UNDETERMINED = 0.5, 0.9
+"""Limits of the part of an unknown's prior deviation that remains. Below the first, the data
+determine the unknown. Above the second, only the prior does."""
 
 GOOD, FAIR = 0.05, 0.15
 """Largest lack of fit of a good and of a fair fit, as a part of the measured values."""
@@ -45,7 +49,7 @@ class Estimate:
         value: Where the search ended. [SI]
         lower, upper: 95 % confidence interval within the bounds; NaN if the value is at a bound or
             not determined. [SI]
-        determined: Whether the data limit it more than its bounds do.
+        determined: Whether the data or its prior limit it more than its bounds do.
         at_bound: "lower" or "upper" if it hit one, else "".
     """
 
@@ -55,22 +59,6 @@ class Estimate:
     upper: float
     determined: bool
     at_bound: str
-
-
-class Assessed(Protocol):
-    """Unknowns with estimates: a `Fit`, or the `Posterior` of a problem with priors."""
-
-    @property
-    def unknowns(self) -> tuple[Unknown, ...]:
-        """The unknowns."""
-
-    @property
-    def estimates(self) -> tuple[Estimate, ...]:
-        """Estimate of each."""
-
-    @property
-    def covariance(self) -> FloatArray:
-        """Covariance of the unknowns (p, p). [SI]"""
 
 
 @dataclass(frozen=True)
@@ -106,6 +94,41 @@ class SearchLog:
 
 
 @dataclass(frozen=True, eq=False)
+class Linearized:
+    """Rows of a problem, linear in the coordinates about the point where a search ended.
+
+    Attributes:
+        point: Coordinates (p,).
+        slopes: Derivatives (m, p) of the rows without those of what is wished: of `count` residuals
+            of the measurements first.
+        count: Number n of measured values.
+    """
+
+    point: FloatArray
+    slopes: FloatArray
+    count: int
+
+    def covariance(self, scatter: float = 1.0) -> FloatArray:
+        """Return the covariance (p, p) of the coordinates for residuals of one known deviation.
+
+        Args:
+            scatter: Standard deviation of the residuals of the measurements.
+        """
+        slopes = self.slopes.copy()
+        slopes[: self.count] /= scatter
+        return np.asarray(np.linalg.inv(slopes.T @ slopes))
+
+    def directions(self) -> FloatArray:
+        """Return the singular values of the slopes of the measurements, in falling order.
+
+        With priors, each one is the ratio of prior deviation to deviation by the data along a
+        principal direction. The number of values above 1 is the number of directions that the data
+        determine.
+        """
+        return np.asarray(np.linalg.svd(self.slopes[: self.count], compute_uv=False))
+
+
+@dataclass(frozen=True, eq=False)
 class Fit:
     """Result of an identification; the same for every method.
 
@@ -120,6 +143,7 @@ class Fit:
         condition: Condition of the scaled Jacobian: 1 if the data see all directions alike, large
             if they hardly see one.
         undetermined: Directions that the data do not determine.
+        linear: The problem about the end of the search.
     """
 
     problem: FitProblem
@@ -132,6 +156,7 @@ class Fit:
     covariance: FloatArray
     condition: float
     undetermined: tuple[Direction, ...]
+    linear: Linearized
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
@@ -152,6 +177,12 @@ class Fit:
     def values(self) -> FloatArray:
         """Values where the search ended (p,). [SI]"""
         return np.array([estimate.value for estimate in self.estimates])
+
+    @property
+    def remaining(self) -> FloatArray:
+        """Part of the prior deviation that remains of each unknown (p,); NaN without a prior."""
+        priors = [np.nan if u.prior is None else u.prior[1] for u in self.unknowns]
+        return np.asarray(np.sqrt(np.diag(self.covariance)) / priors)
 
     def __getitem__(self, name: str) -> Estimate:
         """Return the estimate of an unknown."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wm_drake.parameters.types import FloatArray
-from wm_drake.studies.fitting.problem import CostProblem
+from wm_drake.studies.fitting.problem import FitProblem
 from wm_drake.studies.fitting.search import Optimum, Search
 
 POINTS_PER_AXIS = 5
@@ -37,7 +37,7 @@ class Round:
     spacing: float
 
 
-def grid_search(problem: CostProblem, mesh: float) -> tuple[Optimum, tuple[Round, ...]]:
+def grid_search(problem: FitProblem, mesh: float) -> tuple[Optimum, tuple[Round, ...]]:
     """Minimize the cost by grids that move to the best point and are refined there.
 
     Points of a grid that are outside the region are omitted. Points that are known already are not

@@ -4,7 +4,7 @@ Each is a function that returns the optimum of a search. All evaluate the model 
 once and are repeated by their seed. `identify` assesses the optimum of any of them.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -20,10 +20,10 @@ from wm_drake.studies.fitting.search import (
     Search,
     agreeing,
     descended,
-    scattered,
     silent,
     underway,
 )
+from wm_drake.studies.fitting.starts import starts_of
 from wm_drake.studies.fitting.surfaces import response_surface
 
 AGREEING = 2
@@ -37,7 +37,7 @@ POLISHED_EVERY = 5
 
 
 def least_squares(
-    search: Search[FitProblem],
+    search: Search,
     *,
     seed: int = 0,
     starts: int = 4,
@@ -46,33 +46,48 @@ def least_squares(
 ) -> Optimum:
     """Search by trust-region least squares from several starts, until two searches agree.
 
-    The starts are the problem's start and the best of many scattered points.
-
     Args:
         starts: Searches at most.
         screened: Points that are evaluated (a power of two), of which the best become starts.
         progress: Called after every step.
     """
-    problem = search.problem
-    points = scattered(len(problem.unknowns), screened, seed)
-    order = np.argsort(search.costs(points), kind="stable")
-    begins = [problem.start, *points[order[: starts - 1]]]
-    search.round_done()
-    ends: list[Optimum] = []
-    for index, begin in enumerate(begins):
-        if agreeing(problem, ends) >= AGREEING:
+    begins, ends = starts_of(search, seed, starts, screened), list[Optimum]()
+    for end in descents(search, begins, starts, progress=progress):
+        ends.append(end)
+        if agreeing(search.problem, ends) >= AGREEING:
             break
-
-        def step_done(fraction: float, index: int = index) -> None:
-            progress((index + fraction) / len(begins), search.least)
-
-        ends.append(descended(search, begin, step_done=step_done))
-        search.round_done()
-    note = f"{agreeing(problem, ends)} of {len(ends)} starts came to the same least RMSE"
+    note = f"{agreeing(search.problem, ends)} of {len(ends)} starts came to the same least RMSE"
     return replace(min(ends, key=lambda end: end.cost), note=note)
 
 
-def evolution(search: Search[FitProblem], *, seed: int = 0, progress: Progress = silent) -> Optimum:
+def descents(
+    search: Search,
+    begins: Iterable[FloatArray],
+    starts: int,
+    most: int = 0,
+    progress: Progress = silent,
+) -> Iterator[Optimum]:
+    """Yield where least squares from several starts end.
+
+    Args:
+        begins: The starts.
+        starts: Their number.
+        most: Evaluations of the rows of each at most, as for `descended`.
+        progress: Called after every step.
+    """
+    before = 0
+    for number, begin in enumerate(begins):
+
+        def step_done(fraction: float, number: int = number) -> None:
+            progress((number + fraction) / starts, search.least)
+
+        end = descended(search, begin, most, step_done)
+        search.round_done()
+        yield replace(end, evaluations=search.evaluations - before)
+        before = search.evaluations
+
+
+def evolution(search: Search, *, seed: int = 0, progress: Progress = silent) -> Optimum:
     """Search by differential evolution, with least squares from its best point now and then.
 
     The evolution has to find the valley only, not its floor: it ends when least squares from the

@@ -1,7 +1,7 @@
 """What the pages of all fits share: values with intervals, what is not determined, the search."""
 
 from collections.abc import Mapping, Sequence
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import xarray as xr
@@ -11,8 +11,7 @@ from wm_drake.report.figure import Axis, Figure, Line, Panel
 from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.quantity import Quantity, shown
 from wm_drake.studies.answer import Part, Plot
-from wm_drake.studies.fitting.fit import Assessed, Estimate, Fit
-from wm_drake.studies.fitting.problem import Unknown
+from wm_drake.studies.fitting.fit import Estimate, Fit
 
 FixedNumber: TypeAlias = tuple[str, float, Unit]
 """Name, SI value and unit of a number that was not searched."""
@@ -97,7 +96,7 @@ def fit_parts(
     )
 
 
-def correlations_part(fit: Assessed) -> Part:
+def correlations_part(fit: Fit) -> Part:
     """Return the correlations of the errors of the estimates; of many, in the file only."""
     data = correlations_of(fit)
     heading = "Correlations" if len(fit.estimates) <= MOST_CORRELATED else ""
@@ -136,67 +135,55 @@ def _history(fit: Fit, error: Quantity) -> tuple[Plot, LabelledTable]:
 
 
 def estimates_of(
-    fit: Assessed,
+    fit: Fit,
     planted: Mapping[str, float] | None = None,
     fixed: Sequence[FixedNumber] = (),
 ) -> xr.Dataset:
-    """Return value, standard deviation, interval, unit, bounds and remark over the unknowns.
+    """Return value, standard deviation, interval, bounds and remark over the unknowns.
 
-    The numbers are in the unit for reading of each unknown, which the variable `unit` names: their
-    units differ.
+    Each number carries the unit of its unknown. [SI]
 
     Args:
         planted: True values of the unknowns. [SI]
         fixed: Numbers that were not searched; they have a value only.
     """
-    words = {
-        "value": "value",
-        "deviation": "± standard deviation",
-        "lower_95": "95 % from",
-        "upper_95": "95 % to",
-        "unit": "unit",
+    units = {unknown.name: unknown.unit for unknown in fit.unknowns}
+    units |= {name: unit for name, _, unit in fixed}
+    estimates = fit.estimates
+    columns = {
+        "value": ("value", [e.value if e.determined else np.nan for e in estimates]),
+        "deviation": ("± standard deviation", np.sqrt(np.diag(fit.covariance)).tolist()),
+        "lower_95": ("95 % from", [e.lower for e in estimates]),
+        "upper_95": ("95 % to", [e.upper for e in estimates]),
+        "lower_bound": ("lower bound", [unknown.lower for unknown in fit.unknowns]),
+        "upper_bound": ("upper bound", [unknown.upper for unknown in fit.unknowns]),
     }
-    words |= {"lower_bound": "lower bound", "upper_bound": "upper bound", "remark": "remark"}
-    deviations = np.sqrt(np.diag(fit.covariance)).tolist()
-    rows = list(map(_row, fit.estimates, fit.unknowns, deviations))
-    rows += [
-        (unit.from_si(value), *[np.nan] * 3, _unit_text(unit), *[np.nan] * 2, FIXED)
-        for _, value, unit in fixed
-    ]
-    names = [*(e.name for e in fit.estimates), *(name for name, *_ in fixed)]
-    columns = zip(words.items(), zip(*rows, strict=True), strict=True)
-    data = xr.Dataset(
-        {
-            name: ("unknown", list(values), Quantity(text).attributes())
-            for (name, text), values in columns
-        },
-        {"unknown": names},
-    )
     if planted is not None:
-        units = {unknown.name: unknown.unit for unknown in fit.unknowns}
-        truth = [units[name].from_si(planted[name]) for name in names]
-        data["planted"] = Quantity("planted").variable("unknown", truth)
-    return data
+        columns["planted"] = "planted", [planted[e.name] for e in estimates]
+    given = {"value": [value for _, value, _ in fixed]}
+    data = {
+        name: of_unknowns(words, units, [*values, *given.get(name, [np.nan] * len(fixed))])
+        for name, (words, values) in columns.items()
+    }
+    remarks = [*map(_remark, estimates), *[FIXED] * len(fixed)]
+    remark = xr.Variable("unknown", remarks, Quantity("remark").attributes())
+    return xr.Dataset({**data, "remark": remark}, {"unknown": list(units)})
 
 
-def _row(e: Estimate, unknown: Unknown, deviation: float) -> tuple[float | str, ...]:
-    """Return value, deviation, interval, unit, bounds and remark of an unknown."""
-    values = (e.value if e.determined else np.nan, deviation, e.lower, e.upper)
-    bounds = (unknown.lower, unknown.upper)
-    unit = unknown.unit
-    return (
-        *map(unit.from_si, values),
-        _unit_text(unit),
-        *map(unit.from_si, bounds),
-        _remark(e),
-    )
+def of_unknowns(
+    words: str, units: Mapping[str, Unit], values: Any, dims: str | Sequence[str] = "unknown"
+) -> xr.Variable:
+    """Return numbers over unknowns, each in the unit of its unknown. [SI]
+
+    Args:
+        units: Unit of each unknown.
+        dims: Dimensions of the numbers.
+    """
+    each = {name: Quantity(words, unit) for name, unit in units.items()}
+    return Quantity(words).of_each("unknown", each, dims, values)
 
 
-def _unit_text(unit: Unit) -> str:
-    return unit.shown.replace("*", " ")
-
-
-def correlations_of(fit: Assessed) -> xr.Dataset:
+def correlations_of(fit: Fit) -> xr.Dataset:
     """Return the correlations of the errors of the unknowns."""
     deviation = np.sqrt(np.diag(fit.covariance))
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -26,12 +26,12 @@ NEAR = 2e-3
 
 @dataclass(frozen=True)
 class Profile:
-    """Least sum of squares over one unknown.
+    """Least sum of squares over one unknown without a prior.
 
     Attributes:
         point: Where the search ended (p,), in coordinates.
         unknown: Index of the unknown.
-        free: Indices of the unknowns that are not at a bound.
+        free: Indices of the unknowns that are not at a bound, with all that have a prior.
     """
 
     problem: FitProblem
@@ -44,18 +44,18 @@ class Profile:
 
         Args:
             side: -1 for the lower and 1 for the upper end.
-            rise: Rise of the sum of squared residuals at the end.
+            rise: Rise of the sum of squares at the end.
 
         Returns:
             Where the profile has risen so far; the bound, if it does not.
         """
-        count = sum(len(m.values) for m in self.problem.measurements)
-        least = float(np.sum(np.square(self.problem.residuals(self.point[None])[0])))
+        rows = self.problem.evaluated(self.point[None]).exact[0]
+        least = float(np.sum(np.square(rows)))
 
         def excess(place: float) -> float:
             """Return the rise of the profile less `rise`, in roots: nearly linear."""
             error = self._least_rmse(place)
-            return float(np.sqrt(max(error**2 * count - least, 0.0)) - np.sqrt(rise))
+            return float(np.sqrt(max(error**2 * len(rows) - least, 0.0)) - np.sqrt(rise))
 
         whole, end = self.point.copy(), 0.0 if side < 0 else 1.0
         if excess(end) > 0.0:
@@ -73,4 +73,4 @@ class Profile:
         if len(others):
             begin = self.point[others]
             return descended(Search(problem), begin, MOST_STEPS).cost
-        return float(np.sqrt(np.mean(np.square(problem.residuals(np.zeros((1, 0)))[0]))))
+        return float(problem.costs_of(problem.evaluated(np.zeros((1, 0))).exact)[0])

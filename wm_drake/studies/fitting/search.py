@@ -3,21 +3,16 @@
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Generic, TypeVar
 
 import numpy as np
 from scipy import optimize
-from scipy.stats import qmc
 
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.fitting.fit import SearchLog
-from wm_drake.studies.fitting.problem import FAILED, CostProblem, FitProblem, Residuals, rmse
+from wm_drake.studies.fitting.problem import FitProblem, Rows, rmse
 
 SAME_END = 1e-3
 """Searches whose costs differ by less than this part have the same end."""
-
-
-AnyProblem = TypeVar("AnyProblem", bound=CostProblem)
 
 
 @dataclass(frozen=True)
@@ -49,31 +44,27 @@ def underway(done: int, usual: int) -> float:
 
 
 @dataclass
-class Search(Generic[AnyProblem]):
+class Search:
     """A problem with a count of its evaluations and the best point so far.
 
     Attributes:
         report: Called after each evaluation with the points evaluated and the least cost so far.
         evaluations: Points evaluated so far.
-        best: Coordinates of the best point so far; None before the first finite cost.
+        best: Coordinates of the best point so far; None before the first evaluation.
         least: Its cost.
         history: Least cost after each round.
     """
 
-    problem: AnyProblem
+    problem: FitProblem
     report: Callable[[int, float], None] = lambda evaluations, least: None
     evaluations: int = field(default=0, init=False)
     best: FloatArray | None = field(default=None, init=False)
     least: float = field(default=np.inf, init=False)
     history: list[float] = field(default_factory=list, init=False)
 
-    def evaluated(self, points: FloatArray) -> Residuals:
-        """Return the residuals at points (k, p)."""
+    def evaluated(self, points: FloatArray) -> Rows:
+        """Return the rows at points (k, p)."""
         return self._counted(points)[0]
-
-    def residuals(self, points: FloatArray) -> FloatArray:
-        """Return the residuals (k, n) at points (k, p)."""
-        return self.evaluated(points).exact
 
     def costs(self, points: FloatArray) -> FloatArray:
         """Return the cost at each point (k,)."""
@@ -91,20 +82,15 @@ class Search(Generic[AnyProblem]):
         """Return the log of the search at its end."""
         return SearchLog(method, seed, self.evaluations, (*self.history, self.least), notes)
 
-    def _counted(self, points: FloatArray) -> tuple[Residuals, FloatArray]:
-        residuals = self.problem.evaluated(points)
-        costs = self.problem.costs(residuals.exact, points)
+    def _counted(self, points: FloatArray) -> tuple[Rows, FloatArray]:
+        rows = self.problem.evaluated(points)
+        costs = self.problem.costs_of(rows.exact)
         self.evaluations += len(points)
         index = int(np.argmin(costs))
         if costs[index] < self.least:
             self.least, self.best = float(costs[index]), points[index].copy()
         self.report(self.evaluations, self.least)
-        return residuals, costs
-
-
-def scattered(p: int, number: int, seed: int) -> FloatArray:
-    """Return points that fill the ranges evenly (number, p); best a power of two of them."""
-    return np.asarray(qmc.Sobol(p, rng=np.random.default_rng(seed)).random(number))
+        return rows, costs
 
 
 def agreeing(problem: FitProblem, ends: list[Optimum]) -> int:
@@ -121,9 +107,9 @@ LEAST_GAIN = 0.01
 
 
 def descended(
-    search: Search[AnyProblem],
+    search: Search,
     begin: FloatArray,
-    most: int = 60,
+    most: int = 0,
     step_done: Callable[[float], None] = lambda fraction: None,
 ) -> Optimum:
     """Return where least squares from one point end.
@@ -132,12 +118,12 @@ def descended(
 
     Args:
         begin: First point (p,), moved a little into the bounds.
-        most: Evaluations of the residuals at most, without those of derivatives.
+        most: Evaluations of the rows at most, without those of derivatives; 0 for `Descent.most`.
         step_done: Called before every step with the fraction of a usual search.
     """
     before, problem, descent = search.evaluations, search.problem, search.problem.descent
-    margin = descent.inside * (problem.upper - problem.lower)
-    point, cost, remaining, failed = begin, np.inf, most, 0
+    margin = descent.inside * problem.ranges
+    point, cost, remaining, failed = begin, np.inf, most or descent.most, 0
     for step in itertools.cycle(descent.steps):
         point = np.clip(point, problem.lower + margin, problem.upper - margin)
         end = _gauss_newton(search, point, step, remaining, step_done)
@@ -150,7 +136,7 @@ def descended(
 
 
 def _gauss_newton(
-    search: Search[AnyProblem],
+    search: Search,
     begin: FloatArray,
     step: float,
     most: int,
@@ -159,18 +145,13 @@ def _gauss_newton(
     """Search with one size of the difference steps, until none of scipy's tolerances is missed."""
     problem, descent = search.problem, search.problem.descent
     steps = 0
-    last: tuple[FloatArray, Residuals] = (np.full(len(begin), np.nan), NO_RESIDUALS)
+    last: tuple[FloatArray, Rows] = (np.full(len(begin), np.nan), NO_ROWS)
 
-    def evaluated(point: FloatArray) -> Residuals:
+    def evaluated(point: FloatArray) -> Rows:
         nonlocal last
         if not np.array_equal(point, last[0]):
             last = (point.copy(), search.evaluated(point[None]))
         return last[1]
-
-    def rows(point: FloatArray) -> FloatArray:
-        values = problem.rows(evaluated(point).exact, point[None])[0]
-        # without residuals, a large value makes the trust region reject and shorten the step
-        return np.where(np.isfinite(values), values, FAILED)
 
     def slopes(point: FloatArray) -> FloatArray:
         nonlocal steps
@@ -179,7 +160,7 @@ def _gauss_newton(
         return smooth_slopes(search, point, evaluated(point).smooth, step)
 
     return optimize.least_squares(
-        rows,
+        lambda point: evaluated(point).exact[0],
         begin,
         slopes,
         bounds=(problem.lower, problem.upper),
@@ -191,22 +172,19 @@ def _gauss_newton(
     )
 
 
-NO_RESIDUALS = Residuals(np.empty((1, 0)), np.empty((1, 0)))
+NO_ROWS = Rows(np.empty((1, 0)), np.empty((1, 0)))
 
 
-def smooth_slopes(
-    search: Search[AnyProblem], point: FloatArray, here: FloatArray, step: float
-) -> FloatArray:
-    """Return the derivatives (m, p) of the rows of smooth residuals; 0 where one is NaN.
+def smooth_slopes(search: Search, point: FloatArray, here: FloatArray, step: float) -> FloatArray:
+    """Return the derivatives (m, p) of the smooth rows; 0 where one is NaN.
 
     Args:
         point: In coordinates (p,).
-        here: Smooth residuals there (1, n).
+        here: Smooth rows there (1, m).
         step: Size of the difference steps, in coordinates.
     """
     problem = search.problem
-    ahead = np.maximum(step, problem.descent.side * (problem.upper - problem.lower))
+    ahead = np.maximum(step, problem.descent.side * problem.ranges)
     steps = np.where(point + ahead <= problem.upper, step, -step)
-    moved = point + np.diag(steps)
-    rows = problem.rows(search.evaluated(moved).smooth, moved)
-    return np.nan_to_num(((rows - problem.rows(here, point[None])) / steps[:, None]).T)
+    rows = search.evaluated(point + np.diag(steps)).smooth
+    return np.nan_to_num(((rows - here) / steps[:, None]).T)

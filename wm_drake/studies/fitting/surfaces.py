@@ -13,8 +13,9 @@ import numpy as np
 from scipy import optimize
 
 from wm_drake.parameters.types import FloatArray
-from wm_drake.studies.fitting.problem import FitProblem, Progress
-from wm_drake.studies.fitting.search import Optimum, Search, scattered, silent, underway
+from wm_drake.studies.fitting.problem import Progress
+from wm_drake.studies.fitting.search import Optimum, Search, silent, underway
+from wm_drake.studies.fitting.starts import scattered
 
 WIDEST = 0.5
 """Longest half axis of a region, in ranges; all half axes of the first region."""
@@ -37,7 +38,7 @@ SLENDEREST = 1e3
 
 
 def response_surface(
-    search: Search[FitProblem],
+    search: Search,
     *,
     seed: int = 0,
     screened: int = 32,
@@ -130,19 +131,17 @@ class SurfaceRegion:
         )
 
 
-def _first_region(search: Search[FitProblem], seed: int, screened: int) -> SurfaceRegion:
+def _first_region(search: Search, seed: int, screened: int) -> SurfaceRegion:
     """Return the whole ranges, about the best of the problem's start and scattered points."""
     p = len(search.problem.unknowns)
-    begins = np.concatenate([search.problem.start[None], scattered(p, screened, seed)])
+    begins = np.concatenate([search.problem.start[None], scattered(search, screened, seed)])
     values = np.square(search.costs(begins))
     search.round_done()
     best = int(np.argmin(values))
     return SurfaceRegion(begins[best], float(values[best]), WIDEST * np.eye(p))
 
 
-def _round(
-    search: Search[FitProblem], region: SurfaceRegion, design: FloatArray
-) -> tuple[SurfaceRegion, bool]:
+def _round(search: Search, region: SurfaceRegion, design: FloatArray) -> tuple[SurfaceRegion, bool]:
     """Return the region after a round, and whether the search ends."""
     points = region.designed(design)
     places, values = region.places(points), np.square(search.costs(points))

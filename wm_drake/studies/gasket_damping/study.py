@@ -156,7 +156,7 @@ def damping_problem(machine: Machine, measured: MeasuredDisplacements) -> FitPro
     """
     envelopes = {load: envelopes_of(displacement) for load, displacement in measured.items()}
     curves = tuple(
-        Measurement(f"{load} {sensor}", curve.values, correlated=True)
+        Measurement(f"{load} {sensor}", curve.values, errors="correlated")
         for load, of_load in envelopes.items()
         for sensor, curve in zip(of_load.sensor.values, of_load.T, strict=True)
     )
@@ -196,15 +196,15 @@ class DistanceProblem(FitProblem):
     of all sensors. The lower envelope is the upper one with the other sign.
     """
 
-    def costs(self, residuals: FloatArray, coordinates: FloatArray) -> FloatArray:  # noqa: ARG002
+    def costs_of(self, rows: FloatArray) -> FloatArray:
         """Return the distances (k,); infinite where the model fails."""
         squares: dict[str, FloatArray] = {}
         for where, curve in zip(self.slices, self.measurements, strict=True):
-            apart = np.abs(residuals[:, where])
+            apart = np.abs(rows[:, where])
             apart = np.where(apart >= FAILED * curve.largest, np.inf, apart)
             load = curve.name.rpartition(" ")[0]
             both = 2.0 * np.sum(np.square(apart), axis=1)
-            squares[load] = squares.get(load, np.zeros(len(residuals))) + both
+            squares[load] = squares.get(load, np.zeros(len(rows))) + both
         return np.sum(np.sqrt(list(squares.values())), axis=0)
 
 

@@ -10,14 +10,17 @@ from scipy.stats import t as student
 
 from wm_drake.errors import InputError, Problem
 from wm_drake.parameters.types import FloatArray
+from wm_drake.report.quantity import Quantity
 from wm_drake.rigs.measured import MeasuredMotion
-from wm_drake.studies.fitting.assessment import correlation_time, evaluated, left_out_errors
+from wm_drake.studies.fitting.assessment import correlation_time, evaluated
 from wm_drake.studies.fitting.fit import Fit, TestError
+from wm_drake.studies.fitting.left_out import left_out_errors
 from wm_drake.studies.fitting.methods import identify, refined
 from wm_drake.studies.fitting.problem import FitProblem, Progress
 from wm_drake.studies.identify.judgement import LACK, Judgement, judge
 from wm_drake.studies.identify.models import ComponentModel
 from wm_drake.studies.identify.problem import computed_forces, fit_problem
+from wm_drake.studies.rig.quantities import loop_quantities
 
 MANY = 12
 """Tests from which on a search begins with a part of them."""
@@ -132,13 +135,13 @@ class LawComparison:
         return float(np.mean(ratio)) > limit * error
 
     def _verdict(self) -> list[str]:
-        best, unit = self.order[0], self.unit
+        best = self.order[0]
         if len(self.results) == 1:
             return list(best.judgement.sentences[:1])
         alike = [r.law for r in self.as_good if r is not self.supported]
         if self.by_left_out:
             how = "each test predicted from all the others, RMSE " + ", ".join(
-                f"{r.law} {r.left_out_rmse:.3g} {unit}" for r in self.order
+                f"{r.law} {self.load.text(r.left_out_rmse)}" for r in self.order
             )
         else:
             how = (
@@ -165,7 +168,7 @@ class LawComparison:
         blind = [r.prediction for r in self.results if r.prediction]
         ranked = sorted(blind, key=lambda seen: seen.fit.rmse)
         texts = [
-            f"{seen.law} {seen.fit.rmse:.3g} {self.unit}, "
+            f"{seen.law} {self.load.text(seen.fit.rmse)}, "
             f"lack of fit {LACK.text(seen.judgement.missed)}"
             for seen in ranked
         ]
@@ -191,9 +194,10 @@ class LawComparison:
         ]
 
     @property
-    def unit(self) -> str:
-        """Unit of the errors."""
-        return "N m" if self.motions[0].loop.rotates else "N"
+    def load(self) -> Quantity:
+        """Force or moment of the tests, with significant digits."""
+        load = loop_quantities(self.motions[0].loop.rotates)["load"]
+        return Quantity(load.words, load.unit, form="{:.3g}".format)
 
     @property
     def tested(self) -> "Iterator[TestedLoop]":

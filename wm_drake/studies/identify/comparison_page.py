@@ -4,7 +4,7 @@ import numpy as np
 import xarray as xr
 
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import HIDDEN, Quantity
+from wm_drake.report.quantity import EACH, HIDDEN, Quantity
 from wm_drake.studies.answer import Answer, Part, Plot
 from wm_drake.studies.fitting.page import estimates_of
 from wm_drake.studies.identify.comparison import LawComparison
@@ -164,6 +164,10 @@ def _estimates(comparison: LawComparison) -> LabelledTable:
         laws = ("row", [r.law] * values.sizes["row"])
         parts.append(values.reset_index("unknown").assign_coords(law=laws))
     data = xr.concat(parts, "row")
+    for name, numbers in data.items():
+        if EACH in numbers.attrs:  # the unknowns of all laws
+            each = {k: q for part in parts for k, q in part[name].attrs[EACH].items()}
+            numbers.attrs[EACH] = each
     return LabelledTable(
         "estimates",
         data[["law", "unknown", *data.data_vars]],

@@ -28,7 +28,7 @@ def fit_problem(model: ComponentModel, motions: Sequence[MeasuredMotion]) -> Fit
     Offset and drift of each measured force are taken out.
     """
     measurements = tuple(
-        Measurement(measured.loop.name, measured.loop.force, measured.baseline, correlated=True)
+        Measurement(measured.loop.name, measured.loop.force, measured.baseline, errors="correlated")
         for measured in motions
     )
     return FitProblem(

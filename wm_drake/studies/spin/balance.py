@@ -1,11 +1,10 @@
-"""Part of a spin page about rings of balls: angles of the balls, and what unbalance remains."""
+"""Part of a spin page about rings of balls or liquid: their angles, and what unbalance remains."""
 
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.report import figure as fig
 from wm_drake.report.formatting import listed, shape_name
@@ -30,9 +29,10 @@ UNBALANCE = Quantity("unbalance", Unit("kg*m", "g*m"), 1)
 REMAINING = Quantity("at the end", UNBALANCE.unit, 2)
 
 BALLS = (
-    "Angles are from the top of the drum, positive as it turns. The unbalance in a plane is the "
-    "part of the first moment of load and balls that acts there (ISO 21940-11); of one ring, all "
-    "of it. The natural frequencies and the rest pose are those without balls."
+    "Angles are from the top of the drum, positive as it turns; that of liquid is the side on "
+    "which it is thickest. The unbalance in a plane is the part of the first moment of load, balls "
+    "and liquid that acts there (ISO 21940-11); of one ring, all of it. The natural frequencies "
+    "and the rest pose are those without balls and liquid."
 )
 """Sentences of the section."""
 
@@ -51,22 +51,22 @@ def balance_parts(runs: SpinRuns) -> tuple[Part, Part]:
     """Return the pictures and the tables; both are empty for a machine without rings."""
     shown = balances(runs)
     if not shown:
-        return Part("Balls and remaining unbalance"), Part("Remaining unbalance")
+        return Part("Rings and remaining unbalance"), Part("Remaining unbalance")
     plots = [_plot(case, balance) for _, case, balance in shown if len(balance.time) > 1]
     table = LabelledTable(
         "balance",
         xr.concat([of_planes(name, balance) for name, _, balance in shown], "row"),
         "Remaining unbalance",
-        "Unbalance in the plane of each ring: of the load alone, largest of load and balls with "
+        "Unbalance in the plane of each ring: of the load alone, largest of load and rings with "
         "its drum speed, and mean over the last turn of the drum. Smaller from: speed from which "
-        "the sum over the planes is smaller than that of the load alone; below it the balls add "
+        "the sum over the planes is smaller than that of the load alone; below it the rings add "
         "to the unbalance.",
         marked=("is_worse", "alarm"),
         is_in_terminal=True,
     )
-    balls = xr.concat([of_balls(*one) for one in shown], "row")
+    balls = xr.concat([of_rings(name, balance) for name, _, balance in shown], "row")
     return (
-        Part("Balls and remaining unbalance", plots, BALLS),
+        Part("Rings and remaining unbalance", plots, BALLS),
         Part("Remaining unbalance", (table, LabelledTable("balls", balls, is_in_json=False))),
     )
 
@@ -87,8 +87,8 @@ def of_planes(label: str, balance: Balance) -> xr.Dataset:
     )
 
 
-def of_balls(label: str, case: CaseResult, balance: Balance) -> xr.Dataset:
-    """Return angles of the balls and unbalance in the planes over time, a row for each window."""
+def of_rings(label: str, balance: Balance) -> xr.Dataset:
+    """Return angles of balls and liquid, and unbalance in the planes, a row for each window."""
     rows = _sampled(balance, WINDOW)
     columns: dict[str, Any] = {
         "time": TIME.variable("row", balance.time[rows]),
@@ -97,16 +97,11 @@ def of_balls(label: str, case: CaseResult, balance: Balance) -> xr.Dataset:
     for plane, ring in enumerate(balance.rings):
         values = UNBALANCE.variable("row", balance.size[rows, plane])
         columns[f"{ring}_unbalance"] = values
-    for ring in map(str, case.record.ball_ring_angle.ball_ring.values):
-        for ball, angles in enumerate(_angles_of(case, ring).T, start=1):
-            columns[f"{ring}_ball_{ball}"] = ANGLE.variable("row", angles[rows])
+    for ring, angles in balance.angles.items():
+        for ball, values in enumerate(angles.T, start=1):
+            name = f"{ring}_ball_{ball}" if angles.shape[1] > 1 else ring
+            columns[name] = ANGLE.variable("row", values[rows])
     return rows_of({"load": [label] * len(rows)}, **columns)
-
-
-def _angles_of(case: CaseResult, ring: str) -> FloatArray:
-    """Return the angles of the balls of a ring. (n, balls) [rad]"""
-    angles = case.record.ball_ring_angle.sel(ball_ring=ring).values
-    return np.asarray(angles[:, ~np.isnan(angles[0])])
 
 
 def _sampled(balance: Balance, window: float) -> np.ndarray:
@@ -123,20 +118,20 @@ def _plot(case: CaseResult, balance: Balance) -> Plot:
         ]
     )
     caption = (
-        f"Load {case.title}. Upper row: angle of each ball, seen from the drum. A ball that "
-        "the drum does not carry yet runs round. Dashed: opposite the unbalance of the load in "
-        f"this plane. Lower row: unbalance of load and balls in the plane, largest in {WINDOW:g} "
-        "s. Dashed: the load alone; above it the balls make it worse."
+        f"Load {case.title}. Upper row: angle of each ball, or of the liquid, seen from the drum. "
+        "What the drum does not carry yet runs round. Dashed: opposite the unbalance of the load "
+        "in this plane. Lower row: unbalance of load and rings in the plane, largest in "
+        f"{WINDOW:g} s. Dashed: the load alone; above it the rings make it worse."
     )
     alternative = (
-        f"Angles of the balls and remaining unbalance over time, load {case.title}. At the "
+        f"Angles of balls or liquid and remaining unbalance over time, load {case.title}. At the "
         f"end: {end}."
     )
     return Plot(balance_figure(case, balance), alternative, caption)
 
 
 def balance_figure(case: CaseResult, balance: Balance) -> fig.Figure:
-    """Return the angles of the balls and the unbalance in the plane of the rings over time."""
+    """Return the angles in the rings and the unbalance in their planes over time."""
     x = fig.Axis(label=TIME.label, range=(float(balance.time[0]), float(balance.time[-1])))
     turns = fig.Axis(
         label=ANGLE.label,
@@ -147,7 +142,7 @@ def balance_figure(case: CaseResult, balance: Balance) -> fig.Figure:
     panels = [
         fig.Panel(title=shape_name(ring), marks=marks, x=x, y=turns, top=speed_axis(case.record))
         for p, ring in enumerate(balance.rings)
-        for marks in [_angles(case, balance, p)]
+        for marks in [_angles(balance, p)]
     ]
     panels += [
         fig.Panel(name=f"unbalance, {shape_name(ring)}", marks=_sizes(balance, p), x=x, y=sizes)
@@ -157,19 +152,21 @@ def balance_figure(case: CaseResult, balance: Balance) -> fig.Figure:
     return fig.Figure(panels=grid, height=230.0)
 
 
-def _angles(case: CaseResult, balance: Balance, plane: int) -> tuple[fig.Mark, ...]:
-    """Return the angles of the balls of the ring in a plane as dots."""
+def _angles(balance: Balance, plane: int) -> tuple[fig.Mark, ...]:
+    """Return the angles of the balls or of the liquid of the ring in a plane as dots."""
     length = float(balance.time[-1] - balance.time[0])
     rows = _sampled(balance, max(WINDOW, length / MOST_DOTS))
+    ring = balance.rings[plane]
+    angles = ANGLE.values(balance.angles[ring]).T
     marks: list[fig.Mark] = [
         fig.Points(
             balance.time[rows],
             values[rows],
             color=fig.COLOURS[ball % len(fig.COLOURS)],
             size=2.5,
-            name=f"ball {ball + 1}",
+            name=f"ball {ball + 1}" if len(angles) > 1 else shape_name(ring),
         )
-        for ball, values in enumerate(ANGLE.values(_angles_of(case, balance.rings[plane])).T)
+        for ball, values in enumerate(angles)
     ]
     x, z = -balance.load[plane]
     if balance.load_size[plane] > SMALLEST:
@@ -183,7 +180,7 @@ def _sizes(balance: Balance, plane: int) -> tuple[fig.Mark, ...]:
     rows = _sampled(balance, WINDOW)
     largest = np.maximum.reduceat(balance.size[:, plane], rows)
     drawn = UNBALANCE.values(np.maximum(largest, SMALLEST))
-    marks: list[fig.Mark] = [fig.Line(balance.time[rows], drawn, key="with balls")]
+    marks: list[fig.Mark] = [fig.Line(balance.time[rows], drawn, key="with rings")]
     if balance.load_size[plane] > SMALLEST:
         of_load = float(UNBALANCE.values(balance.load_size[plane]))
         marks.append(fig.Rule(of_load, color=fig.MEASURED, dash="dashed", key="load alone"))

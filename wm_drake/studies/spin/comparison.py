@@ -155,7 +155,7 @@ def differences_of(variants: Variants, references: Mapping[str, str]) -> xr.Data
 
 def _numbers(runs: SpinRuns) -> dict[tuple[str, str, str, str], float]:
     """Return numbers in their units for reading, by load, measure, what they are of, and unit."""
-    names = [*COMPARED, *(variable.name for variable in tabulated())]
+    names = [*COMPARED, *(variable.name for variable in tabulated(runs.parameters))]
     numbers = dict[tuple[str, str, str, str], float]()
     for row, case in enumerate(runs.results):
         table = runs.measures.isel(load=row)

@@ -53,6 +53,7 @@ from wm_drake.studies.spin.study import (
     write_replay,
 )
 from wm_drake.studies.spin.vibration import vibration_plots
+from wm_drake.studies.stops import stops_sentence
 
 if TYPE_CHECKING:
     from wm_drake.studies.modes.study import NaturalModes
@@ -263,8 +264,9 @@ def summary(runs: SpinRuns, amplitudes: xr.Dataset) -> str:
         opening += f" {excluded} excluded from this summary."
     main = max(ended, key=lambda case: _peak(case)[0])
     largest = f"The largest amplitude occurs with load {main.title}: {_peak_text(main)}."
-    sentences = (_contact_sentence(ended), opening, largest, _agreement(runs, ended, amplitudes))
-    return " ".join(sentences)
+    contact = _contact_sentence(ended), stops_sentence(runs.measures)
+    sentences = (*contact, opening, largest, _agreement(runs, ended, amplitudes))
+    return " ".join(filter(None, sentences))
 
 
 def _peak(case: CaseResult) -> tuple[float, str, float]:
@@ -363,9 +365,9 @@ def overlap_warnings(runs: SpinRuns) -> list[str]:
     """Return a warning for each load with which tub and housing overlap."""
     gaps = [(case.title, case.measures.smallest_gap) for case in runs.results]
     return [
-        f"Load {title}: {gap.parts} overlap by {GAP.text(-gap.distance)}. The model has no contact "
-        "forces. In the real machine these parts would collide, and the motion after that is not "
-        "valid."
+        f"Load {title}: {gap.parts} overlap by {GAP.text(-gap.distance)}. The model has no "
+        "contact forces but those of stops. In the real machine these parts would collide, and the "
+        "motion after that is not valid."
         for title, gap in gaps
         if gap is not None and gap.distance <= 0.0
     ]
@@ -480,7 +482,7 @@ def _more_tables(runs: SpinRuns) -> list[LabelledTable]:
             across=variable.dims[-1] if variable.dims else "",
             is_in_terminal=True,
         )
-        for variable in tabulated()
+        for variable in tabulated(runs.parameters)
     ]
 
 

@@ -23,6 +23,7 @@ from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
 from wm_drake.model.scene import Scene
 from wm_drake.parameters import MachineParameters, Sensor
+from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.report.quantity import SPEED, STEP, TIME, Quantity
 from wm_drake.simulation.cases import Case, is_as_measured, notice_jumping_friction
@@ -327,6 +328,16 @@ def _run(
     return CaseResult(item.case, record, measures, time.perf_counter() - begin)
 
 
+def _water_in(case: CaseResult, shown: Record) -> FloatArray | None:
+    """Return the mean share of water in each wet mass over a motion; None for a load that stays."""
+    if "mass_left" not in shown:
+        return None
+    load, masses = case.case.load, shown.mass_left.values.mean(axis=0)
+    dry, wet = (load.masses(share * np.ones(len(load.wet))) for share in (0.0, 1.0))
+    at = list(load.wet)
+    return np.asarray((masses - dry)[at] / (wet - dry)[at])
+
+
 def write_replay(parameters: MachineParameters, case: CaseResult, path: Path) -> None:
     """Write the page of the 3D replay of a case around its largest amplitude."""
     from wm_drake.model.replay import Motion, replay_page
@@ -340,7 +351,7 @@ def write_replay(parameters: MachineParameters, case: CaseResult, path: Path) ->
     words = "" if gasket or parameters.gasket is None else ", without gasket"
     text = replay_page(
         parameters,
-        Motion(time, positions, shown.drum_speed.values, cabinet),
+        Motion(time, positions, shown.drum_speed.values, cabinet, _water_in(case, shown)),
         title=f"Machine {parameters.name}, load {case.case.name}{words}",
         load=case.case.load,
         gasket=gasket,

@@ -14,7 +14,7 @@ class SpinCycleDataOptions(Options):
     machine: str = option("free_stroke", "Name of a shipped machine, or machine file.", "NAME|FILE")
     profile: str = option(
         "spin_cycle",
-        "Name of a shipped profile (spin_cycle, run_up, ifb_9kg), or file with regions.",
+        "Name of a shipped profile (spin_cycle, run_up, ifb_9kg, household), or file with regions.",
         "NAME|FILE",
     )
     cases: Path | None = option(

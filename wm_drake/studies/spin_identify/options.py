@@ -1,5 +1,8 @@
 """Options of the identification from a spin cycle, and its declaration."""
 
+from pathlib import Path
+from typing import Literal
+
 from wm_drake.studies.spin_cycle.options import SpinCycleDataOptions
 from wm_drake.studies.study import Study, imported, option
 
@@ -17,6 +20,21 @@ class SpinIdentifyOptions(SpinCycleDataOptions):
         (),
         "Use only this case. Repeatable. Default: those of --cases, or 2, 5 and 29 of [A] Table 9.",
         "NAME",
+    )
+    record: tuple[str, ...] = option(
+        (),
+        "Recorded file of a case, in place of --measured: 5=run_5.mf4. Repeatable; several of a "
+        "case are repeats. The model predicts the signals of the sensors.",
+        "CASE=FILE",
+    )
+    test: Path | None = option(
+        None,
+        "For --record: file with sensors and channel of the drum speed. Default: the sensors of "
+        "the machine file.",
+        "FILE",
+    )
+    by: Literal["envelope", "order", "rms", "history"] = option(
+        "rms", "What is fitted of records, as in `calibrate`.", "NAME"
     )
     noise: float = option(
         0.005, "Relative standard deviation of the noise in a virtual experiment.", ge=0.0

@@ -1,5 +1,6 @@
 """Show an identification from a spin cycle: values found, and how well they fit."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +10,11 @@ from wm_drake.parameters import machine_yaml
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Share
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import HIDDEN, Quantity, text_of
+from wm_drake.report.quantity import HIDDEN, Quantity, text_of, units_of
 from wm_drake.studies.answer import Answer, Part, Plot
 from wm_drake.studies.fitting.fit import Fit, verdict_of
-from wm_drake.studies.fitting.page import estimates_of, fit_parts, search_facts
+from wm_drake.studies.fitting.page import estimates_of, fit_parts, of_unknowns, search_facts
+from wm_drake.studies.fitting.sought import Sought
 from wm_drake.studies.spin_cycle.figures import bars_figure
 from wm_drake.studies.spin_cycle.page import (
     case_description,
@@ -160,30 +162,38 @@ def _parameters(
     model: SpinModel, fit: Fit, identified: xr.Dataset, truth: dict[str, float] | None
 ) -> LabelledTable:
     """Return the estimates with a row for each key of the machine file."""
-    starts = [
-        np.nan if one.start is None else one.unit.from_si(one.start)
-        for one in (sought.unknown for sought in model.sought)
-    ]
-    rows = estimates_of(fit, truth).assign(before=("unknown", starts))
+    unknowns = [sought.unknown for sought in model.sought]
+    units = {unknown.name: unknown.unit for unknown in unknowns}
+    starts = [np.nan if unknown.start is None else unknown.start for unknown in unknowns]
+    rows = estimates_of(fit, truth).assign(before=of_unknowns("before", units, starts))
     accuracy = [name for name in ("half_width", "error", "is_identified") if name in identified]
     for name in accuracy:
         rows[name] = identified[name].variable
     for name in ("lower_bound", "upper_bound"):
         rows[name].attrs[HIDDEN] = True
-    first = ["before", *(["planted"] if truth else []), "value", "lower_95", "upper_95", "unit"]
-    owners = [index for index, sought in enumerate(model.sought) for _ in sought.keys]
-    keys = [key for sought in model.sought for key in sought.keys]
+    first = ["before", *(["planted"] if truth else []), "value", "lower_95", "upper_95"]
     return LabelledTable(
         "parameters",
-        rows[[*first, *accuracy, "remark", "lower_bound", "upper_bound"]]
-        .isel(unknown=owners)
-        .assign_coords(unknown=keys),
+        of_keys(rows[[*first, *accuracy, "remark", "lower_bound", "upper_bound"]], model.sought),
         "Values found",
         "Values of the unknowns, each in its unit, with 95 % confidence intervals; keys of one "
         f"unknown have the same value. Bold: determined to within {WITHIN}.",
         marked=("is_identified", "ours"),
         is_in_terminal=True,
     )
+
+
+def of_keys(estimates: xr.Dataset, sought: Sequence[Sought]) -> xr.Dataset:
+    """Return numbers over `unknown` with a line for each key of the machine file."""
+    owners = [index for index, one in enumerate(sought) for _ in one.keys]
+    units = {key: one.unknown.unit for one in sought for key in one.keys}
+    rows = estimates.isel(unknown=owners).assign_coords(unknown=list(units))
+    for name, variable in rows.items():
+        if units_of(estimates[name]) is not None:
+            words = variable.attrs["quantity"].words
+            rows[name] = of_unknowns(words, units, variable.values)
+            rows[name].attrs |= {HIDDEN: True} if HIDDEN in variable.attrs else {}
+    return rows
 
 
 def _bars(model: SpinModel, identified: xr.Dataset, index: int) -> Plot:

@@ -10,31 +10,20 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from wm_drake.errors import input_error, problems_at
-from wm_drake.parameters import (
-    Change,
-    MachineParameters,
-    SpinProfile,
-    Variation,
-    apply,
-    with_values,
-)
-from wm_drake.parameters.keys import allowed_range
+from wm_drake.errors import input_error
+from wm_drake.parameters import MachineParameters, SpinProfile
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.unbalance_cases import UnbalanceCase
 from wm_drake.parameters.units import Share
-from wm_drake.parameters.variation import number_at, range_of
 from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.fitting.fit import Fit
 from wm_drake.studies.fitting.methods import identify
-from wm_drake.studies.fitting.problem import FitProblem, Measurement, Progress, Unknown
+from wm_drake.studies.fitting.problem import FitProblem, Measurement, Progress
+from wm_drake.studies.fitting.sought import Sought, SoughtNumbers, at_point, sought_in, sought_of
 from wm_drake.studies.spin_cycle.measured import DIMS, RMS
 from wm_drake.studies.spin_cycle.study import average_errors, labels_of, region_errors, runs_of
-
-SPAN = 1.5
-"""Default bounds of an unknown: the number of the machine divided and multiplied by this."""
 
 PLANTED = (0.8, 1.25)
 """Range of the ratio of true number to machine's number in a virtual experiment."""
@@ -45,9 +34,6 @@ HALF_WIDTH = Quantity("95 % interval, ±", Share(), 2)
 
 KNOWN = 0.02
 """Largest relative half-width of the 95 % confidence interval of an identified unknown."""
-
-JOIN = "+"
-"""Separator between keys whose numbers are equal and form one unknown."""
 
 TABLE_8 = (
     ("bushing_types.connecting.friction_torque_y",),
@@ -63,105 +49,21 @@ They are the friction about the axis of its bushings and all rotational numbers 
 """
 
 
-@dataclass(frozen=True)
-class Sought:
-    """An unknown: a variation with bounds.
-
-    Attributes:
-        variation: Numbers of the machine that are equal to the unknown.
-    """
-
-    variation: Variation
-    unknown: Unknown
-
-    @property
-    def keys(self) -> tuple[str, ...]:
-        """Key paths of the numbers."""
-        return self.variation.keys
-
-    @property
-    def guess(self) -> float:
-        """Start of the search; without one, the geometric mean of the bounds. [SI]"""
-        return float(self.unknown.start or np.sqrt(self.unknown.lower * self.unknown.upper))
-
-
 def unknowns_of(parameters: MachineParameters, texts: Sequence[str]) -> tuple[Sought, ...]:
     """Return the unknowns of KEYS[=RANGE] texts, or those of [A] Table 8 if there are none.
 
     Raises:
         InputError: a key or a range is wrong, or the machine does not have the numbers of Table 8.
     """
-    if not texts:
-        if not parameters.bushing_types or parameters.gasket is None:
-            raise input_error(
-                f"machine '{parameters.name}' does not have the numbers of [A] Table 8; give keys "
-                "of this machine",
-                where="--unknown",
-            )
-        return tuple(sought_of(parameters, keys) for keys in TABLE_8)
-    unknowns = []
-    for text in texts:
-        names, _, bounds = (part.strip() for part in text.partition("="))
-        keys = [key.strip() for key in names.split(JOIN)]
-        with problems_at("--unknown"):
-            unknowns.append(sought_of(parameters, keys, bounds))
-    return tuple(unknowns)
-
-
-def sought_of(parameters: MachineParameters, keys: Sequence[str], bounds: str = "") -> Sought:
-    """Return an unknown of a machine; the search uses its logarithm if the bounds are positive.
-
-    Args:
-        parameters: The machine; its number is the start value.
-        keys: Key paths of numbers that are equal.
-        bounds: Bounds of the search, ``LOW..HIGH`` or ``(LOW, HIGH) UNIT``. If empty, they are the
-            machine's number divided and multiplied by `SPAN`.
-
-    Raises:
-        InputError: a key is unknown or not a number, the numbers have different units, or bounds
-            are wrong, or are needed because the number is not positive.
-    """
-    numbers = tuple(number_at(parameters, key) for key in keys)
-    for number in numbers:
-        if number.is_table:
-            raise input_error("is a table; an unknown is a number", key=number.key)
-    first = numbers[0]
-    if any(number.unit != first.unit for number in numbers):
+    if texts:
+        return sought_in(parameters, texts)
+    if not parameters.bushing_types or parameters.gasket is None:
         raise input_error(
-            f"{', '.join(keys)} have different units; equal numbers need the same unit",
-            key=first.key,
+            f"machine '{parameters.name}' does not have the numbers of [A] Table 8; give keys "
+            "of this machine",
+            where="--unknown",
         )
-    value = first.nominal
-    if bounds:
-        ends = range_of(bounds)
-        if ends is None:
-            example = f"(1, 2) {first.unit.shown}"
-            message = f"'{bounds}' is not a range; write for example '{example}'"
-            raise input_error(message, key=first.key)
-        lower, upper = map(first.resolved, ends)
-    elif value is None or value <= 0.0:
-        message = "is not positive, so its range must be given; write KEY=LOW..HIGH"
-        raise input_error(message, key=first.key)
-    else:
-        lower, upper = value / SPAN, value * SPAN
-    for number in numbers:  # the search may go to either end
-        allowed = allowed_range(parameters, number.key)
-        if not (allowed.holds(lower) and allowed.holds(upper)):
-            limits = " and ".join(f"{sign} {end:g}" for sign, end in allowed.limits())
-            raise input_error(f"'{bounds}' is out of range; allowed is {limits}", key=number.key)
-    start = value if value is not None and lower <= value <= upper else None
-    name = JOIN.join(keys)
-    return Sought(
-        Variation(name, numbers, Change.VALUE, first.unit),
-        Unknown(name, lower, upper, first.unit, start, logarithmic=lower > 0.0),
-    )
-
-
-def at_point(
-    parameters: MachineParameters, sought: Sequence[Sought], values: FloatArray
-) -> MachineParameters:
-    """Return the machine with values of the unknowns, in SI units."""
-    return apply(parameters, [s.variation for s in sought], map(float, values))
+    return tuple(sought_of(parameters, keys) for keys in TABLE_8)
 
 
 def planted_values(sought: Sequence[Sought], seed: int) -> FloatArray:
@@ -291,33 +193,11 @@ def half_widths(fit: Fit) -> FloatArray:
 
 
 def identified_machine(model: SpinModel, fit: Fit, *, is_virtual: bool) -> MachineParameters:
-    """Return the machine with the identified numbers and the source of each.
-
-    A number that the data do not determine stays as it is. The machine has a name of its own.
-    """
+    """Return the machine with the identified numbers and the source of each."""
     virtual = "virtual experiment: " if is_virtual else ""
     cases = ", ".join(case.name for case in model.cases)
-    values: dict[str, float] = {}
-    sources: dict[str, str] = {}
-    for sought, estimate in zip(model.sought, fit.estimates, strict=True):
-        if not estimate.determined:
-            continue
-        text = f"{virtual}identified from spin cycle, cases {cases}"
-        if estimate.at_bound:
-            text += f"; at the {estimate.at_bound} bound of the search"
-        elif np.isfinite(estimate.lower):
-            unit = sought.unknown.unit
-            lower, upper = (unit.from_si(value) for value in (estimate.lower, estimate.upper))
-            text += f"; 95 % interval {lower:.4g} to {upper:.4g} {unit.shown}"
-        values |= dict.fromkeys(sought.keys, estimate.value)
-        sources |= dict.fromkeys(sought.keys, text)
-    changed = with_values(model.parameters, values)
-    return changed.model_copy(
-        update={
-            "name": f"{model.parameters.name}_identified",
-            "sources": {**changed.sources, **sources},
-        }
-    )
+    source = f"{virtual}identified from spin cycle, cases {cases}"
+    return SoughtNumbers(model.parameters, model.sought, "identified").solved(fit, source)
 
 
 def _problem(model: SpinModel, measured: xr.DataArray) -> FitProblem:
@@ -341,7 +221,7 @@ def _problem(model: SpinModel, measured: xr.DataArray) -> FitProblem:
         return [(values[..., k, :, :, :] * weights[k])[..., is_measured[k]] for k in with_data]
 
     tests = tuple(
-        Measurement(f"case {model.cases[k].name}", numbers, heteroscedastic=True)
+        Measurement(f"case {model.cases[k].name}", numbers, errors="each")
         for k, numbers in zip(with_data, scaled(data), strict=True)
     )
     unknowns = tuple(s.unknown for s in model.sought)

@@ -1,13 +1,24 @@
 """Check the options of the identification from a spin cycle, and run it."""
 
+from pathlib import Path
 from typing import Any
 
+from wm_drake.errors import check_known, input_error
 from wm_drake.model.machine import Machine
 from wm_drake.studies.answer import Answer
+from wm_drake.studies.calibrate.records_task import (
+    fitted_answer,
+    record_model,
+    recorded_load,
+    records_here,
+)
+from wm_drake.studies.compare.options import CompareOptions
+from wm_drake.studies.compare.task import CompareTask
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.experiment import Experiment
-from wm_drake.studies.inputs import runnable_profile
-from wm_drake.studies.spin_cycle.study import cases_of_table, measured_displacements
+from wm_drake.studies.fitting.sought import SoughtNumbers
+from wm_drake.studies.inputs import pairs_of, runnable_profile
+from wm_drake.studies.spin_cycle.study import cases_of_table, measured_displacements, runs_of
 from wm_drake.studies.spin_identify.options import SpinIdentifyOptions
 from wm_drake.studies.spin_identify.page import spin_identify_answer
 from wm_drake.studies.spin_identify.study import (
@@ -32,10 +43,38 @@ class SpinIdentifyTask(Task):
         self.profile = runnable_profile(options.profile, machine.parameters)
         names = options.case or (() if options.cases else DEFAULT_CASES)
         self.cases = cases_of_table(options.cases, names)
-        self.measured = measured_displacements(
-            options, machine.parameters, self.cases, self.profile
-        )
         self.sought = unknowns_of(machine.parameters, options.unknown)
+        self.measured, self.tests = None, dict[str, CompareTask]()
+        if options.record:
+            self.tests = self._tests()
+        else:
+            for name in ("test", "by"):
+                if name in options.model_fields_set:
+                    raise input_error("is about --record, and none is given", where=f"--{name}")
+            self.measured = measured_displacements(
+                options, machine.parameters, self.cases, self.profile
+            )
+
+    def _tests(self) -> dict[str, CompareTask]:
+        """Return the records of each case that has some.
+
+        Raises:
+            InputError: a record belongs to no case, or is wrong.
+        """
+        options, parameters = self.options, self.machine.parameters
+        for name in ("measured", "accelerations"):
+            if getattr(options, name):
+                raise input_error("not allowed together with --record", where=f"--{name}")
+        runs = {run.name: run for run in runs_of(parameters, self.cases, self.profile)}
+        files: dict[str, list[Path]] = {}
+        for name, path in pairs_of(options.record, "--record"):
+            check_known(name, runs, f"unknown case '{name}'", where="--record")
+            files.setdefault(name, []).append(Path(path))
+        shared = {"test": options.test, "unit": options.unit, "channels": options.channels}
+        return {
+            name: CompareTask(CompareOptions(records=paths, **shared), self.machine, runs[name])
+            for name, paths in files.items()
+        }
 
     @property
     def identity(self) -> dict[str, Any]:
@@ -47,10 +86,13 @@ class SpinIdentifyTask(Task):
             "measurements": measured,
             "unknowns": [{"keys": s.keys, "unknown": s.unknown} for s in self.sought],
             "noise": f"{self.options.noise:g}, seed {self.options.seed}",
+            "records": f"{self.options.by}, {', '.join(self.options.record)}",
         }
 
     def run(self, executor: Executor) -> Answer:
         """Identify the unknowns, from measurements or from a virtual experiment."""
+        if self.tests:
+            return self._fitted(executor)
         seed, measured, planted = self.options.seed, self.measured, None
         with executor.fraction("search") as report:
             experiment = Experiment(self.machine, ("regions",), executor.simulate)
@@ -68,3 +110,19 @@ class SpinIdentifyTask(Task):
                 progress=lambda fraction, least: report(fraction),
             )
         return spin_identify_answer(model, fit, identified, planted)
+
+    def _fitted(self, executor: Executor) -> Answer:
+        """Fit the unknowns to the records."""
+        parameters, cases = self.machine.parameters, {case.name: case for case in self.cases}
+        loads = [
+            recorded_load(test, executor, cases[name].load) for name, test in self.tests.items()
+        ]
+        model = record_model(
+            records_here(self.machine, executor),
+            SoughtNumbers(parameters, self.sought, "identified"),
+            list(self.tests.values()),
+            loads,
+            self.options.by,
+        )
+        title = f"Parameters of machine {parameters.name} identified from records of a spin cycle"
+        return fitted_answer(executor, model, self.options.seed, (title, "identified"))

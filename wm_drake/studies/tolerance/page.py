@@ -6,9 +6,10 @@ import numpy as np
 import xarray as xr
 
 from wm_drake.parameters import MachineParameters
+from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import MISSING, listed
-from wm_drake.report.labelled import LabelledTable, TurnedTable
-from wm_drake.report.quantity import quantity_of, text_of
+from wm_drake.report.labelled import LabelledTable
+from wm_drake.report.quantity import Quantity, quantity_of, text_of
 from wm_drake.studies.answer import Answer, Part, Plot
 from wm_drake.studies.tolerance.figures import distributions_figure, gap_figure, sobol_figure
 from wm_drake.studies.tolerance.study import (
@@ -148,12 +149,12 @@ def rare_sentences(contact: xr.Dataset) -> str:
     """Return how the subset simulation went; nothing if there was none."""
     if "threshold" not in contact:
         return ""
-    steps = ", ".join(map(GAP_SIZE.number, contact.threshold.values))
+    steps = ", ".join(map(GAP_SIZE.text, contact.threshold.values))
     text = (
         f"Of {contact.attrs['samples']} samples {text_of(contact.touching)} touch, too few to "
         f"count. Subset simulation took {text_of(contact.rare_runs)} runs in "
         f"{contact.sizes['level'] + 1} levels. Each level holds the tenth of the runs with the "
-        f"smallest gaps of the level before: at most {steps} mm"
+        f"smallest gaps of the level before: at most {steps}"
     )
     if not np.isfinite(contact.rare_deviation):
         return (
@@ -257,6 +258,9 @@ def about_loads(trials: ToleranceTrials, samples: xr.Dataset, gaps: xr.DataArray
     )
 
 
+LAUNDRY = Quantity("mass of the laundry", Unit("kg", "kg"), form="{:.3g}".format)
+
+
 def masses_text(
     parameters: MachineParameters, loads: Sequence[str], masses: tuple[float, float]
 ) -> str:
@@ -267,8 +271,10 @@ def masses_text(
         masses: Smallest and largest mass of the laundry. [kg]
     """
     of_load = {name: parameters.loads[name].mass for name in loads}
-    ends = f"{masses[0]:.2g} to {masses[1]:.2g} kg"
-    heavier = [f"{load} ({mass:.3g} kg)" for load, mass in of_load.items() if mass > masses[1]]
+    ends = f"{LAUNDRY.text(masses[0])} to {LAUNDRY.text(masses[1])}"
+    heavier = [
+        f"{load} ({LAUNDRY.text(mass)})" for load, mass in of_load.items() if mass > masses[1]
+    ]
     if not heavier:
         return f"The laundry of the samples, {ends}, is as heavy as any of these loads."
     verb = "is" if len(heavier) == 1 else "are"
@@ -398,26 +404,30 @@ def _contact(contact: xr.Dataset) -> Part:
     return Part("Contact", tables, rare_sentences(contact))
 
 
-def _statistics(measures: xr.Dataset) -> tuple[TurnedTable, ...]:
+def _statistics(measures: xr.Dataset) -> tuple[LabelledTable, ...]:
     """Return statistics of the measures, and the intervals of the percentiles."""
     statistics = statistics_of(measures)
+    each = {str(name): quantity_of(array) for name, array in statistics.items()}
+    dims = ("quantity", "statistic")
+    values = Quantity("").of_each("quantity", each, dims, list(statistics.values()))
+    lines = xr.Dataset({"value": values}, {"quantity": list(each), **statistics.coords})
     ends = [name for name in statistics["statistic"].values if name not in ("mean", "deviation")]
-    return (
-        TurnedTable(
-            "measures",
-            statistics.sel(statistic=[*STATISTICS]),
-            "Measures of the samples",
-            "Measures over all samples.",
-            words=WORDS,
-            is_in_terminal=True,
-        ),
-        TurnedTable(
-            "percentiles",
-            statistics.sel(statistic=ends),
-            "Percentiles",
-            "Percentiles with 95 % intervals of order statistics.",
-            words=WORDS,
-        ),
+    about = "Percentiles with 95 % intervals of order statistics."
+    texts = {
+        "measures": ([*STATISTICS], "Measures of the samples", "Measures over all samples."),
+        "percentiles": (ends, "Percentiles", about),
+    }
+    return tuple(
+        LabelledTable(
+            name,
+            lines.sel(statistic=chosen),
+            heading,
+            caption,
+            "statistic",
+            words=WORDS | {key: quantity.words for key, quantity in each.items()},
+            is_in_terminal=name == "measures",
+        )
+        for name, (chosen, heading, caption) in texts.items()
     )
 
 

@@ -7,10 +7,12 @@ from wm_drake.engines.compiled.step_check import check_step
 from wm_drake.errors import problems_at
 from wm_drake.model.bodies import with_sdf_values
 from wm_drake.model.build import build_machine
+from wm_drake.model.key_patterns import keys_like
 from wm_drake.model.machine import Machine
 from wm_drake.parameters.tolerances import (
     TOLERANCES,
     Limit,
+    Tolerances,
     check_load,
     load_limits,
     load_tolerances,
@@ -49,7 +51,7 @@ class ToleranceTask(Task):
         self.settings = ToleranceSettings(
             options.samples, sensitivity, options.subset, options.seed
         )
-        self.tolerances = load_tolerances(options.file)
+        self.tolerances = matched(load_tolerances(options.file), machine)
         limits: tuple[Limit, ...] = ()
         if options.limits is not None:
             limits = load_limits(existing_file(options.limits, "--limits"))
@@ -105,6 +107,23 @@ class ToleranceTask(Task):
             contact = contact.assign(gap_of_load=trials.gaps_of_loads())
         limits = judged(samples, self.limits)
         return tolerance_answer(trials, samples, indices, contact, limits)
+
+
+def matched(tolerances: Tolerances, machine: Machine) -> Tolerances:
+    """Return tolerances with the keys of a machine in place of patterns with *.
+
+    A quantity of which no pattern fits a number of the machine is left out.
+    """
+    keys = {
+        name: tuple(dict.fromkeys(k for key in quantity.keys for k in keys_like(machine, key)))
+        for name, quantity in tolerances.quantities.items()
+    }
+    quantities = {
+        name: quantity.model_copy(update={"keys": keys[name]})
+        for name, quantity in tolerances.quantities.items()
+        if keys[name]
+    }
+    return tolerances.model_copy(update={"quantities": quantities})
 
 
 def _measures(

@@ -8,9 +8,10 @@ import xarray as xr
 from wm_drake.report import figure as fig
 from wm_drake.report.formatting import shape_name
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import SPEED, Quantity, shown, text_of
+from wm_drake.report.quantity import SPEED, Quantity, of_measure, shown, text_of
 from wm_drake.studies.answer import Answer, Part, Plot
 from wm_drake.studies.proposal_page import proposal_part
+from wm_drake.studies.stops import stops_sentence
 from wm_drake.studies.tolerance.page import masses_text
 from wm_drake.studies.verdict.study import (
     FACTOR,
@@ -61,6 +62,7 @@ def verdict_answer(
         question.machine,
         (
             Part("Smallest gaps", (gaps_plot(question, states, laundry), *_laundry(laundry))),
+            Part("Stops", (stops_table(states),) if "stop_hits" in states else ()),
             Part("What decides the gap", influences_shown(question, states, tried)),
             Part("Each load", (loads_table(question, states),)),
             Part("Other commands with a smallest gap", text=HOW_OTHERS_DIFFER),
@@ -82,12 +84,14 @@ def word_of(question: VerdictQuestion, states: xr.Dataset, laundry: xr.Dataset) 
 def answer(question: VerdictQuestion, states: xr.Dataset, laundry: xr.Dataset) -> str:
     """Return the answer in a sentence or two."""
     base, gap = states.isel(state=0), smallest(states)[0].item()
+    at_stops = stops_sentence(base)
     nearest = base.isel(load=int(base.smallest_gap.fillna(-np.inf).argmin("load")))
     load = nearest["load"].item()
     if not np.isfinite(gap):
         return f"No verdict: the run of load {load} failed, which counts as contact."
     size = f"smallest gap {mm(gap)}" if gap > 0.0 else f"overlap of {mm(-gap)}"
     text = f"{size}, between {_pair(nearest)}, with load {load} at {SPEED.text(nearest.gap_speed)}."
+    text = " ".join(filter(None, [text, at_stops]))
     if gap <= 0.0:
         return f"The tub touches the housing: {text}"
     gaps = laundry.gap[0].values
@@ -215,10 +219,28 @@ def loads_table(question: VerdictQuestion, states: xr.Dataset) -> LabelledTable:
         data.assign(is_too_small=gaps.drop_attrs() <= question.clearance),
         "Smallest gap of each load",
         "Smallest gap between the parts that move with the tub and the housing. 0 and below: "
-        "contact; the model has no contact forces.",
+        "contact; the model has no contact forces but those of stops.",
         marked=("is_too_small", "alarm"),
         is_in_terminal=True,
     )
+
+
+def stops_table(states: xr.Dataset) -> LabelledTable:
+    """Return force, hits and velocity at each stop, with each load."""
+    base = states.isel(state=0, drop=True)
+    force = base.mount_force_peak.sel(mount=[f"elements.{name}" for name in base["stop"].values])
+    data = xr.Dataset(
+        {
+            "force": of_measure("mount_force_peak").variable(("load", "stop"), force),
+            "hits": of_measure("stop_hits").variable(("load", "stop"), base.stop_hits),
+            "velocity": of_measure("stop_hit_velocity").variable(
+                ("load", "stop"), base.stop_hit_velocity
+            ),
+        },
+        {"load": base["load"].values, "stop": base["stop"].values},
+    )
+    caption = "Largest force, number of hits and largest velocity of a hit, of each stop."
+    return LabelledTable("stops", data, "Stops", caption)
 
 
 def _laundry(laundry: xr.Dataset) -> tuple[LabelledTable, LabelledTable]:

@@ -11,10 +11,13 @@ from wm_drake.model.sdf_names import sdf_names
 from wm_drake.parameters import with_values
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.measures.responses import GAP, has_gap, known_responses, measures_of
-from wm_drake.studies.answer import Answer
+from wm_drake.simulation.measures.stops import STOPS
+from wm_drake.studies.answer import Answer, Part
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.inputs import profile_of, selected_cases
+from wm_drake.studies.next.knowledge import Knowledge
+from wm_drake.studies.next.task import UNMEASURED, next_block, tolerances_of
 from wm_drake.studies.study import Task
 from wm_drake.studies.tolerance.options import ToleranceOptions
 from wm_drake.studies.tolerance.study import CONTACTS, laundry_masses
@@ -57,6 +60,7 @@ class VerdictTask(Task):
         known = known_responses(full, profile_of(full, options.profile))
         self.responses = tuple(r for r in known if r.group in SHOWN_GROUPS or r.name == GAP)
         measures = {*measures_of(full, self.responses), CONTACTS}
+        measures |= {STOPS.name} if STOPS.applies(full) else set()
         self.measures = tuple(name for name in MEASURES if name in measures)
         self.live = self._live(machine) if options.live else ""
 
@@ -116,7 +120,23 @@ class VerdictTask(Task):
             laundry_of(samples, self.clearance),
             laundry_masses(samples[0]),
         )
-        return replace(answer, live=self.live)
+        return replace(answer, parts=(*answer.parts, self._next(executor)), live=self.live)
+
+    def _next(self, executor: Executor) -> Part:
+        """Return what to measure next, if the machine is known from drawings and catalogues."""
+        profile = self.options.profile
+
+        def known() -> Knowledge:
+            return tolerances_of(UNMEASURED, self.machine, profile)
+
+        return next_block(executor, known, _study_next(self.options), self.cases[0].profile)
+
+
+def _study_next(options: VerdictOptions) -> str:
+    """Return the command that says what to measure next of the machine of a verdict."""
+    sets = [f'--set "{text}"' for text in options.sets]
+    profile = [f"--profile {options.profile}"] if options.profile else []
+    return " ".join(["wm-drake study next", options.machine, *sets, *profile])
 
 
 def _length(text: str) -> float:

@@ -1,0 +1,143 @@
+"""Design of measurements on problems of known answer: variances in closed form, no machine runs."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from wm_drake.simulation.measures import MEASURES
+from wm_drake.simulation.measures.responses import Response
+from wm_drake.studies.next.measurements import CandidateMeasurement
+from wm_drake.studies.next.question import Observed, Question
+from wm_drake.studies.next.study import (
+    Model,
+    model_of,
+    pairs_of,
+    sequence_of,
+    singles_of,
+    steps_of,
+)
+
+GAP = Response("gap", MEASURES["gap"].variables[0])
+
+
+def linear_model(slopes, data, samples=4000, costs=None, bend=0.0):
+    """Return the model of answers `slopes` (K, p) and data `data` (n, p) each, made up."""
+    slopes = np.atleast_2d(np.asarray(slopes, dtype=float))
+    rng = np.random.default_rng(3)
+    scores = rng.standard_normal((samples, slopes.shape[1]))
+    data = [np.atleast_2d(np.asarray(rows, dtype=float)) for rows in data]
+    costs = costs or [np.nan] * len(data)
+    measurements = tuple(
+        CandidateMeasurement(
+            f"m{k}", f"m{k}", cost, lambda numbers: numbers, lambda machines: machines
+        )
+        for k, cost in enumerate(costs)
+    )
+    loads = tuple(f"load{k}" for k in range(len(slopes)))
+    return Model(
+        Question(SimpleNamespace(names=("a",)), measurements, (GAP,), loads, {}),
+        np.zeros(len(slopes)),
+        slopes,
+        tuple(data),
+        scores @ slopes.T + bend * (scores[:, :1] ** 2 - 1.0),
+        tuple(scores @ rows.T + rng.standard_normal((samples, len(rows))) for rows in data),
+        scores,
+    )
+
+
+@pytest.mark.parametrize("accuracy", [0.1, 1.0, 3.0])
+def test_direct_measurement_leaves_the_variance_of_two_combined_normals(accuracy):
+    model = linear_model([1.0], [[1.0 / accuracy]])
+    expected = accuracy**2 / (1.0 + accuracy**2)
+    assert model.is_linear
+    assert model.remaining([0]) == pytest.approx(expected, rel=1e-6)
+    assert np.var(model.sampled([0])) == pytest.approx(expected, rel=0.05)
+
+
+def test_measurement_of_something_else_leaves_the_answer():
+    model = linear_model([1.0, 0.0], [[0.0, 50.0]])
+    assert model.remaining([0]) == pytest.approx(1.0)
+
+
+def test_worst_of_two_loads_has_the_variance_of_a_smallest_of_two_normals():
+    model = linear_model(np.eye(2), [[100.0, 0.0]])
+    # the smaller of two independent normals has the variance 1 - 1/pi
+    assert np.var(model.linear(())) == pytest.approx(1.0 - 1.0 / np.pi, rel=0.05)
+    # with one of them known to be 0, it is that of min(0, z): 1/2 - 1/(2 pi)
+    known = 0.5 - 0.5 / np.pi
+    assert np.var(model.linear([0])) == pytest.approx(known, rel=0.05)
+    # a model of one load, or of their mean, would say that half remains
+    assert model.remaining([0]) == pytest.approx(known / (1.0 - 1.0 / np.pi), rel=0.05)
+
+
+def test_pairs_find_two_measurements_that_help_only_together():
+    # b sees the answer behind something large, c sees that; a sees the answer badly
+    model = linear_model([1.0, 0.0], [[1.2, 0.0], [100.0, 1000.0], [0.0, 1000.0]])
+    assert sequence_of(model, 1) == [0]
+    best = pairs_of(model).isel(pair=0)
+    assert {best["first"].item(), best["second"].item()} == {"m1", "m2"}
+    assert best.remaining.item() < 1e-3
+    assert model.remaining([0, 1]) > 0.1
+
+
+def test_sequence_never_widens_the_interval_and_repeats_nothing():
+    rng = np.random.default_rng(0)
+    model = linear_model(rng.standard_normal((3, 6)), list(rng.standard_normal((8, 2, 6))))
+    taken = sequence_of(model, 5)
+    assert len(set(taken)) == 5
+    steps = steps_of(model, taken)
+    widths = (steps.high - steps.low).values[:, 0]
+    assert (np.diff(widths) < 1e-9).all()
+    assert (steps.low < steps.value).all()
+    assert (steps.value < steps.high).all()
+
+
+def test_singles_are_ranked_and_have_gain_per_cost():
+    model = linear_model([1.0], [[1.0], [3.0], [0.1]], costs=[1.0, 10.0, np.nan])
+    singles = singles_of(model)
+    assert singles["name"].values.tolist() == ["m1", "m0", "m2"]
+    gains = singles.gain.sel(candidate=["m0", "m1"]).values
+    widths = [1.0 - np.sqrt(1.0 / 2.0), 1.0 - np.sqrt(1.0 / 10.0)]
+    assert gains == pytest.approx(widths, rel=0.02)
+    per_cost = singles.gain_per_cost.sel(candidate=["m0", "m1"]).values
+    assert per_cost == pytest.approx([gains[0], gains[1] / 10.0])
+    assert np.isnan(singles.gain_per_cost.sel(candidate="m2"))
+
+
+def test_curved_answer_is_judged_by_samples_that_keep_what_a_line_misses():
+    model = linear_model([1.0], [[100.0]], bend=0.6)
+    assert not model.is_linear
+    # var(u + b (u^2 - 1)) = 1 + 2 b^2; a linear estimate misses the second part
+    explained = 1.0 - 2.0 * 0.36 / (1.0 + 2.0 * 0.36)
+    assert model.explained[0] == pytest.approx(explained, abs=0.05)
+    assert model.remaining([0]) == pytest.approx(1.0 - explained, abs=0.05)
+
+
+class Made(Question):
+    """A question whose machines are functions of the scores."""
+
+    def at(self, scores, what):  # noqa: ARG002
+        u = np.asarray(scores)
+        answers = np.stack([-(5.0 + u[:, 0] - 2.0 * u[:, 1]), -(6.0 + u[:, 1])], axis=1)
+        numbers = np.stack([20.0 + 0.5 * u[:, 1], np.full(len(u), 7.0)], axis=1)
+        answers[u[:, 0] > 2.5] = np.nan  # no such machine
+        return Observed(answers, (numbers, numbers[:, 1:]))
+
+
+def test_model_of_made_up_machines_has_their_slopes():
+    accuracy = np.array([0.1, 0.1])
+    measurements = (
+        CandidateMeasurement("both", "both", 1.0, lambda numbers: accuracy, None),
+        CandidateMeasurement("nothing", "nothing", 1.0, lambda numbers: accuracy[:1], None),
+    )
+    question = Made(
+        SimpleNamespace(names=("a", "b")), measurements, (GAP,), ("x", "y"), {True: None}
+    )
+    model = model_of(question, 512, 0)
+    assert [m.name for m in model.question.measurements] == ["both"]
+    np.testing.assert_allclose(model.slopes, [[-1.0, 2.0], [0.0, -1.0]], atol=1e-12)
+    np.testing.assert_allclose(model.data_slopes[0], [[0.0, 5.0], [0.0, 0.0]], atol=1e-12)
+    assert model.question.worst(model.middle[None])[0, 0] == pytest.approx(5.0)
+    assert len(model.drawn) < 512
+    assert model.is_linear

@@ -1,0 +1,371 @@
+"""Fit numbers of a machine to what its sensors recorded.
+
+The data are the signals as they were recorded, or their amplitudes, and the model predicts these
+signals. What is not known of the recorder are unknowns of the fit beside those of the machine, each
+with a prior: the gain of each sensor and how it is tilted, offset and rate of each clock, and for
+signals over time the angle of the drum at the start.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, Protocol, TypeAlias
+
+import numpy as np
+import xarray as xr
+from scipy.interpolate import CubicSpline
+
+from wm_drake.errors import InputError, input_error
+from wm_drake.parameters import Load, MachineParameters, SpinProfile
+from wm_drake.parameters.recorded_sensors import RecordedSensor
+from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import Unit
+from wm_drake.report.quantity import Quantity
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.recorded_signal import turned_signals
+from wm_drake.simulation.records import Record, profile_of
+from wm_drake.studies.calibrate.recorded import (
+    Block,
+    By,
+    RecordedLoad,
+    amplitude_block,
+    block_name,
+    history_block,
+    mean_of,
+    reduced,
+)
+from wm_drake.studies.compare.pairs import OFFSET, PHASE, Pair, order_one
+from wm_drake.studies.compare.study import RATE
+from wm_drake.studies.experiment import Experiment
+from wm_drake.studies.fitting.fit import Fit
+from wm_drake.studies.fitting.methods import identify
+from wm_drake.studies.fitting.problem import (
+    SMOOTH,
+    FitProblem,
+    Measurement,
+    ModelValues,
+    Progress,
+    Unknown,
+)
+from wm_drake.studies.fitting.search import silent
+
+RECORDED = replace(SMOOTH, cost=1e-5, point=1e-4, gradient=1e-9, most=25)
+"""Descent of a fit to records: noise of the amplitudes is larger than these tolerances."""
+
+MISFIT = Quantity("misfit in standard deviations", decimals=2)
+
+GAIN_SD = 0.01
+"""Deviation of the gain of a sensor: an assumption, that of a usual accelerometer."""
+
+TILT_SD = float(np.deg2rad(2.0))
+"""Deviation of each of two angles by which the axis of a sensor is off: an assumption. [rad]"""
+
+OFFSET_SD, RATE_SD, ANGLE_SD = 1e-4, 1e-6, 0.05
+"""Smallest deviations of a clock [s, 1] and of the angle of the drum at the start [rad]: what the
+alignment claims is not better than the model it aligns with. An assumption."""
+
+REACH = 6.0
+"""Bounds of such an unknown, in deviations."""
+
+RunKey: TypeAlias = tuple[bytes, str, SpinProfile, float]
+"""What determines a run: numbers of the machine, load, profile, angle of the drum."""
+
+ColumnKey: TypeAlias = tuple[int, RunKey, int, float, float, float, float]
+"""What determines the signal of a sensor: recording, run, number of the sensor, offset and rate of
+the clock, and both angles of the axis."""
+
+KEPT_RUNS, KEPT_COLUMNS = 40, 1500
+"""Numbers of runs and of amplitudes of a sensor beyond which none are kept for the next call."""
+
+
+class FreeNumbers(Protocol):
+    """Unknown numbers of a machine: keys with ranges, or the quantities of a free file."""
+
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """The unknowns."""
+
+    def parameters_at(self, point: FloatArray) -> MachineParameters:
+        """Return the machine at a point. [SI]"""
+
+    def known(self, points: FloatArray) -> FloatArray:
+        """Return the residuals of what else is known at points (k, p). (k, m)"""
+
+    def solved(self, fit: Fit, source: str) -> MachineParameters:
+        """Return the machine with the values of a fit; `source` says where they come from."""
+
+
+@dataclass(frozen=True, eq=False)
+class RecordModel:
+    """What sensors record as a function of unknowns of the machine and of the recorder.
+
+    Attributes:
+        experiment: Runs of the machine.
+        free: Unknowns of the machine.
+        loads: Loads with their recordings.
+        sensors, points: Sensors by name, and their positions in T. [m]
+        by: What is fitted.
+    """
+
+    experiment: Experiment
+    free: FreeNumbers
+    loads: tuple[RecordedLoad, ...]
+    sensors: Mapping[str, RecordedSensor]
+    points: Mapping[str, FloatArray]
+    by: By
+    _runs: dict[RunKey, FloatArray] = field(default_factory=dict, repr=False)
+    _columns: dict[ColumnKey, FloatArray] = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def pairs(self) -> tuple[Pair, ...]:
+        """All recordings."""
+        return tuple(pair for load in self.loads for pair in load.pairs)
+
+    @cached_property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """Unknowns of the machine, then those of the recorder."""
+        return (*self.free.unknowns, *self._of_sensors, *self._of_recordings)
+
+    @cached_property
+    def _of_sensors(self) -> tuple[Unknown, ...]:
+        """Gain and two angles of the axis of each sensor."""
+        angle = Unit("rad", "deg")
+        return tuple(
+            unknown
+            for name in self.sensors
+            for unknown in (
+                _nuisance(f"gain of {name}", 1.0, GAIN_SD, Unit("", "")),
+                _nuisance(f"tilt of {name}", 0.0, TILT_SD, angle),
+                _nuisance(f"other tilt of {name}", 0.0, TILT_SD, angle),
+            )
+        )
+
+    @cached_property
+    def _of_recordings(self) -> tuple[Unknown, ...]:
+        """Offset and rate of the clock of each recording, and the angle at its start."""
+        unknowns, names = [], [pair.recording.path.name for pair in self.pairs]
+        for number, pair in enumerate(self.pairs, 1):
+            name, at = names[number - 1], pair.alignment
+            name = name if names.count(name) == 1 else f"{name} ({number})"
+            offset, rate = max(at.offset_sd, OFFSET_SD), max(at.rate_sd, RATE_SD)
+            unknowns.append(_nuisance(f"clock of {name}", 0.0, offset, OFFSET.unit))
+            unknowns.append(_nuisance(f"clock rate of {name}", 0.0, rate, RATE.unit))
+            if self.by == "history":
+                start = float(order_one(pair).start)
+                unknowns.append(_nuisance(f"drum angle of {name}", start, ANGLE_SD, PHASE.unit))
+        return tuple(unknowns)
+
+    @cached_property
+    def blocks(self) -> tuple[Block, ...]:
+        """The data."""
+        if self.by == "history":
+            pairs = ((load, pair) for load in self.loads for pair in load.pairs)
+            return tuple(history_block(load, pair, self.sensors) for load, pair in pairs)
+        return tuple(amplitude_block(load, self.by) for load in self.loads)
+
+    def problem(self) -> FitProblem:
+        """Return the problem of all unknowns: a measurement for each sensor of each block.
+
+        Raises:
+            InputError: no sensor has an amplitude.
+        """
+        tests = []
+        for block in self.blocks:
+            name = "" if len(self.blocks) == 1 else f"{block_name(block, self.by)}, "
+            for k, sensor in enumerate(self.sensors):
+                used = block.valid[:, k]
+                if used.any():
+                    values = block.measured[used, k] / block.deviation[used, k]
+                    base = None if block.baseline is None else block.baseline[used]
+                    errors = "alike" if self.by == "rms" else "correlated"
+                    tests.append(Measurement(f"{name}{sensor}", values, base, errors=errors))
+        if not tests:
+            raise input_error("no sensor has an amplitude to fit; the records are too short")
+        return FitProblem(self.unknowns, tuple(tests), self._values, RECORDED)
+
+    def _values(self, points: FloatArray) -> ModelValues:
+        """Return the computed values of all measurements, in their deviations."""
+        values = np.stack(
+            [
+                np.concatenate(
+                    [
+                        (computed[block.valid[:, k], k] / block.deviation[block.valid[:, k], k])
+                        for block, computed in zip(self.blocks, of_point, strict=True)
+                        for k in range(len(self.sensors))
+                    ]
+                )
+                for of_point in self.computed(points)
+            ]
+        )
+        return ModelValues(values, known=self.free.known(points[:, : len(self.free.unknowns)]))
+
+    def computed(self, points: FloatArray) -> list[list[FloatArray]]:
+        """Return what is predicted of each block (m, k) at each point; NaN where a run failed."""
+        self._run(points)
+        for load in self.loads:
+            for pair in load.pairs:
+                self._reduce(load, pair, points)
+        return [[self._computed(block, point) for block in self.blocks] for point in points]
+
+    def _computed(self, block: Block, point: FloatArray) -> FloatArray:
+        runs = [self._runs[self._key(block.load, pair, point)] for pair in block.pairs]
+        if any(np.isnan(signals[0]).any() for signals in runs):
+            return np.full(block.measured.shape, np.nan)
+        each = [
+            np.stack([self._columns[key] for key in self._keys(block.load, pair, point)], axis=1)
+            for pair in block.pairs
+        ]
+        return mean_of(np.stack(each)) * self._sensors_at(point)[:, 0]
+
+    def _sensors_at(self, point: FloatArray) -> FloatArray:
+        """Return gain and both angles of each sensor at a point (k, 3)."""
+        count = len(self.free.unknowns)
+        return point[count : count + 3 * len(self.sensors)].reshape(-1, 3)
+
+    def _keys(self, load: RecordedLoad, pair: Pair, point: FloatArray) -> list[ColumnKey]:
+        """Return what determines the signal of each sensor of a recording at a point."""
+        run = self._key(load, pair, point)
+        offset, rate = self._of(pair, point)[:2].tolist()
+        tilts = self._sensors_at(point)[:, 1:].tolist()
+        return [(id(pair), run, k, offset, rate, *tilt) for k, tilt in enumerate(tilts)]
+
+    def _reduce(self, load: RecordedLoad, pair: Pair, points: FloatArray) -> None:
+        """Keep what is fitted of the signals of a recording at points, all new ones at once."""
+        needed = dict.fromkeys(key for point in points for key in self._keys(load, pair, point))
+        new = [key for key in needed if key not in self._columns]
+        if not new:
+            return
+        time = pair.run.time.values
+        columns = []
+        for _, run, k, offset, rate, *tilt in new:
+            signal = self._runs[run][:, k] @ np.array([1.0, *tilt])
+            if offset or rate:
+                moved = time + offset + rate * (time - 0.5 * time[-1])
+                signal = CubicSpline(time, signal)(np.clip(moved, time[0], time[-1]))
+            columns.append(np.where(np.isfinite(pair.measured[:, k]), signal, np.nan))
+        values = reduced(load, pair, np.stack(columns, axis=1), self.by)
+        self._columns.update(zip(new, values.T, strict=True))
+
+    def _of(self, pair: Pair, point: FloatArray) -> FloatArray:
+        """Return the unknowns of a recording at a point."""
+        size = len(self._of_recordings) // len(self.pairs)
+        return point[len(point) - size * (len(self.pairs) - self.pairs.index(pair)) :][:size]
+
+    def _key(self, load: RecordedLoad, pair: Pair, point: FloatArray) -> RunKey:
+        """Return what determines the run of a recording at a point."""
+        numbers = point[: len(self.free.unknowns)].tobytes()
+        angle = float(self._of(pair, point)[2]) if self.by == "history" else 0.0
+        return numbers, load.name, profile_of(pair.run), angle
+
+    def _run(self, points: FloatArray) -> None:
+        """Run what is not kept of points, and keep the signals (n, k, 3), NaN of failed runs."""
+        cases: dict[RunKey, Case] = {}
+        needed = {
+            self._key(load, pair, point): (load, pair, point)
+            for point in points
+            for load in self.loads
+            for pair in load.pairs
+        }
+        if len(self._runs) > KEPT_RUNS or len(self._columns) > KEPT_COLUMNS:
+            self._runs.clear()
+            self._columns.clear()
+        for key, (load, pair, point) in needed.items():
+            if key in self._runs:
+                continue
+            self._runs[key] = np.full((len(pair.run.time), len(self.sensors), 3), np.nan)
+            try:
+                machine = self.free.parameters_at(point[: len(self.free.unknowns)])
+            except InputError:
+                continue
+            if self.experiment.can_run(machine):
+                turned = turned_load(load.load_at(machine), key[-1])
+                cases[key] = Case(load.name, turned, profile_of(pair.run), parameters=machine)
+        keys = list(cases)
+
+        def keep(number: int, record: Record) -> None:
+            if not record.attrs["diverged"]:
+                self._runs[keys[number]] = turned_signals(record, self.sensors, self.points)
+
+        if cases:
+            self.experiment.record(self.experiment.machine, list(cases.values()), keep, "records")
+
+
+def _nuisance(name: str, expected: float, deviation: float, unit: Unit) -> Unknown:
+    reach = REACH * deviation
+    prior = (expected, deviation)
+    return Unknown(name, expected - reach, expected + reach, unit, prior=prior)
+
+
+def turned_load(load: Load, angle: float) -> Load:
+    """Return a load in a drum that stands further by an angle at the start. [rad]"""
+    if not angle:
+        return load
+
+    def turned(part: Any) -> Any:
+        return None if part is None else part.model_copy(update={"phase": part.phase + angle})
+
+    return Load(
+        unbalances=tuple(map(turned, load.unbalances)),
+        static=turned(load.static),
+        couple=turned(load.couple),
+    )
+
+
+def calibrated(
+    model: RecordModel, seed: int, progress: Progress = silent
+) -> tuple[Fit, xr.Dataset]:
+    """Fit the unknowns of a model to its recordings.
+
+    Args:
+        progress: Called with the fraction done and the least misfit so far.
+
+    Returns:
+        The fit; and over place and sensor, in SI: `measured`, mean of the repeats, its `deviation`,
+        `before` and `after` the search, and the residual `misfit` after it, in deviations; signals
+        over time without their offset and drift. Over place the name of the load or of the record,
+        `block`. Over sensor: `error_before` and `error_after`, RMS of the difference by that of the
+        measured values.
+
+    Raises:
+        InputError: no sensor has an amplitude.
+    """
+    problem = model.problem()
+    fit = identify(problem, seed=seed, starts=2, screened=8, progress=progress)
+    start = problem.points_at(problem.start)
+    before, after = model.computed(np.stack([start, fit.values]))
+    parts = [
+        _compared(block, block_name(block, model.by), *pair)
+        for block, *pair in zip(model.blocks, before, after, strict=True)
+    ]
+    data = xr.concat(parts, "place").assign_coords(sensor=list(model.sensors))
+    for name in ("before", "after"):
+        missed = np.sqrt(((data[name] - data.measured) ** 2).sum("place"))
+        size = np.sqrt((data.measured.where(data[name].notnull()) ** 2).sum("place"))
+        data[f"error_{name}"] = missed / size.where(size > 0.0)
+    data["misfit"] = MISFIT.variable(
+        ("place", "sensor"), (data.after - data.measured) / data.deviation
+    )
+    return fit, data
+
+
+def _compared(block: Block, name: str, before: FloatArray, after: FloatArray) -> xr.Dataset:
+    """Return measured and computed values of a block over place and sensor."""
+    masked = np.where(block.valid, 1.0, np.nan)
+    values = {"measured": block.measured, "before": before, "after": after}
+    kept = {key: _without_baseline(block, values_ * masked) for key, values_ in values.items()}
+    kept["deviation"] = block.deviation * masked
+    places = {"place": list(block.places), "block": ("place", [name] * len(block.places))}
+    return xr.Dataset({key: (("place", "sensor"), v) for key, v in kept.items()}, places)
+
+
+def _without_baseline(block: Block, values: FloatArray) -> FloatArray:
+    """Return values (m, k) less their offset and drift, if a block has a baseline."""
+    if block.baseline is None:
+        return values
+    result = values.copy()
+    for k in range(values.shape[1]):
+        used = np.isfinite(values[:, k])
+        base = block.baseline[used]
+        amount = np.linalg.lstsq(base, values[used, k], rcond=None)[0] if used.any() else 0.0
+        result[used, k] -= base @ amount if used.any() else 0.0
+    return result

@@ -1,0 +1,162 @@
+"""Check the options of a fit to recordings, and run it."""
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from wm_drake.errors import InputError, input_error
+from wm_drake.model.machine import Machine
+from wm_drake.parameters import located
+from wm_drake.parameters.free import load_free
+from wm_drake.simulation.cases import load_of
+from wm_drake.studies.answer import Answer
+from wm_drake.studies.calibrate.options import CalibrateOptions
+from wm_drake.studies.calibrate.parameter_map import parameter_map_of
+from wm_drake.studies.calibrate.recorded import RecordedLoad, without_edges
+from wm_drake.studies.calibrate.records import FreeNumbers, RecordModel, calibrated
+from wm_drake.studies.calibrate.records_page import records_answer
+from wm_drake.studies.calibrate.solutions import FreeQuantities
+from wm_drake.studies.compare.pairs import check_signs
+from wm_drake.studies.compare.task import CompareTask
+from wm_drake.studies.executor import Executor
+from wm_drake.studies.experiment import Experiment, record_here
+from wm_drake.studies.fitting.sought import SoughtNumbers, sought_in
+from wm_drake.studies.inputs import existing_file
+from wm_drake.studies.study import Task
+
+OF_TARGETS = ("targets", "deviation", "weight", "limit", "leave_out")
+"""Options that are about targets, not about records."""
+
+
+class CalibrateRecordsTask(Task):
+    """A calibration to recordings with checked options."""
+
+    def __init__(self, options: CalibrateOptions, machine: Machine) -> None:
+        """Read test, recordings, loads and profile, and check the unknowns.
+
+        Raises:
+            InputError: an option or a file is wrong.
+        """
+        for name in OF_TARGETS:
+            if name in options.model_fields_set:
+                word = name.replace("_", "-")
+                raise input_error("is about targets, not about records", where=f"--{word}")
+        if options.by == "history" and options.speed == "measured":
+            raise input_error(
+                "history needs the angle of the drum, which a measured speed does not tell; fit "
+                "envelope, order or rms, or name the profile",
+                where="--by",
+            )
+        self.options, self.machine = options, machine
+        self.free = _free_numbers(options, machine)
+        self.tests = [
+            CompareTask(options.model_copy(update={"records": files, "load": load}), machine)
+            for load, files in _by_load(options).items()
+        ]
+
+    @property
+    def identity(self) -> Mapping[str, Any]:
+        """Return what determines the fit beside the machine."""
+        options = self.options
+        return {
+            "records": [str(path) for path in options.records],
+            "unknowns": self.free.unknowns,
+            "fitted": f"{options.by}, seed {options.seed}",
+        }
+
+    def run(self, executor: Executor) -> Answer:
+        """Align the recordings at the start of the search, and fit the unknowns."""
+        loads = [
+            recorded_load(test, executor, partial(load_of, test.case, self.machine.parameters))
+            for test in self.tests
+        ]
+        experiment = records_here(self.machine, executor)
+        model = record_model(experiment, self.free, self.tests, loads, self.options.by)
+        title = f"Machine {self.machine.parameters.name} calibrated to records"
+        return fitted_answer(executor, model, self.options.seed, (title, "calibrated"))
+
+
+def fitted_answer(
+    executor: Executor, model: RecordModel, seed: int, words: tuple[str, str]
+) -> Answer:
+    """Fit a model to its recordings, and return the answer.
+
+    Args:
+        words: Title of the page, and name of the file of the machine with the values found.
+    """
+    with executor.fraction("search") as report:
+        fit, data = calibrated(model, seed, lambda fraction, least: report(fraction))
+    return records_answer(model, fit, data, *words)
+
+
+def records_here(machine: Machine, executor: Executor) -> Experiment:
+    """Return runs of a machine whose records are used at once."""
+    return Experiment(machine, (), record=partial(record_here, workers=executor.workers))
+
+
+def recorded_load(test: CompareTask, executor: Executor, load_at: Any) -> RecordedLoad:
+    """Return the recordings of a test on the times of runs, without their ends.
+
+    Args:
+        load_at: Function of a machine with the load.
+    """
+    pairs = test.pairs(executor)
+    for pair in pairs:
+        check_signs(pair, test.sensors)
+    return RecordedLoad(test.case.name, load_at, tuple(map(without_edges, pairs)))
+
+
+def record_model(
+    experiment: Experiment,
+    free: FreeNumbers,
+    tests: Sequence[CompareTask],
+    loads: Sequence[RecordedLoad],
+    by: Any,
+) -> RecordModel:
+    """Return the model of the sensors of all loads.
+
+    Raises:
+        InputError: the records of the loads have other sensors.
+    """
+    names = list(tests[0].sensors)
+    for test in tests:
+        if list(test.sensors) != names:
+            raise input_error(
+                f"the records of load {test.case.name} have the sensors "
+                f"{', '.join(test.sensors)}, those of load {tests[0].case.name} {', '.join(names)}",
+                where="RECORD",
+            )
+    return RecordModel(experiment, free, tuple(loads), tests[0].sensors, tests[0].points, by)
+
+
+def _by_load(options: CalibrateOptions) -> dict[str | None, tuple[Path, ...]]:
+    """Return the records of each load: RECORD is one of the test, LOAD=RECORD of another load."""
+    files: dict[str | None, tuple[Path, ...]] = {}
+    for path in options.records:
+        load, separator, name = str(path).partition("=")
+        known = load if separator and not path.exists() else None
+        file = Path(name) if known else path
+        files[known or options.load] = (*files.get(known or options.load, ()), file)
+    return files
+
+
+def _free_numbers(options: CalibrateOptions, machine: Machine) -> FreeNumbers:
+    """Return the unknowns of `--unknown`, or those of a free file."""
+    if bool(options.unknown) == (options.free is not None):
+        raise input_error(
+            "records need either --unknown KEYS[=RANGE] or --free FILE", where="--unknown"
+        )
+    if options.free is None:
+        sought = sought_in(machine.parameters, options.unknown)
+        return SoughtNumbers(machine.parameters, sought, "calibrated")
+    free = load_free(existing_file(options.free, "--free"))
+    if free.spring_preload is not None or free.spring_elongation is not None:
+        raise input_error(
+            "spring_preload and spring_elongation are about targets; leave them out for records",
+            where=str(options.free),
+        )
+    try:
+        return FreeQuantities(parameter_map_of(machine, free))
+    except InputError as error:
+        raise located(error, options.free) from None

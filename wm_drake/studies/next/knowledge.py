@@ -1,0 +1,151 @@
+"""What is known of the numbers of a machine: a machine for each point of independent scores.
+
+The scores u are independent and standard normal; u = 0 is the machine in the middle of what is
+known. Truncated, skewed and correlated quantities follow from them (Gaussian copula), so the rest
+of the study knows one form only: a prior of zero mean and unit covariance.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from wm_drake.errors import InputError, input_error, problems_at
+from wm_drake.model.machine import Machine
+from wm_drake.parameters import MachineParameters, apply, located
+from wm_drake.parameters.csv_files import finite_numbers, read_csv, read_header
+from wm_drake.parameters.free import FreeFile, load_free
+from wm_drake.parameters.types import FloatArray
+from wm_drake.studies.calibrate.parameter_map import ParameterMap, parameter_map_of
+from wm_drake.studies.inputs import existing_file
+from wm_drake.studies.tolerance.distributions import Joint, normal
+from wm_drake.studies.tolerance.variables import UncertainMachine
+
+
+@dataclass(frozen=True)
+class Knowledge:
+    """Uncertain numbers of a machine.
+
+    Attributes:
+        machine: Built machine with the elements of all that `at` returns.
+        names: Names of the quantities, one for each score.
+        at: Function of scores (p,) with the machine there. It raises an InputError if the numbers
+            are no machine.
+        about: Where this knowledge comes from, in words.
+    """
+
+    machine: Machine
+    names: tuple[str, ...]
+    at: Callable[[FloatArray], MachineParameters]
+    about: str
+
+
+def of_tolerances(machine: Machine, uncertain: UncertainMachine, about: str) -> Knowledge:
+    """Return what a tolerance file says; its laundry is drawn at each run and not measured.
+
+    Args:
+        machine: Built machine with the parts of `uncertain`.
+
+    Raises:
+        InputError: nothing but laundry scatters.
+    """
+    kept = [k for k, variable in enumerate(uncertain.variables) if not variable.is_of_load]
+    if not kept:
+        raise input_error(
+            "only the laundry scatters, which no measurement makes sure; allowed is a file with "
+            "quantities of the machine, such as unmeasured",
+            where="--tolerances",
+        )
+    variations = [uncertain.variables[k].variation for k in kept]
+    factor = uncertain.joint.factor
+    if factor is not None:
+        correlation = factor @ factor.T
+        factor = np.asarray(np.linalg.cholesky(correlation[np.ix_(kept, kept)]))
+    joint = Joint(tuple(uncertain.joint.marginals[k] for k in kept), factor)
+
+    def at(scores: FloatArray) -> MachineParameters:
+        return apply(uncertain.parameters, variations, joint.values(scores[None])[0].tolist())
+
+    names = tuple(variation.name for variation in variations)
+    return Knowledge(machine, names, at, about)
+
+
+def of_free_file(machine: Machine, path: Path) -> Knowledge:
+    """Return what the priors of a free file say, each truncated at its bounds."""
+    parameters = _map(machine, path)
+    joint = Joint(
+        tuple(
+            normal(mean, deviation, low, high)
+            for mean, deviation, low, high in zip(
+                parameters.expected,
+                parameters.deviation,
+                parameters.lower,
+                parameters.upper,
+                strict=True,
+            )
+        )
+    )
+
+    def at(scores: FloatArray) -> MachineParameters:
+        return parameters.parameters_at(joint.values(scores[None])[0])
+
+    about = f"priors of {path.name}"
+    return Knowledge(machine, tuple(parameters.names), at, about)
+
+
+def of_calibration(
+    machine: Machine, parameters: ParameterMap, point: FloatArray, covariance: FloatArray
+) -> Knowledge:
+    """Return what a calibration says: a normal distribution about its best machine.
+
+    Args:
+        point: Values of the quantities. (p,) [SI]
+        covariance: Their covariance. (p, p) [SI]
+    """
+    deviation = np.sqrt(np.diag(covariance))
+    sizes, directions = np.linalg.eigh(covariance / np.outer(deviation, deviation))
+    # numbers from a file are rounded, so that an eigenvalue of 0 may be a little below
+    root = deviation[:, None] * directions * np.sqrt(np.maximum(sizes, 0.0))
+
+    def at(scores: FloatArray) -> MachineParameters:
+        moved = point + root @ scores
+        return parameters.parameters_at(np.clip(moved, parameters.lower, parameters.upper))
+
+    return Knowledge(machine, tuple(parameters.names), at, "posterior of a calibration")
+
+
+def of_calibration_folder(machine: Machine, free: Path, folder: Path) -> Knowledge:
+    """Return what the results of `wm-drake calibrate` in a folder say.
+
+    Args:
+        free: Free file of the calibration.
+
+    Raises:
+        InputError: the folder has no such results, or other quantities than the free file.
+    """
+    parameters = _map(machine, free)
+    estimates, of_pairs = (folder / f"{name}.csv" for name in ("estimates", "correlations"))
+    with problems_at("--calibrated"):
+        table = read_csv(estimates, read_header(existing_file(estimates, "")))
+        columns = {"unknown", "value", "deviation"}
+        if not columns <= set(table) or table["unknown"].tolist() != parameters.names:
+            raise input_error(
+                f"'{folder}' does not have the quantities of {free.name}; allowed is the folder of "
+                "a calibration with this free file"
+            )
+        numbers = finite_numbers(table[["value", "deviation"]], estimates)
+        pairs = read_csv(existing_file(of_pairs, ""), ["unknown", *parameters.names])
+        correlation = finite_numbers(pairs[parameters.names], of_pairs)
+    units = np.array([unknown.unit.from_si(1.0) for unknown in parameters.unknowns])
+    point, deviation = (column / units for column in numbers.T)
+    covariance = correlation * np.outer(deviation, deviation)
+    return of_calibration(machine, parameters, point, covariance)
+
+
+def _map(machine: Machine, path: Path) -> ParameterMap:
+    free: FreeFile = load_free(existing_file(path, "--free"))
+    try:
+        return parameter_map_of(machine, free)
+    except InputError as error:
+        raise located(error, path) from None

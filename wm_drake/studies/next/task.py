@@ -1,0 +1,198 @@
+"""Check the options of the study of what to measure next, and run it."""
+
+from collections.abc import Callable, Collection, Sequence
+from pathlib import Path
+from typing import Any
+
+from wm_drake.errors import InputError, input_error, problems_at
+from wm_drake.model.build import build_machine
+from wm_drake.model.machine import Machine
+from wm_drake.parameters import MachineParameters, SpinProfile, with_values
+from wm_drake.parameters.candidates import CANDIDATES, CandidateFile, load_candidates
+from wm_drake.parameters.machine import FrameOverride, Sensor
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.measures import MEASURES
+from wm_drake.simulation.measures.responses import (
+    GAP,
+    Response,
+    chosen_responses,
+    has_gap,
+    measures_of,
+)
+from wm_drake.studies.answer import Answer, Part
+from wm_drake.studies.executor import Executor
+from wm_drake.studies.experiment import Experiment
+from wm_drake.studies.inputs import problems_of_file, profile_of
+from wm_drake.studies.next.knowledge import (
+    Knowledge,
+    of_calibration_folder,
+    of_free_file,
+    of_tolerances,
+)
+from wm_drake.studies.next.measurements import CandidateMeasurement, measurements_of
+from wm_drake.studies.next.options import NextOptions
+from wm_drake.studies.next.page import BLOCK, next_answer, next_part
+from wm_drake.studies.next.question import Question
+from wm_drake.studies.next.study import model_of
+from wm_drake.studies.run import machine_text
+from wm_drake.studies.study import Task
+from wm_drake.studies.tolerance.options import ToleranceOptions
+from wm_drake.studies.tolerance.task import ToleranceTask
+
+FEW, BLOCK_BUDGET = 32, 2
+"""Drawn machines and measurements of the block for another page."""
+
+UNMEASURED = "unmeasured"
+"""Shipped tolerance file of what is known of any machine."""
+
+
+class NextTask(Task):
+    """The study with checked options."""
+
+    def __init__(self, options: NextOptions, machine: Machine) -> None:
+        """Read what is known and what could be measured."""
+        self.options = options
+        check_sources(options)
+        path = CANDIDATES.path(options.candidates)
+        self.file = load_candidates(options.candidates)
+        with problems_of_file(path):
+            extended = build_machine(with_candidates(machine.parameters, self.file))
+        self.profile = profile_of(extended.parameters, options.profile)
+        with problems_at("--for", ""):
+            self.answers = chosen_responses(extended.parameters, self.profile, options.answers)
+        self.cases = cases_of(machine.parameters, self.profile)
+        self.knowledge = knowledge_of(options, extended)
+        with problems_of_file(path):
+            self.measurements = measurements_of(self.knowledge.machine, self.file)
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """Return what determines the runs."""
+        return {
+            "machine": machine_text(self.knowledge.machine.parameters),
+            "known": self.knowledge.about,
+            "profile": self.profile,
+            "seed": str(self.options.seed),
+        }
+
+    def run(self, executor: Executor) -> Answer:
+        """Run the machines near the middle and those drawn, and rank the measurements."""
+        question = question_of(
+            executor, self.knowledge, self.measurements, self.answers, self.cases
+        )
+        model = model_of(question, self.options.samples, self.options.seed)
+        return next_answer(model, self.options.budget, self.file.about)
+
+
+def next_block(
+    executor: Executor,
+    knowledge: Callable[[], Knowledge],
+    command: str,
+    profile: SpinProfile,
+    measured: Collection[tuple[str, bool]] = (),
+) -> Part:
+    """Return the block on what to measure next for the page of another study.
+
+    It has few samples, runs with the gasket only, and the usual candidates.
+
+    Args:
+        knowledge: Function that returns what is known of the machine.
+        command: Command of the whole study.
+        profile: Spin profile of all runs.
+        measured: Load and gasket of runs that are measured already.
+    """
+    try:
+        known = knowledge()
+        parameters = known.machine.parameters
+        usual = measurements_of(known.machine, load_candidates())
+        left = tuple(m for m in usual if m.run is None or (m.run[1] and m.run not in measured))
+        names = (GAP,) if has_gap(parameters) else ("amplitude",)
+        cases = cases_of(parameters, profile)
+        answers = chosen_responses(parameters, profile, names)
+        question = question_of(executor, known, left, answers, cases)
+        return next_part(model_of(question, FEW, 0), BLOCK_BUDGET, command)
+    except InputError as error:
+        return Part(BLOCK, text=f"Not computed: {error.problems[0]}. Try {command}.")
+
+
+def with_candidates(parameters: MachineParameters, file: CandidateFile) -> MachineParameters:
+    """Return a machine with the loads and the sensors of a file of candidates."""
+    changes: dict[str, Any] = {f"loads.{name}": load for name, load in file.loads.items()}
+    for name, sensor in file.sensors.items():
+        frame = f"sensor_{name}"
+        changes[f"frames.{frame}"] = FrameOverride(position=sensor.position, attached_to="tub")
+        changes[f"sensors.{name}"] = Sensor(frame=frame, axis=sensor.axis)
+    for key in changes:
+        group, name = key.split(".")
+        if name in getattr(parameters, group):
+            raise input_error("is in the machine already; choose another name", key=key)
+    bare = parameters.model_copy(update={"measured": ()}) if file.sensors else parameters
+    return with_values(bare, changes) if changes else parameters
+
+
+def check_sources(options: NextOptions) -> None:
+    """Check that the options say in one way what is known.
+
+    Raises:
+        InputError: they contradict each other, or one is missing.
+    """
+    if options.free is not None and options.tolerances is not None:
+        raise input_error("is given beside --free; allowed is one of them", where="--tolerances")
+    if options.calibrated is not None and options.free is None:
+        message = "needs the free file of the calibration; add --free FILE"
+        raise input_error(message, where="--calibrated")
+
+
+def knowledge_of(options: NextOptions, machine: Machine) -> Knowledge:
+    """Return what the options say is known."""
+    if options.free is None:
+        return tolerances_of(options.tolerances or UNMEASURED, machine, options.profile)
+    if options.calibrated is None:
+        return of_free_file(machine, options.free)
+    return of_calibration_folder(machine, options.free, options.calibrated)
+
+
+def tolerances_of(file: str, machine: Machine, profile: Path | None) -> Knowledge:
+    """Return what a tolerance file says of a machine."""
+    few = ToleranceOptions(file=file, samples=16, sensitivity=0, subset=0, profile=profile)
+    task = ToleranceTask(few, machine)
+    return of_tolerances(task.machine, task.uncertain, f"tolerances {file}")
+
+
+def cases_of(parameters: MachineParameters, profile: SpinProfile) -> tuple[Case, ...]:
+    """Return a case of each load of a machine."""
+    return tuple(Case(name, load, profile) for name, load in parameters.loads.items())
+
+
+def question_of(
+    executor: Executor,
+    knowledge: Knowledge,
+    measurements: tuple[CandidateMeasurement, ...],
+    answers: tuple[Response, ...],
+    cases: Sequence[Case],
+) -> Question:
+    """Return the question with the runs that it needs.
+
+    Args:
+        cases: Case of each load of the answers; their profile is that of all runs.
+    """
+    parameters = knowledge.machine.parameters
+    needed = {*measures_of(parameters, answers), "amplitudes"}
+    measures = tuple(name for name in MEASURES if name in needed)
+    loads = tuple(case.name for case in cases)
+    runs = dict.fromkeys([*((load, True) for load in loads), *(m.run for m in measurements)])
+    experiments = {
+        gasket: Experiment(
+            knowledge.machine,
+            measures,
+            executor.simulate,
+            tuple(
+                Case(run[0], parameters.loads[run[0]], cases[0].profile, gasket)
+                for run in runs
+                if run is not None and run[1] is gasket
+            ),
+        )
+        for gasket in (True, False)
+        if any(run is not None and run[1] is gasket for run in runs)
+    }
+    return Question(knowledge, measurements, answers, loads, experiments)
