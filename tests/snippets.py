@@ -61,9 +61,11 @@ BLOCKS = [block for path in PAGES for block in blocks_of(path)]
 FILES = {  # what a block with a file is called in the commands of its page
     "README.md": ["mine.yaml"],
     "docs/how-to/accelerometers.md": ["test.yaml"],
+    "docs/how-to/balancers.md": ["my_liquid.yaml"],
     "docs/how-to/bench-to-machine.md": ["mine.yaml"],
     "docs/how-to/calibrate.md": ["free.yaml", "responses.csv", "relation.yaml"],
     "docs/how-to/compliant-bearing.md": ["whirling.yaml", "loose.yaml"],
+    "docs/how-to/cycle.md": ["towels.yaml"],
     "docs/how-to/designs.md": ["mine.yaml"],
     "docs/how-to/drive.md": ["drive.yaml"],
     "docs/how-to/floor.md": ["on_my_floor.yaml", "on_soft_feet.yaml"],
@@ -78,6 +80,7 @@ FILES = {  # what a block with a file is called in the commands of its page
     "docs/how-to/rubber.md": ["rubber.yaml"],
     "docs/how-to/tolerances.md": ["mine.yaml", "limits.yaml"],
     "docs/theory/ball-ring.md": ["balls.yaml"],
+    "docs/theory/liquid-ring.md": ["liquid.yaml"],
 }
 """Names of the YAML and CSV blocks of each page."""
 

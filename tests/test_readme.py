@@ -173,6 +173,7 @@ MACHINES = [  # page, index of the block, a number in it by key path
     (page("own-machine"), 3, "elements.left_buffer.loss", 0.4),
     (page("compliant-bearing"), 0, "imperfections.bearing.y", None),
     (page("compliant-bearing"), 1, "imperfections.bearing.clearance", 1e-4),
+    (page("cycle"), 0, "loads.towels.unbalances.0.water.time_constant", 25.0),
     (page("drive"), 0, "drive.belt_ratio", 12.0),
     (page("extend"), 0, "elements.slow.coefficient", 400.0),
     (page("floor"), 0, "cabinet.friction", 0.5),

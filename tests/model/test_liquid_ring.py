@@ -262,7 +262,7 @@ def response(machine, speed, moment, **changes):
     """Return displacement of To [m] and first moment of the liquid [kg m], complex, in D."""
     keys = {f"elements.ring.{name}": value for name, value in changes.items()}
     parameters = wm.with_values(machine.parameters, keys)
-    case = wm.Case("", unbalance(moment / 0.25), constant_speed(speed, 16.0), True, parameters)
+    case = wm.Case("", unbalance(moment / 0.25), constant_speed(speed, 45.0), True, parameters)
     record = wm.simulate(machine, case, step=1e-3)
     last = record.isel(time=slice(-200, None))
     turned = np.exp(-1j * last.drum_angle.values)
@@ -282,13 +282,16 @@ def dynamic_stiffness(speed, moment, mass):
     return STIFFNESS + 1j * speed * DAMPING - whole * speed**2
 
 
-@pytest.mark.parametrize("speed", [9.0, 20.0, 60.0])
+@pytest.mark.parametrize(("speed", "lag"), [(9.0, 1.0), (20.0, 1.0), (60.0, 0.1)])
 @pytest.mark.parametrize("fill", [0.3, 0.6])
-def test_a_partly_filled_ring_acts_as_a_full_disc(whirling, speed, fill):
-    """Compare with the classical result: the force on the wall is rho pi R^2 b W^2 e."""
+def test_a_partly_filled_ring_acts_as_a_full_disc(whirling, speed, lag, fill):
+    """Compare with the classical result: the force on the wall is rho pi R^2 b W^2 e.
+
+    The lag does not change a steady whirl. It is chosen so that free motions decay.
+    """
     ring = ring_of(fill=fill)
     disc = 1000.0 * 0.04 * np.pi * ring.outer_radius**2
-    place, liquid = response(whirling, speed, 0.05, fill=fill)
+    place, liquid = response(whirling, speed, 0.05, fill=fill, lag=lag)
     whole = expected(speed, 0.05, disc)
     assert abs(place - whole) < 2e-3 * abs(whole)
     assert abs(liquid - (disc - ring.mass) * whole) < 3e-3 * abs(liquid)

@@ -67,6 +67,10 @@ frames:
   more: {attached_to: tub, position: "(0, 0, 0) mm", angles: "(0, 0, 0) deg"}
 springs: {left: {preload: 90 N}}
 gasket: {rotational_stiffness_x: {angle: "(-3, 0, 3) deg", torque: "(-1, 0, 1) N m"}}
+loads:
+  towels:
+    unbalances:
+      - {mass: 1 kg, radius: 240 mm, y: 0 mm, water: {share: 0.6, speed: "(0, 400) rpm", left: "(1, 0.6)", time_constant: 20 s}}
 spring_types:
   free: {stiffness: 8 N/mm, free_length: 150 mm}
   table: {stiffness: {displacement: "(-20, 0, 20) mm", force: "(-160, 0, 160) N"}}

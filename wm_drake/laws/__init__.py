@@ -25,6 +25,7 @@ maxwell_rate, test in test_rubber. Own derivations: normal loads of four feet, m
 turning and tilting in `feet`, test in test_feet; a foot that slides and lifts in `foot_contact`,
 test in test_foot_contact; a shaft with play in its bearing in `clearance`, test in test_clearance.
 Contact with a rubber buffer (Hunt and Crossley 1975) in `stop`, test in tests/elements/test_stop.
+Water that leaves laundry in `water`, test in tests/elements/test_water.
 Rolling resistance of balls that may park (Dahl 1968, Coulomb) in `rolling`, test in test_rolling.
 Torque limit, speed controller and bearing friction of a drive in `motor`, test in test_motor.
 

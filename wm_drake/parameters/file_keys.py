@@ -142,7 +142,7 @@ def _form(field: FieldInfo, unit: Unit | None) -> tuple[str, str]:
         is_list = "tuple" in str(field.annotation)
         form = "number" if isinstance(unit, PureNumber) else f"number in {unit.shown}"
         if is_list:
-            form = f"list in {unit.shown}"
+            form = f"list in {unit.shown}" if unit.shown else "list of numbers"
         if any(True for _ in models_in(field.annotation)):
             form += ", or a table"
         limits = (f"{sign} {unit.text(end)}" for sign, end in declared_range(field).limits())

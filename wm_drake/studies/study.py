@@ -347,10 +347,9 @@ SHIPPED = (
 
 SI_ONLY = (
     *("spin", "verdict"),
-    *("study gasket-damping", "study gasket-geometry", "study response"),
-    *("rig bushing", "rig damper", "rig gasket"),
+    *("study gasket-damping", "study gasket-geometry"),
     *("study design", "study gasket", "study spin-cycle", "study spin-identify", "study tolerance"),
-    *("identify bushing", "identify damper", "identify gasket"),
+    *("identify bushing", "identify gasket"),
 )
 """Commands whose numbers do not all carry a quantity: their units cannot be chosen."""
 

@@ -9,6 +9,16 @@ from wm_drake.errors import InputError
 from wm_drake.parameters import Load, MachineParameters, SpinProfile, load_machine
 from wm_drake.simulation.balance import moments_of_load, rings_of
 from wm_drake.simulation.cases import Case
+from wm_drake.studies.balancer.candidates import (
+    BALLS,
+    LIQUID,
+    NONE,
+    RESPONSES,
+    WORDS,
+    candidate_proposal,
+    is_machine,
+    with_rings,
+)
 from wm_drake.studies.balancer.page import diverged
 from wm_drake.studies.balancer.rings import (
     capacities_of,
@@ -170,6 +180,53 @@ def test_a_release_is_judged_by_all_of_its_run():
     assert found.after_free.values == pytest.approx([3e-3, 2.5e-3])
 
 
+def candidate_runs(balls, liquid):
+    """Return responses of two loads without a balancer, with balls and with liquid. [mm]"""
+    values = 1e-3 * np.array([[[10.0, 4.0], [8.0, 3.0]], balls, liquid])
+    labels = {"candidate": [NONE, BALLS, LIQUID], "load": ["a", "b"], "response": list(RESPONSES)}
+    return xr.DataArray(values, labels)
+
+
+COMMANDS = {BALLS: "spin --machine balls", LIQUID: "spin --machine liquid"}
+WORSE_IN_RUN_UP = [[12.0, 0.1], [9.0, 0.1]]
+SOMEWHAT_BETTER = [[9.0, 3.0], [7.0, 2.0]]
+BETTER = [[9.5, 0.1], [8.0, 0.1]]
+ALIKE = [[10.01, 4.0], [8.0, 3.0]]
+
+
+@pytest.mark.parametrize(
+    ("balls", "liquid", "chosen"),
+    [
+        (WORSE_IN_RUN_UP, SOMEWHAT_BETTER, LIQUID),  # balls raise a response by a fifth
+        (BETTER, ALIKE, BALLS),
+        (WORSE_IN_RUN_UP, ALIKE, None),
+        ([[np.nan, np.nan], [9.0, 0.1]], SOMEWHAT_BETTER, LIQUID),  # a run failed
+    ],
+)
+def test_the_fitted_balancer_raises_no_response_by_more_than_a_tenth(balls, liquid, chosen):
+    proposal = candidate_proposal(candidate_runs(balls, liquid), COMMANDS)
+    assert bool(proposal.is_confirmed) == (chosen is not None)
+    assert proposal.line_to_copy.item() == COMMANDS.get(chosen, "")
+    assert proposal.value.values.tolist() == ([WORDS[chosen]] if chosen else [])
+    assert proposal.before.values.tolist() == pytest.approx([10e-3, 4e-3])
+
+
+def test_a_machine_gets_the_rings_that_it_does_not_have():
+    balls, liquid = load_machine("ball_rings"), load_machine("liquid_rings")
+    own = with_rings(balls, BALLS, liquid)
+    assert own == balls
+    other = with_rings(balls, LIQUID, liquid)
+    assert other.elements == liquid.elements
+    assert is_machine(other, liquid)
+    plain = with_rings(load_machine("reference"), LIQUID, liquid)
+    assert plain.elements == liquid.elements
+    assert plain.step == liquid.step < load_machine("reference").step
+    assert not is_machine(plain, liquid)  # other loads
+    both = wm.with_values(balls, {"elements": {**balls.elements, **liquid.elements}})
+    assert with_rings(both, BALLS, liquid).elements == balls.elements
+    assert not without_rings(both).elements
+
+
 @pytest.fixture(scope="module")
 def result():
     return wm.run_study("balancer", quick=True, quiet=True)
@@ -188,6 +245,20 @@ def test_balls_help_at_speed_and_hurt_in_the_run_up(result):
     assert release.after_free_mm < release.after_locked_mm
     assert release.level_free_mm < 0.1 * release.level_locked_mm
     assert result.failures() == ()
+
+
+def test_the_candidates_run_with_the_same_loads(result):
+    """Check that liquid lowers both amplitudes a little, and balls that at the highest speed most."""
+    tables = result.tables()
+    level, peak = (
+        tables["candidates"][[f"{name}_{one}_mm" for one in (NONE, BALLS, LIQUID)]].to_numpy().T
+        for name in ("level", "peak")
+    )
+    assert (level[1] < 0.1 * level[0]).all()
+    assert (level[1] < level[2]).all()
+    assert (level[2] < level[0]).all()
+    assert (peak[2] < 1.1 * peak[0]).all()
+    np.testing.assert_allclose(level[1], tables["loads"].level_free_mm)
 
 
 def test_more_damping_passes_and_less_damping_changes_the_run_up(result):
@@ -209,7 +280,8 @@ def test_a_run_that_diverged_is_a_failure(result):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"machine": "reference"}, "no element of kind ball_ring"),
+        ({"machine": "heavy_cabinet"}, "needs a rigid bearing and a fixed"),
+        ({"liquid": "none.yaml"}, "none.yaml"),
         ({"mass": "0 kg"}, "--mass: '0 kg' is not above 0"),
         ({"place": "1 kg"}, "--place"),
         ({"high": "50 rpm"}, "--to: is below 100 rpm"),

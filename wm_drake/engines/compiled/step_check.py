@@ -294,13 +294,18 @@ def free_states(setup: Setup, states: StateMap) -> tuple[list[int], list[str]]:
 def _states(setup: Setup, kinds: StateKinds) -> FloatArray:
     """Return the states to look at (WIDTH, size): the rest pose, with speeds of each size.
 
-    A drum with play in its bearing is pressed into the contact, which is the stiffest it meets.
+    A drum with play in its bearing is pressed into the contact, which is the stiffest it meets. If
+    something rolls or flows in the drum, the drum turns at its highest speed in every second one.
     """
     rest = initial_state(setup, _STANDSTILL)
     if setup.bearing:
         place = state_map(setup).indices(POSITION, kinds=[CARRIER])
         rest[place] += setup.bearing.into_contact(rest[place] - setup.rest_pose[3:])
     states, directions = np.tile(rest, (WIDTH, 1)), _directions(len(rest))
+    if any(e.kind.on_drum for e in setup.elements.others.values()):
+        highest = setup.parameters.profile.highest_speed
+        profile = SpinProfile(time=_STANDSTILL.time, speed=(highest, highest))
+        states[1::2] = initial_state(setup, profile)
     speeds, sponges = np.resize(SPEEDS, WIDTH), kinds.sponges.astype(int)
     states[:, kinds.velocities] += speeds[:, None] * directions[kinds.velocities]
     states[:, sponges] += DEFORMATION * directions[sponges]

@@ -69,9 +69,8 @@ def with_rings(
 
 
 def is_machine(parameters: MachineParameters, other: MachineParameters) -> bool:
-    """Return whether a machine is another one but for names, sources, step, loads and profile."""
-    same = ("name", "about", "sources", "step", "loads", "profile", "measured")
-    taken = {name: getattr(other, name) for name in same if hasattr(other, name)}
+    """Return whether a machine is another one but for its name, sources and step."""
+    taken = {name: getattr(other, name) for name in ("name", "about", "sources", "step")}
     return parameters.model_copy(update=taken) == other
 
 
@@ -105,7 +104,8 @@ def candidate_proposal(runs: xr.DataArray, commands: Mapping[str, str]) -> xr.Da
     number = aim.proposed(worst[[names.index(name) for name in others]], [1] * len(others))
     shown = {NONE: BEFORE} if number is None else {NONE: BEFORE, others[number]: AFTER}
     chosen = runs.sel(candidate=list(shown)).rename(candidate="setting")
-    values = Quantity("").of_each("response", RESPONSES, chosen.dims, chosen.values)
+    dims = ("setting", "load", "response")
+    values = Quantity("").of_each("response", RESPONSES, dims, chosen.values)
     labels = {
         "setting": list(shown.values()),
         "load": runs["load"].values,

@@ -41,6 +41,7 @@ from wm_drake.studies.fitting.fit import Fit
 from wm_drake.studies.fitting.methods import identify
 from wm_drake.studies.fitting.problem import (
     SMOOTH,
+    Errors,
     FitProblem,
     Measurement,
     ModelValues,
@@ -177,7 +178,7 @@ class RecordModel:
                 if used.any():
                     values = block.measured[used, k] / block.deviation[used, k]
                     base = None if block.baseline is None else block.baseline[used]
-                    errors = "alike" if self.by == "rms" else "correlated"
+                    errors: Errors = "alike" if self.by == "rms" else "correlated"
                     tests.append(Measurement(f"{name}{sensor}", values, base, errors=errors))
         if not tests:
             raise input_error("no sensor has an amplitude to fit; the records are too short")

@@ -124,7 +124,7 @@ class CalibrateTask(Task):
 
         def known() -> Knowledge:
             covariance = best.fit.covariance
-            return of_calibration(self.machine, calibration.parameter_map, best.point, covariance)
+            return of_calibration(calibration.parameter_map, best.point, covariance)
 
         profile = self.machine.parameters.profile
         return next_block(executor, known, " ".join(words), profile, self.targets.loads)

@@ -44,7 +44,7 @@ SLIDING = Quantity("horizontal force on the floor", Unit("N", "N"), 0)
 
 
 @dataclass(frozen=True)
-class Measured:
+class WindowExtremes:
     """What is measured of a piece.
 
     Attributes:
@@ -155,12 +155,12 @@ def course_of(machine: Machine, case: Case, scene: Scene | None = None) -> xr.Da
     period = profile.sample_period(parameters.output_period)
     rows = max(2, round(max(profile.duration / WINDOWS, SHORTEST) / period))
     setup = machine.set_up(case.load, context=empty.context, gasket=case.gasket)
-    measured = Measured(setup, scene or Scene(parameters), rows)
+    extremes = WindowExtremes(setup, scene or Scene(parameters), rows)
     pieces = run_pieces(setup, profile, stepping, period, rows * WINDOWS_OF_PIECE)
     courses, diverged = list[xr.Dataset](), ""
     for piece in _ahead(pieces):
         if len(piece.time) >= rows:
-            courses.append(measured(piece))
+            courses.append(extremes(piece))
         diverged = piece.divergence.reason if piece.divergence else ""
     course = xr.concat(courses, "time", combine_attrs="override")
     how = {"integrator": stepping.integrator, "step": stepping.step, "period": period}

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from wm_drake.errors import InputError, input_error, problems_at
+from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters, apply, located
 from wm_drake.parameters.csv_files import finite_numbers, read_csv, read_header
@@ -91,11 +92,11 @@ def of_free_file(machine: Machine, path: Path) -> Knowledge:
         return parameters.parameters_at(joint.values(scores[None])[0])
 
     about = f"priors of {path.name}"
-    return Knowledge(machine, tuple(parameters.names), at, about)
+    return Knowledge(build_machine(parameters.base), tuple(parameters.names), at, about)
 
 
 def of_calibration(
-    machine: Machine, parameters: ParameterMap, point: FloatArray, covariance: FloatArray
+    parameters: ParameterMap, point: FloatArray, covariance: FloatArray
 ) -> Knowledge:
     """Return what a calibration says: a normal distribution about its best machine.
 
@@ -112,7 +113,8 @@ def of_calibration(
         moved = point + root @ scores
         return parameters.parameters_at(np.clip(moved, parameters.lower, parameters.upper))
 
-    return Knowledge(machine, tuple(parameters.names), at, "posterior of a calibration")
+    built = build_machine(parameters.base)
+    return Knowledge(built, tuple(parameters.names), at, "posterior of a calibration")
 
 
 def of_calibration_folder(machine: Machine, free: Path, folder: Path) -> Knowledge:
@@ -140,7 +142,7 @@ def of_calibration_folder(machine: Machine, free: Path, folder: Path) -> Knowled
     units = np.array([unknown.unit.from_si(1.0) for unknown in parameters.unknowns])
     point, deviation = (column / units for column in numbers.T)
     covariance = correlation * np.outer(deviation, deviation)
-    return of_calibration(machine, parameters, point, covariance)
+    return of_calibration(parameters, point, covariance)
 
 
 def _map(machine: Machine, path: Path) -> ParameterMap:
