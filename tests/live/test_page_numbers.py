@@ -51,7 +51,7 @@ def runs_of(machine, cases):
 
 
 def check_equal(page, run, twin):
-    """Check a run of the page against one of the engine, and its twin."""
+    """Check a run of the page against one of the engine; return whether its twin stays near."""
     expected, other = (one.record.displacement.values for one in (run, twin))
     assert page.moved.shape == expected.shape
     largest = np.abs(expected).max(axis=0)
@@ -67,6 +67,7 @@ def check_equal(page, run, twin):
     if run.gap is not None:
         wide = 2.0 * abs(twin.gap.distance - run.gap.distance)
         assert abs(page.gap - run.gap.distance) <= GAP + wide
+    return bool(is_near.all())
 
 
 def check_feet(data, page, record):
@@ -111,8 +112,7 @@ def test_each_load_runs_as_with_spin(opened, name):
     cases = [wm.case_of(parameters, load) for load in parameters.loads]
     for case, (run, twin) in zip(cases, runs_of(machine.machine, cases), strict=True):
         found = page.run(case.name)
-        check_equal(found, run, twin)
-        if parameters.cabinet:
+        if check_equal(found, run, twin) and parameters.cabinet:
             check_feet(page.data, found, run.record)
 
 
