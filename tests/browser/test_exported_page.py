@@ -42,8 +42,13 @@ const text = (numbers) => {
 """
 
 
-@pytest.mark.parametrize("name", sorted(shipped_machines()))
-@pytest.mark.slow
+MACHINES = [
+    pytest.param(name, marks=pytest.mark.slow if name == "reference" else pytest.mark.hours)
+    for name in sorted(shipped_machines())
+]
+
+
+@pytest.mark.parametrize("name", MACHINES)
 def test_a_browser_computes_the_bits_that_node_computes(browser, tmp_path, name):
     # so that tests of the numbers need no browser: tests/live/test_page_numbers.py
     parameters, path = wm.load_machine(name), tmp_path / "machine.html"

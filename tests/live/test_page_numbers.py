@@ -23,6 +23,11 @@ from wm_drake.simulation.measures.record import foot_loads_of
 DISPLACEMENT, AMPLITUDE, GAP = 1e-6, 1e-3, 1e-4
 """Accuracies: of displacements before the filter, relative to the largest; of amplitudes, relative;
 of the gap [m]."""
+OTHER_STEP = 1e-4
+"""Accuracy of displacements if `spin` takes another step for a moved number than for the machine as
+exported, whose step the page keeps."""
+OF_OVERLAP = 0.01
+"""Accuracy of the depth of an overlap, relative: the page searches the direction of least depth."""
 DISTURBANCE, NEAR = 1e-14, 1e-9
 """Relative change of the unbalance of a twin, and how near its displacements then are."""
 
@@ -51,7 +56,7 @@ def runs_of(machine, cases):
 
 
 def check_equal(page, run, twin):
-    """Check a run of the page against one of the engine, and its twin."""
+    """Check a run of the page against one of the engine; return whether its twin stays near."""
     expected, other = (one.record.displacement.values for one in (run, twin))
     assert page.moved.shape == expected.shape
     largest = np.abs(expected).max(axis=0)
@@ -59,14 +64,18 @@ def check_equal(page, run, twin):
     end = len(is_near) if is_near.all() else int(is_near.argmin())
     apart = (np.abs(page.moved - expected)[:end] / largest).max()
     assert end > 0.02 * len(is_near)
-    assert apart <= DISPLACEMENT, f"{apart:.2g} in {end} of {len(is_near)} samples"
+    has_its_step = run.record.attrs["step_s"] == pytest.approx(page.step, rel=1e-9)
+    allowed = DISPLACEMENT if has_its_step else OTHER_STEP
+    assert apart <= allowed, f"{apart:.2g} in {end} of {len(is_near)} samples"
     sizes, sizes_of_twin = (one.values["amplitude"] for one in (run, twin))
     allowed = AMPLITUDE * sizes + 2.0 * np.abs(sizes_of_twin - sizes)
     assert (np.abs(page.sizes - sizes) <= allowed).all()
     assert (page.gap is None) == (run.gap is None)
     if run.gap is not None:
         wide = 2.0 * abs(twin.gap.distance - run.gap.distance)
-        assert abs(page.gap - run.gap.distance) <= GAP + wide
+        deep = OF_OVERLAP * max(0.0, -run.gap.distance)
+        assert abs(page.gap - run.gap.distance) <= GAP + wide + deep
+    return bool(is_near.all())
 
 
 def check_feet(data, page, record):
@@ -111,8 +120,7 @@ def test_each_load_runs_as_with_spin(opened, name):
     cases = [wm.case_of(parameters, load) for load in parameters.loads]
     for case, (run, twin) in zip(cases, runs_of(machine.machine, cases), strict=True):
         found = page.run(case.name)
-        check_equal(found, run, twin)
-        if parameters.cabinet:
+        if check_equal(found, run, twin) and parameters.cabinet:
             check_feet(page.data, found, run.record)
 
 
