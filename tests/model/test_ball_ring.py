@@ -199,6 +199,7 @@ def at_constant_speed(rig, rpm, moment, duration=8.0, step=1e-4, **changes):
     return wm.simulate(rig, wm.Case("", load, profile, True, parameters), step=step)
 
 
+@pytest.mark.slow
 def test_balls_park_while_the_axis_is_near_the_centre_of_rotation(rig):
     """Balls roll only where the axis is more than mu R from the centre, here 86 um."""
     moment, half = 20e-6, np.arccos(20e-6 / (2.0 * 0.44e-3 * 42.8e-3))
@@ -217,6 +218,7 @@ def test_balls_park_while_the_axis_is_near_the_centre_of_rotation(rig):
     assert radius[0] < 0.2 * radius[1] < 0.2 * 2e-3 * RIG_RING["race_radius"]
 
 
+@pytest.mark.slow
 def test_the_centre_of_an_eccentric_race_becomes_the_centre_of_rotation(rig):
     """Balls take the places at which the axis is as far from the centre as the race, opposite."""
     record = at_constant_speed(rig, 4500.0, 15e-6, 8.0, eccentricity=10e-6, eccentricity_phase=0.7)

@@ -111,6 +111,7 @@ def moved(rng, spin=30.0):
     return np.array([*place, *velocity, rng.uniform(0.5, 1.5) * spin])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["reference", "motor"])
 def test_both_engines_agree_at_random_states(name):
     """Compare the accelerations of tub and drum, prescribed or turned by a motor, and the liquid."""
@@ -229,6 +230,7 @@ def settled(ring, speed, duration):
     return solve_ivp(rates, (0.0, duration), start, method="LSODA", rtol=1e-8, atol=1e-10).y[:, -1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("lag", "duration"), [(0.02, 60.0), (0.2, 15.0)])
 def test_liquid_hangs_below_the_axis_and_lags_as_the_closed_form_says(lag, duration):
     """At rest in W: m g = (k - i W c) q with k = m W^2 R^2/r_s^2, q complex, turned with the drum."""
@@ -242,6 +244,7 @@ def test_liquid_hangs_below_the_axis_and_lags_as_the_closed_form_says(lag, durat
     assert state[6] == pytest.approx(speed, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_below_the_speed_at_which_the_ring_closes_there_is_a_pool():
     ring = ring_of(lag=0.02)
     assert ring.closes_from == pytest.approx(np.sqrt(9.81 * (0.25 + ring.surface_radius)) / 0.25)
@@ -282,6 +285,7 @@ def dynamic_stiffness(speed, moment, mass):
     return STIFFNESS + 1j * speed * DAMPING - whole * speed**2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("speed", "lag"), [(9.0, 1.0), (20.0, 1.0), (60.0, 0.1)])
 @pytest.mark.parametrize("fill", [0.3, 0.6])
 def test_a_partly_filled_ring_acts_as_a_full_disc(whirling, speed, lag, fill):
@@ -298,6 +302,7 @@ def test_a_partly_filled_ring_acts_as_a_full_disc(whirling, speed, lag, fill):
     assert (liquid.real < 0.0) == (speed > np.sqrt(STIFFNESS / (MASS + 0.2 + disc)))
 
 
+@pytest.mark.slow
 def test_a_full_ring_is_plain_mass(whirling):
     place, liquid = response(whirling, 30.0, 0.05, fill=1.0)
     mass = ring_of(fill=1.0).mass
@@ -306,6 +311,7 @@ def test_a_full_ring_is_plain_mass(whirling):
     assert abs(liquid) < 0.01 * abs(mass * place)
 
 
+@pytest.mark.slow
 def test_a_saturated_ring_gives_no_more_than_its_capacity(whirling):
     """Whirl by 60 mm: the liquid is where the geometry says, and not where a straight line does."""
     ring, speed, moment = ring_of(), 14.0, 1.0

@@ -13,8 +13,9 @@ def rolling_resistance(normal_force, velocity, bristle, coefficient, full_veloci
     smaller force than mu N parks it. A ball that rolls fast, |v| >> v_t, meets -mu N sgn(v). With N
     constant the element gives back at most what the bristle stores, mu N x_c z^2 / 2.
 
-    That balls park, and that what they leave grows with their rolling resistance, is shown by Chao,
-    Sung and Leu (2004) for optical disk drives and by Ishida, Matsuura and Zhang (2012).
+    That rolling friction stops balls beside their places is stated for balancers of optical disk
+    drives (abstract, ASME TRIB2004, p. 795) and in Efficiency Improvement of an Automatic Ball
+    Balancer, Journal of Vibration and Acoustics 134 (2012) 021012 (abstract).
 
     Args:
         normal_force: N, >= 0. [N]
