@@ -39,6 +39,8 @@ CASES = {
     "Fig. 20": (6.67, 1.0),
 }
 """Frequency [Hz] and amplitude [mm] of each case of sections 4.2 and 4.3; misprint C4."""
+TO_MIDDLE, TO_REVERSAL = (1, 3), (0, 2)
+"""Quarters of a loop from a reversal to the middle, CD and AB, and the others, BC and DA."""
 RIG = "`wm-drake rig damper --component mstv_damper --matrix C`"
 SCRIPT = "this script"
 
@@ -102,26 +104,28 @@ class Runs:
         return np.asarray(np.gradient(states, step, axis=1) * omega[:, None])
 
 
+PICTURES = "pictures", "no numbers are printed", NOT_COMPARABLE, ""
+"""Cells of a statement that is printed as a picture."""
+
+
 def test_lines(runs: Runs) -> list[list[str]]:
     """Return lines for sections 2 and 4.1: tests, loops, friction."""
-    shown = runs.loops[10.0, 1.0]
-    rising = shown.force[1080:]  # from A, the lowest point, to B, the middle
-    energy = {
-        f: [measures_of(x).energy_per_cycle for x in runs.over_amplitude(f)]
-        for f in (1.0, 3.0, 6.67, 10.0)
-    }
-    stiffness = [measures_of(x).dynamic_stiffness for x in runs.over_frequency(1.0)]
-    peaks = [measures_of(x).peak_force for x in runs.over_frequency(1.0)]
-    of_sponge = runs.sponge_rates(1.0)
-    rates = np.max(np.abs(of_sponge), axis=1)
-    slider = np.abs(shown.velocity - of_sponge[-1, :-1])
-    at_c = float(slider[360] / slider.max())
-    held = slider_friction_curves(damper_bench(runs.damper), (MM, 5 * MM, 25 * MM), np.array([MM]))
-    assert held is not None
-    friction = np.abs(held[:, 0])
-    first, last = shown.force[360], shown.force[1080]
     return [
         ["Table 1: tests", "18", str(len(runs.loops)), verdict(len(runs.loops) == 18), RIG],
+        *_loop_lines(runs),
+        *_trend_lines(runs),
+        ["Figs. 4 to 7: measured curves", *PICTURES],
+    ]
+
+
+def _loop_lines(runs: Runs) -> list[list[str]]:
+    """Return the lines of section 2.3 on one loop, of 10 Hz and 1 mm."""
+    shown = runs.loops[10.0, 1.0]
+    rising = shown.force[1080:]  # from A, the lowest point, to B, the middle
+    slider = np.abs(shown.velocity - runs.sponge_rates(1.0)[-1, :-1])
+    at_c = float(slider[360] / slider.max())
+    first, last = shown.force[360], shown.force[1080]
+    return [
         [
             "2.3, Fig. 4: the force rises from A to B",
             "rises",
@@ -143,124 +147,162 @@ def test_lines(runs: Runs) -> list[list[str]]:
             verdict(at_c < 0.02),
             SCRIPT,
         ],
-        [
-            "2.3, Fig. 6: a smaller amplitude makes a smaller loop (energy at 10 Hz)",
-            "smaller",
-            listed(energy[10.0], " mJ", 1e3),
-            verdict(all(np.all(np.diff(values) > 0.0) for values in energy.values())),
-            RIG,
-        ],
-        [
-            "2.3, Fig. 7: a higher frequency makes a stiffer loop (fundamental at 1 mm)",
-            "stiffer",
-            listed(stiffness, " N/mm", 1e-3),
-            verdict(np.all(np.diff(stiffness) > 0.0)),
-            RIG,
-        ],
-        [
-            "4.1, Fig. 7: forces fall with frequency (peak at 1 mm; misprints, C11)",
-            "fall",
-            listed(peaks, " N"),
-            verdict(np.all(np.diff(peaks) < 0.0)),
-            RIG,
-        ],
-        [
-            "4.1: the sponge is deformed faster at a higher frequency (1 mm)",
-            "faster",
-            listed(rates, " mm/s", 1e3),
-            verdict(np.all(np.diff(rates) > 0.0)),
-            SCRIPT,
-        ],
-        [
-            "4.1, Fig. 12: the faster the deformation, the smaller the friction (slider at 1 mm/s, "
-            "deformation at 1, 5, 25 mm/s)",
-            "smaller",
-            listed(friction, " N"),
-            verdict(np.all(np.diff(friction) < 0.0)),
-            RIG,
-        ],
-        ["Figs. 4 to 7: measured curves", "pictures", "no numbers are printed", NOT_COMPARABLE, ""],
     ]
 
 
-def case_lines(runs: Runs) -> tuple[list[list[str]], list[list[str]]]:
-    """Return lines for the seven cases, and for the sentences of sections 3.3 to 4.3."""
+def _trend_lines(runs: Runs) -> list[list[str]]:
+    """Return the lines of sections 2.3 and 4.1 on trends with amplitude and frequency."""
+    energy = [
+        np.array([measures_of(loop).energy_per_cycle for loop in runs.over_amplitude(f)])
+        for f in (1.0, 3.0, 6.67, 10.0)
+    ]
+    measured = [measures_of(loop) for loop in runs.over_frequency(1.0)]
+    held = slider_friction_curves(damper_bench(runs.damper), (MM, 5 * MM, 25 * MM), np.array([MM]))
+    assert held is not None
+    words = "the faster the deformation, the smaller the friction"
+    trends: list[tuple[str, str, FloatArray, str, float, str]] = [
+        (
+            "2.3, Fig. 7: a higher frequency makes a stiffer loop (fundamental at 1 mm)",
+            "stiffer",
+            np.array([of.dynamic_stiffness for of in measured]),
+            " N/mm",
+            1e-3,
+            RIG,
+        ),
+        (
+            "4.1, Fig. 7: forces fall with frequency (peak at 1 mm; misprints, C11)",
+            "fall",
+            np.array([of.peak_force for of in measured]),
+            " N",
+            1.0,
+            RIG,
+        ),
+        (
+            "4.1: the sponge is deformed faster at a higher frequency (1 mm)",
+            "faster",
+            np.max(np.abs(runs.sponge_rates(1.0)), axis=1),
+            " mm/s",
+            1e3,
+            SCRIPT,
+        ),
+        (
+            f"4.1, Fig. 12: {words} (slider at 1 mm/s, deformation at 1, 5, 25 mm/s)",
+            "smaller",
+            np.abs(held[:, 0]),
+            " N",
+            1.0,
+            RIG,
+        ),
+    ]
+    smaller = verdict(all(np.all(np.diff(values) > 0.0) for values in energy))
+    lines = [
+        [
+            "2.3, Fig. 6: a smaller amplitude makes a smaller loop (energy at 10 Hz)",
+            "smaller",
+            listed(energy[-1], " mJ", 1e3),
+            smaller,
+            RIG,
+        ]
+    ]
+    for statement, printed, values, unit, factor, command in trends:
+        falls = printed in ("fall", "smaller")
+        holds = np.all(np.diff(-values if falls else values) > 0.0)
+        lines.append([statement, printed, listed(values, unit, factor), verdict(holds), command])
+    return lines
+
+
+@dataclass(frozen=True)
+class Models:
+    """Loops of the other models in the cases of `CASES`, by test.
+
+    Attributes:
+        coulomb, stv: Coulomb and STV friction with the numbers of the damper.
+        fitted: Coulomb friction with k1 and c1 of Table 2.
+    """
+
+    coulomb: dict[tuple[float, float], ForceLoop]
+    stv: dict[tuple[float, float], ForceLoop]
+    fitted: dict[tuple[float, float], ForceLoop]
+
+
+def other_models() -> Models:
+    """Return the loops of the other models."""
     tests = list(CASES.values())
     printed = {(row.frequency_hz, row.amplitude_mm): row for row in printed_table().itertuples()}
-    stv = dict(zip(tests, loops_of(with_stv(STV), tests), strict=True))
-    coulomb = dict(zip(tests, loops_of(with_stv(0.0), tests), strict=True))
-    of_table = {}
+    stv, coulomb = (
+        dict(zip(tests, loops_of(with_stv(velocity), tests), strict=True))
+        for velocity in (STV, 0.0)
+    )
+    fitted = {}
     for test in tests:
         row = printed[test]
         numbers = with_stv(0.0, sponge_stiffness=row.k1 * 1e3, sponge_damping=row.c1 * 1e3)
-        of_table[test] = loops_of(numbers, [test])[0]
-    cases, of_stv, of_fit, ratio = [], {}, {}, {}
+        fitted[test] = loops_of(numbers, [test])[0]
+    return Models(coulomb, stv, fitted)
+
+
+def case_lines(runs: Runs, models: Models) -> list[list[str]]:
+    """Return lines for the seven cases: deviations from the loops of [C]."""
+    cases = []
     for figure, test in CASES.items():
-        true = runs.loops[test]
-        of_stv[test], of_fit[test] = deviation(stv[test], true), deviation(of_table[test], true)
-        # quarters 1 and 3 lead from a reversal to the middle: CD and AB; 0 and 2 are BC and DA
-        near, far = deviation(stv[test], true, (1, 3)), deviation(stv[test], true, (0, 2))
-        ratio[test] = near / far
-        values = (deviation(coulomb[test], true), of_fit[test], of_stv[test], near, far)
+        true, stv = runs.loops[test], models.stv[test]
+        values = (
+            deviation(models.coulomb[test], true),
+            deviation(models.fitted[test], true),
+            deviation(stv, true),
+            deviation(stv, true, TO_MIDDLE),
+            deviation(stv, true, TO_REVERSAL),
+        )
         cases.append([f"{figure}: {test[0]:g} Hz, {test[1]:g} mm", *(f"{v:.3f}" for v in values)])
+    return cases
+
+
+def sentence_lines(runs: Runs, models: Models) -> list[list[str]]:
+    """Return lines for the sentences of sections 3.3 to 4.3."""
+    of_stv = {test: deviation(models.stv[test], runs.loops[test]) for test in models.stv}
+    worst = max(deviation(models.fitted[test], runs.loops[test]) for test in models.fitted)
+    near_coulomb = loops_of(with_stv(1e-3 * STV), list(models.coulomb))
+    limit = max(map(deviation, near_coulomb, models.coulomb.values()))
+    shown = models.stv[10.0, 1.0], runs.loops[10.0, 1.0]
+    ratio = deviation(*shown, TO_MIDDLE) / deviation(*shown, TO_REVERSAL)
     pairs = [(of_stv[f, 0.3], of_stv[f, 1.0]) for f in (3.0, 6.67, 10.0)]
-    limit = max(
-        deviation(a, b)
-        for a, b in zip(loops_of(with_stv(1e-3 * STV), tests), coulomb.values(), strict=True)
-    )
-    worst = max(of_fit.values())
-    sentences = [
-        [
+    rows = (
+        (
             "3.3: the fitted Coulomb model (Table 2) has an error of more than 10 % in some case",
             "not accurate",
             f"up to {worst:.2f}",
             verdict(worst > 0.1),
-            SCRIPT,
-        ],
-        [
+        ),
+        (
             "3.4: STV at a velocity of zero is Coulomb (0.0001 mm/s)",
             "the same",
             f"differs by {limit:.1e}",
             verdict(limit < 0.01),
-            SCRIPT,
-        ],
-        [
+        ),
+        (
             "4.2, Fig. 13: the error of STV lies in AB and CD (that there by that in BC and DA)",
             "above 1",
-            f"{ratio[10.0, 1.0]:.1f}",
-            verdict(ratio[10.0, 1.0] > 1.0),
-            SCRIPT,
-        ],
-        [
+            f"{ratio:.1f}",
+            verdict(ratio > 1.0),
+        ),
+        (
             "4.3, Figs. 15 to 18: STV has a larger error than MSTV (STV beside MSTV)",
             "larger than MSTV",
             listed([of_stv[f, 0.3] for f in (1.0, 3.0, 6.67, 10.0)], ""),
             NOT_COMPARABLE,
-            SCRIPT,
-        ],
-        [
+        ),
+        (
             "4.3: at 0.3 mm STV deviates more than at 1 mm (3, 6.67, 10 Hz; misprints, C5)",
             "more",
             "; ".join(f"{a:.2f} against {b:.2f}" for a, b in pairs),
             verdict(all(a > b for a, b in pairs)),
-            SCRIPT,
-        ],
-        [
-            "4.2, 4.3: MSTV agrees with the tests, less so in BC and DA",
-            "pictures",
-            "no numbers are printed",
-            NOT_COMPARABLE,
-            "",
-        ],
-        [
-            "Fig. 14: loops of MSTV are very similar to Fig. 7",
-            "pictures",
-            "no numbers are printed",
-            NOT_COMPARABLE,
-            "",
-        ],
+        ),
+    )
+    return [
+        *([*row, SCRIPT] for row in rows),
+        ["4.2, 4.3: MSTV agrees with the tests, less so in BC and DA", *PICTURES],
+        ["Fig. 14: loops of MSTV are very similar to Fig. 7", *PICTURES],
     ]
-    return cases, sentences
 
 
 def fit_lines(damper: DamperNumbers, quick: bool) -> list[list[str]]:
@@ -293,7 +335,8 @@ def main() -> None:
     parser.add_argument("--out", type=Path, help="also write the text to this file")
     arguments = parser.parse_args()
     runs = Runs(mstv_of_c())
-    cases, sentences = case_lines(runs)
+    models = other_models()
+    cases, sentences = case_lines(runs, models), sentence_lines(runs, models)
     heads = ["", "[C]", "ours", "verdict", "command"]
     text = page.origin("python analyses/write_paper_c.py --page docs/paper-c.md", [])
     text += page.table_text("Tests and friction: sections 2 and 4.1", heads, test_lines(runs))

@@ -19,21 +19,41 @@ LOOSE = {
     "contact_stiffness": "10 kN/mm",
     "contact_damping": "1 N s/mm",
 }
+SIZES = ("0.05 mm", "10 g", "2 deg"), ("0.15 mm", "20 g", "5 deg"), ("0.5 mm", "50 g", "10 deg")
+"""Small, middle and large size of the three causes. All are assumptions."""
+
+
+def whirl(size: str) -> dict[str, Any]:
+    """Return a radial clearance in the bearing."""
+    return {"bearing": BEARING | LOOSE | {"clearance": size}}
+
+
+def residual(size: str) -> dict[str, Any]:
+    """Return a residual imbalance of the drum."""
+    return {"residual_imbalance": {"mass": size, "radius": "240 mm", "y": "0 mm"}}
+
+
+def phase(size: str) -> dict[str, Any]:
+    """Return an error of the phase of the rear mass."""
+    return {"phase_error": size}
+
+
 CAUSES: dict[str, dict[str, Any]] = {
     "whirl: a compliant bearing without clearance": {"bearing": BEARING | STIFF},
+    **{f"whirl: radial clearance {size}": whirl(size) for size, _, _ in SIZES},
+    **{f"residual imbalance, {size}": residual(size) for _, size, _ in SIZES},
+    **{f"phase error, {size}": phase(size) for _, _, size in SIZES},
     **{
-        f"whirl: radial clearance {size}": {"bearing": BEARING | LOOSE | {"clearance": size}}
-        for size in ("0.05 mm", "0.15 mm", "0.5 mm")
+        f"all three: {', '.join(sizes)}": whirl(sizes[0]) | residual(sizes[1]) | phase(sizes[2])
+        for sizes in SIZES
     },
-    **{
-        f"residual imbalance, {size}": {
-            "residual_imbalance": {"mass": size, "radius": "240 mm", "y": "0 mm"}
-        }
-        for size in ("10 g", "20 g", "50 g")
-    },
-    **{f"phase error, {size}": {"phase_error": size} for size in ("2 deg", "5 deg", "10 deg")},
 }
-"""Causes of error that [A] names in section 4.2; all sizes are assumptions."""
+"""Causes of error that [A] names in section 4.2, alone and together."""
+
+
+def without_phase_error(imperfections: dict[str, Any]) -> dict[str, Any]:
+    """Return imperfections without the error of the phase, as at 0 degrees."""
+    return {name: value for name, value in imperfections.items() if name != "phase_error"}
 
 
 def with_cause(machine: MachineParameters, imperfections: dict[str, Any]) -> MachineParameters:

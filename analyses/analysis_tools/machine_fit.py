@@ -1,7 +1,9 @@
 """Least squares of a machine to all targets, and to the changes by the gasket of [B] Table 1."""
 
 import sys
-from dataclasses import replace
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +11,7 @@ import pandas as pd
 from calibrate_reference import PLAN, REFERENCE, adams_targets
 
 from analysis_tools.goals import changes_of, printed_changes
+from analysis_tools.steady_net import SteadyNet
 from wm_drake.batch.ledger import open_ledger
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import load_machine
@@ -25,34 +28,65 @@ CHANGE_DEVIATION = 0.06
 """Standard deviation of a change by the gasket, of the logarithm of its ratio."""
 
 
-def fitted_point(
-    machine: Machine, free: FreeFile, start: FloatArray, iterations: int, ledger_path: Path
-) -> FloatArray:
-    """Return the free quantities (quantity,) where least squares from a start end. [SI]
+def steady_end(steady: SteadyNet, start: FloatArray, iterations: int) -> FloatArray:
+    """Return the free quantities where least squares by the steady motion end. (quantity,) [SI]
 
     Args:
-        machine: A machine with the sensors and loads of the reference machine.
-        free: Its free quantities.
+        steady: Machines by their steady motion.
         start: Where the search starts. (quantity,) [SI]
         iterations: Limit of iterations.
-        ledger_path: File of the evaluations; a second call goes on from there.
     """
-    reference = load_machine(REFERENCE)
-    targets = adams_targets(reference)
-    parameter_map = parameter_map_of(machine, free)
-    identity = identity_of(machine, free, targets, PLAN)
-    with open_ledger(ledger_path, identity, resume=True) as ledger:
-        experiment = Experiment(machine, (), kept_in(ledger, workers=1))
-        values = Evaluation(experiment, parameter_map, targets)
-        problem = _with_changes(
-            calibration_problem(values, PLAN), values, printed_changes(reference, targets)
-        )
-        search = Search(problem, _report)
-        end = descended(search, problem.coordinates_of(start), iterations)
-        return problem.points_at(end.point)
+    search = Search(problem_of(steady))
+    end = descended(search, search.problem.coordinates_of(start), iterations)
+    return search.problem.points_at(end.point)
 
 
-def _with_changes(problem: FitProblem, values: Evaluation, printed: FloatArray) -> FitProblem:
+@dataclass(frozen=True)
+class FitByRuns:
+    """Least squares of a machine by runs; runs are kept in a ledger.
+
+    Attributes:
+        machine: A machine with the sensors and loads of the reference machine.
+        free: Its free quantities.
+        ledger_path: File of the runs; a second call goes on from there.
+    """
+
+    machine: Machine
+    free: FreeFile
+    ledger_path: Path
+
+    def costs(self, points: FloatArray) -> FloatArray:
+        """Return the misfit of each of some points (point, quantity). (point,)"""
+        with self._problem() as problem:
+            coordinates = np.array([problem.coordinates_of(point) for point in points])
+            return Search(problem).costs(coordinates)
+
+    def end(self, start: FloatArray, iterations: int) -> FloatArray:
+        """Return the free quantities where least squares from a start end; see `steady_end`."""
+        with self._problem() as problem:
+            search = Search(problem, _report)
+            end = descended(search, problem.coordinates_of(start), iterations)
+            return problem.points_at(end.point)
+
+    @contextmanager
+    def _problem(self) -> Iterator[FitProblem]:
+        targets = adams_targets(load_machine(REFERENCE))
+        identity = identity_of(self.machine, self.free, targets, PLAN)
+        with open_ledger(self.ledger_path, identity, resume=True) as ledger:
+            experiment = Experiment(self.machine, (), kept_in(ledger, workers=1))
+            parameter_map = parameter_map_of(self.machine, self.free)
+            yield problem_of(Evaluation(experiment, parameter_map, targets))
+
+
+def problem_of(values: Evaluation | SteadyNet) -> FitProblem:
+    """Return the problem of all targets and of the changes by the gasket of [B] Table 1."""
+    printed = printed_changes(load_machine(REFERENCE), values.targets)
+    return _with_changes(calibration_problem(values, PLAN), values, printed)
+
+
+def _with_changes(
+    problem: FitProblem, values: Evaluation | SteadyNet, printed: FloatArray
+) -> FitProblem:
     """Return a problem with the changes of [B] Table 1 as a further measurement."""
 
     def missed(amplitude: FloatArray) -> FloatArray:
@@ -83,3 +117,9 @@ def quantities_of(parameter_map: ParameterMap, point: FloatArray) -> pd.DataFram
     in_units = {name: m.in_units(column) for name, column in columns.items()}
     units = [unknown.unit.shown for unknown in m.unknowns]
     return pd.DataFrame({"quantity": m.names, **in_units, "unit": units})
+
+
+def point_of(parameter_map: ParameterMap, table: pd.DataFrame) -> FloatArray:
+    """Return the free quantities of a table of `quantities_of`. (quantity,) [SI]"""
+    sizes = [unknown.unit.from_si(1.0) for unknown in parameter_map.unknowns]
+    return np.asarray(table.set_index("quantity").value[parameter_map.names] / sizes)

@@ -39,8 +39,9 @@ class StudyRuns(ResponseRuns):
     Stiffness tables are replaced by the slopes of their first 20 %, as in [B] section 4.
     """
 
-    levels: ClassVar[Levels] = orthogonal_levels(len(load_factors(GASKET_FACTORS)), TRIALS)
-    """Levels (trial, factor)."""
+    factors: ClassVar[tuple[str, ...]] = tuple(load_factors(GASKET_FACTORS))
+    levels: ClassVar[Levels] = orthogonal_levels(len(factors), TRIALS)
+    """Names of the factors, and levels (trial, factor)."""
 
     def __init__(self, machine: Machine) -> None:
         """Build the machine with all factors at their middle level."""
@@ -62,7 +63,7 @@ class StudyRuns(ResponseRuns):
         mean = runs.mean(axis=1)
         if not target.factor:
             return np.asarray(mean)
-        levels = self.levels[:, list(load_factors(GASKET_FACTORS)).index(target.factor)]
+        levels = self.levels[:, self.factors.index(target.factor)]
         effects = [runs[:, levels == level].mean(axis=1) - mean for level in (-1, 0, 1)]
         if target.level is not None:
             return np.asarray(effects[target.level + 1])
