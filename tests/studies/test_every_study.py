@@ -21,6 +21,7 @@ REQUIRED = {"calibrate": KINDS["calibration"].commands[0][1:]}
 """Options of studies that cannot run without any."""
 SHORTER = {
     "gasket-damping": KINDS["gasket_damping"].commands,
+    "next": KINDS["next"].commands,
     "spin-identify": KINDS["spin_identify"].commands,
     "verdict": KINDS["verdict"].commands,
 }
@@ -35,7 +36,6 @@ SHORTER["tolerance"] = [(*KINDS["tolerance"].commands[0], "--samples", "32", "--
 SHORTER["gasket"] = [("study", "gasket", "--response", "D", "--profile", "short_cycle.yaml")]
 SHORTER["gasket-geometry"] = [("study", "gasket-geometry", "--profile", "short_cycle.yaml")]
 SHORTER["spin-cycle"] = [("study", "spin-cycle", "--profile", "eight_regions.yaml")]
-SHORTER["next"] = [KINDS["next"].commands[0]]
 SHORTER["balancer"] = [(
     "study", "balancer", "--place", "0 mm", "--damping", "100 %",
     "--release", "80 rpm", "--to", "110 rpm", "--rate", "80 rpm/s",

@@ -116,8 +116,8 @@ def _of_numbers(
         if any(value_at(machine.parameters, key) is None for key in keys):
             continue  # only the SDF has it: nothing about it is in doubt
         label = part.partition(".")[2] or part
-        full = f"{name}.{label}" if label else name
-        yield _measurement(full, candidate, label, deviation, _Numbers(tuple(keys)).numbers)
+        key_of_part = f"{name}.{label}" if label else name
+        yield _measurement(key_of_part, candidate, label, deviation, _Numbers(tuple(keys)).numbers)
 
 
 @dataclass(frozen=True)
