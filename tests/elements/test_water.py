@@ -56,6 +56,7 @@ def test_water_leaves_with_the_time_constant_and_does_not_come_back():
     assert draining_rate(0.5, 0.9, 20.0) == 0.0
 
 
+@pytest.mark.slow
 def test_masses_at_a_constant_speed_are_those_of_the_closed_form(machine):
     record = wm.simulate(machine, Case("towels", TOWELS, STEADY))
     time = record.time.values
@@ -89,6 +90,7 @@ def test_both_engines_move_alike(machine):
     check_alike(ours, drake, ("mass_left",), 1e-5)
 
 
+@pytest.mark.slow
 def test_eight_runs_side_by_side_are_single_runs(machine):
     cases = [
         Case(f"{mass:g} kg", TOWELS.with_masses(np.array([mass, 0.3, 0.5])), RAMP)
@@ -100,6 +102,7 @@ def test_eight_runs_side_by_side_are_single_runs(machine):
     check_runs_alone(machine, cases)
 
 
+@pytest.mark.slow
 def test_energy_leaves_with_the_water():
     """Book what the water takes: its kinetic energy at the speed of the mass, and its height."""
     step = 1.5625e-4
@@ -146,6 +149,7 @@ def test_other_drives_and_dampers_dry_too(name):
     assert left[-1].sum() < TOWELS.mass - 0.2
 
 
+@pytest.mark.slow
 def test_measure_is_the_mass_at_the_end_in_record_and_batch(machine):
     cases = [Case("towels", TOWELS, RAMP), Case("middle", machine.parameters.loads["middle"], RAMP)]
     table = wm.simulate_many(machine, cases, measures=["water"])
@@ -157,6 +161,7 @@ def test_measure_is_the_mass_at_the_end_in_record_and_batch(machine):
     assert float(alone[1]) == machine.parameters.loads["middle"].mass
 
 
+@pytest.mark.slow
 def test_numbers_of_the_water_can_vary(machine):
     key = "loads.towels.unbalances.0.water.time_constant"
     faster = wm.with_value(machine.parameters, key, 0.5)

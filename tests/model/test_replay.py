@@ -19,12 +19,13 @@ from wm_drake.model.replay import (
     Motion,
     _Frame,
     _parts,
+    _unbalances,
     coil,
     replay_page,
     ring,
 )
 from wm_drake.model.scene import Scene
-from wm_drake.parameters import load_machine
+from wm_drake.parameters import Load, load_machine
 
 
 class Recorder:
@@ -56,7 +57,8 @@ def drawn(scene):
     recorder = Recorder()
     drum = POSE @ RigidTransform(RollPitchYaw(0.0, np.pi / 2.0, 0.0), [0.0, 0.0, 0.0])
     frame = _Frame(0.5, POSE, drum)
-    for part in _parts(scene, parameters, parameters.loads["counter"], gasket=True):
+    load = parameters.loads["counter"]
+    for part in [*_parts(scene, parameters, gasket=True), *_unbalances(load, None)]:
         part.move(recorder, frame)
     return recorder
 
@@ -119,8 +121,19 @@ def test_unbalances_turn_with_the_drum(drawn):
 
 def test_gasket_that_is_taken_out_is_not_drawn(scene):
     parameters = load_machine("reference")
-    kinds = [part.kind for part in _parts(scene, parameters, None, gasket=False)]
+    kinds = [part.kind for part in _parts(scene, parameters, gasket=False)]
     assert kinds == ["spring"] * 3 + ["damper"] * 3
+
+
+def test_a_mass_that_dries_shrinks_and_loses_its_blue():
+    water = {"share": 0.6, "speed": (0.0, 60.0), "left": (1.0, 0.3), "time_constant": 20.0}
+    mass = {"mass": 1.0, "radius": 0.24, "y": 0.0}
+    load = Load.model_validate({"unbalances": [{**mass, "water": water}, mass]})
+    wet, dry = ([*_unbalances(load, np.array([left]))] for left in (1.0, 0.0))
+    assert (dry[0].radius / wet[0].radius) ** 3 == pytest.approx(0.4)
+    assert wet[0].colour.b() > 0.5 > dry[0].colour.b()
+    assert wet[1].colour == dry[1].colour == dry[0].colour
+    assert wet[1].radius == dry[1].radius == wet[0].radius
 
 
 def test_coil_and_ring_have_the_sizes_that_were_asked_for():

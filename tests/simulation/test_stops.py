@@ -49,6 +49,7 @@ def with_stop():
     return MachineParameters.model_validate(tree | {"elements": {"left": stop}})
 
 
+@pytest.mark.slow
 def test_record_and_batch_count_the_same_hits():
     machine = wm.build_machine(with_stop())
     profile = SpinProfile(time=(0.0, 1.0, 3.0), speed=(5.0, 18.0, 18.0))

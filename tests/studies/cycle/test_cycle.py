@@ -40,6 +40,7 @@ def case():
     return Case("wet laundry", load_load(WET_LAUNDRY), PROFILE)
 
 
+@pytest.mark.slow
 def test_pieces_are_the_whole_run(machine, case):
     setup = machine.set_up()
     stepping = choose_stepping(setup, *pack(setup), PROFILE, machine.parameters.step)
@@ -54,6 +55,7 @@ def test_pieces_are_the_whole_run(machine, case):
         np.testing.assert_array_equal(joined, getattr(whole, name), err_msg=name)
 
 
+@pytest.mark.slow
 def test_windows_have_the_extremes_of_the_record(machine, case):
     course = course_of(machine, case)
     record = wm.simulate(machine, case)
@@ -86,6 +88,7 @@ def test_unbalance_is_the_vector_sum(machine, case):
     np.testing.assert_allclose(unbalance_of(setup, masses), expected)
 
 
+@pytest.mark.slow
 def test_parts_are_those_of_the_profile(machine, case):
     course = course_of(machine, case)
     parts = parts_of(course, case)
@@ -107,6 +110,7 @@ def test_shipped_cycle_lasts_a_quarter_of_an_hour_and_ends_its_regions_in_order(
     assert water[0] == pytest.approx(0.55, abs=0.01)
 
 
+@pytest.mark.slow
 def test_command_writes_page_and_files(wm_drake, tmp_path):
     Path("short.yaml").write_text(
         "steps: [{ramp_to: 200 rpm, rate: 40 rpm/s}, {hold_until: 12 s}]\n", encoding="utf-8"

@@ -114,6 +114,28 @@ def test_curved_answer_is_judged_by_samples_that_keep_what_a_line_misses():
     assert model.remaining([0]) == pytest.approx(1.0 - explained, abs=0.05)
 
 
+class Bent(Question):
+    """A question with a bent answer, of which some machines cannot be measured."""
+
+    def at(self, scores, what):  # noqa: ARG002
+        u = np.asarray(scores)
+        answers = -(5.0 + u[:, :1] + 0.6 * (u[:, :1] ** 2 - 1.0))
+        numbers = np.where(np.abs(u[:, :1] - 0.5) < 0.1, np.nan, 3.0 + u[:, :1])
+        return Observed(answers, (numbers,) * len(self.measurements))
+
+
+def test_machines_that_cannot_be_measured_are_left_out_of_the_samples():
+    measurement = CandidateMeasurement("m", "m", 1.0, lambda numbers: np.array([0.01]), None)
+    question = Bent(SimpleNamespace(names=("a",)), (measurement,), (GAP,), ("x",), {True: None})
+    model = model_of(question, 512, 0)
+    assert not model.is_linear
+    assert 400 < len(model.drawn) < 512
+    assert len(model.drawn) == len(model.scores) == len(model.drawn_data[0])
+    u = model.scores[:, 0]  # what is left is the bend
+    bend = np.var(0.6 * u**2) / np.var(u + 0.6 * u**2)
+    assert model.remaining([0]) == pytest.approx(bend, rel=0.02)
+
+
 class Made(Question):
     """A question whose machines are functions of the scores."""
 

@@ -136,6 +136,12 @@ def of_calibration_folder(machine: Machine, free: Path, folder: Path) -> Knowled
                 f"'{folder}' does not have the quantities of {free.name}; allowed is the folder of "
                 "a calibration with this free file"
             )
+        labels = [unknown.unit.label for unknown in parameters.unknowns]
+        if "unit" in table and table["unit"].fillna("").tolist() != labels:
+            raise input_error(
+                f"the values in '{folder}' have other units than the free file; allowed are those "
+                "of a calibration with --units si"
+            )
         numbers = finite_numbers(table[["value", "deviation"]], estimates)
         pairs = read_csv(existing_file(of_pairs, ""), ["unknown", *parameters.names])
         correlation = finite_numbers(pairs[parameters.names], of_pairs)

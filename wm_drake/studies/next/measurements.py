@@ -110,8 +110,9 @@ def _of_numbers(
         part = ".".join(key.split(".")[:2]) if is_pattern else ""
         groups.setdefault(part, []).append(key)
     for part, keys in groups.items():
-        full = with_sdf_values(machine.plant, machine.parameters, keys)  # checks their names
-        deviation = _deviations_of_numbers(full, candidate.accuracy, keys)
+        # checks the names of the keys, too
+        parameters = with_sdf_values(machine.plant, machine.parameters, keys)
+        deviation = _deviations_of_numbers(parameters, candidate.accuracy, keys)
         if any(value_at(machine.parameters, key) is None for key in keys):
             continue  # only the SDF has it: nothing about it is in doubt
         label = part.partition(".")[2] or part

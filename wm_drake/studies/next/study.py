@@ -184,6 +184,10 @@ def _with_data(model: Model, near: Sequence[FloatArray], seed: int) -> Model:
     """
     question, rng = model.question, np.random.default_rng([seed, 1])
     drawn = None if model.is_linear else question.at(model.scores, "samples measured").numbers
+    if drawn is not None:  # some may not run without their gasket
+        kept = np.all([np.isfinite(numbers).any(axis=1) for numbers in drawn], axis=0)
+        drawn = tuple(numbers[kept] for numbers in drawn)
+        model = replace(model, drawn=model.drawn[kept], scores=model.scores[kept])
     chosen, slopes, data = list[CandidateMeasurement](), list[FloatArray](), list[FloatArray]()
     for number, (measurement, numbers) in enumerate(zip(question.measurements, near, strict=True)):
         deviation = measurement.deviations(numbers[0])

@@ -271,7 +271,7 @@ def masses_text(
         masses: Smallest and largest mass of the laundry. [kg]
     """
     of_load = {name: parameters.loads[name].mass for name in loads}
-    ends = f"{LAUNDRY.text(masses[0])} to {LAUNDRY.text(masses[1])}"
+    ends = f"{LAUNDRY.number(masses[0])} to {LAUNDRY.text(masses[1])}"
     heavier = [
         f"{load} ({LAUNDRY.text(mass)})" for load, mass in of_load.items() if mass > masses[1]
     ]
