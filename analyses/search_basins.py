@@ -50,7 +50,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--quick", action="store_true", help="one block of four machines, two runs")
+    parser.add_argument("--quick", action="store_true", help="four machines, two of them run")
     parser.add_argument("--machines", type=int, default=100_000, help="machines to draw")
     parser.add_argument("--runs", type=int, default=2_000, help="machines of the second stage")
     parser.add_argument("--minutes", type=float, default=60.0, help="time until it stops")
@@ -111,7 +111,7 @@ def _text(stages: TwoStages) -> str:
     rows = [_row(name, blocks, found[name]) for name in order[:SHOWN]]
     heads = ["machine", "law", "score", "first stage", "signs, Table 1", "signs of effects"]
     heads += ["Dz by K_Lx", "Dz by K_Lz"]
-    return "\n".join(lines) + page.table_text("The best by runs", heads, rows)
+    return "\n".join(lines) + "\n\n" + page.table_text("The best by runs", heads, rows)
 
 
 def _is_lateral(slopes: np.ndarray) -> np.ndarray:
