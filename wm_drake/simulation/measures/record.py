@@ -322,7 +322,10 @@ class RecordedRun(Run):
     def mass_left(self) -> FloatArray:
         if "mass_left" in self._values:
             return np.asarray(self._values["mass_left"].sum(axis=1))
-        return np.full(len(self.time), load_of_record(self.record).mass)
+        # a record that was made by hand may not say its load
+        is_known = "load_parameters" in self.record.attrs
+        mass = load_of_record(self.record).mass if is_known else np.nan
+        return np.full(len(self.time), mass)
 
 
 def wrenches_on_cabinet(record: Record) -> FloatArray:
