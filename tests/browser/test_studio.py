@@ -369,12 +369,15 @@ const drawn = () => new Promise((resolve) => {
 
 
 def test_picture_follows_the_slider_quickly(page):
-    """Measure from slider to picture: 0.1 s on idle cores, of which the server has about half."""
+    """Measure from slider to picture, with limits that a slow or busy computer keeps.
+
+    On idle cores it takes 0.1 s, of which the server has about half: docs/performance.md.
+    """
     settled(page)
     measured = page.driver.execute_async_script(MOVES, STIFFNESS, 20)
     times, processor = np.array(measured["times"]), np.array(measured["processor"])
     assert len(processor) == len(times) == 20
-    assert np.median(processor) < 0.1
+    assert np.median(processor) < 0.5
     assert np.median(times) < 1.0, times  # on a computer that has other work
     settled(page)
     assert page.errors() == []

@@ -92,10 +92,10 @@ def balancer_answer(
         words=WORDS,
     )
     parts = (
-        Part("Which balancer to fit", (each_candidate,)),
         Part("Over the drum speed", (curve_plot(base), LabelledTable("curve", curve))),
         Part("Unbalance and its place", (loads_plot(loads),)),
         Part("Mass of the balls and damping", (rings_plot(loads, rings, numbers),)),
+        Part("Which balancer to fit", (each_candidate,)),
         Part("Each load", (each,)),
         Part("Each ball mass and damping", (each_ring,)),
         Part("Release of locked balls", (release, LabelledTable("numbers", numbers))),
