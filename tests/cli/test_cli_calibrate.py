@@ -67,7 +67,7 @@ def test_planted_friction_comes_back_from_command_line_to_report(wm_drake):
     assert names == {
         "report.html", "machine_1.yaml", "estimates.csv", "solutions.csv", "correlations.csv", "amplitudes.csv", "differences.csv",
         "predictions.csv", "intervals_back.csv", "critical_speeds.csv", "gaps.csv", "searches.csv",
-        "ledger.sqlite", "run.json",
+        "next_steps.csv", "ledger.sqlite", "run.json",
     }  # fmt: skip
     written = load_machine(Path("out/machine_1.yaml"))
     assert written.damper_types["friction"].friction_force == pytest.approx(
