@@ -127,6 +127,7 @@ wm-drake verdict short.yaml --samples 16 --out verdict
 wm-drake export fmu --load middle --out machine.fmu
 wm-drake export page --load middle --out machine.html
 wm-drake study balancer --quick --place '0 mm' --damping '100 %' --release '80 rpm' --to '110 rpm' --rate '80 rpm/s' --out balancer
+wm-drake study cycle --profile short_cycle.yaml --out cycle
 wm-drake study design gasket --quick --profile short_cycle.yaml --out design
 wm-drake study drive --quick --load middle --out drive
 wm-drake study gasket --quick --response D --profile short_cycle.yaml --out gasket
