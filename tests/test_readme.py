@@ -17,6 +17,7 @@ from wm_drake.cli import app
 from wm_drake.errors import LIBRARIES
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import SpinProfile, load_component, load_machine, quantities
+from wm_drake.parameters.candidates import load_candidates
 from wm_drake.parameters.designs import load_design
 from wm_drake.parameters.free import FreeFile, load_free
 from wm_drake.parameters.gasket_drawing import load_gasket_drawing
@@ -171,6 +172,7 @@ MACHINES = [  # page, index of the block, a number in it by key path
     (page("own-machine"), 1, "spring_types.suspension.stiffness", None),
     (page("own-machine"), 2, "imperfections.residual_imbalance.mass", 0.02),
     (page("own-machine"), 3, "elements.left_buffer.loss", 0.4),
+    (page("balancers"), 0, "elements.front_ring.fill", 0.6),
     (page("compliant-bearing"), 0, "imperfections.bearing.y", None),
     (page("compliant-bearing"), 1, "imperfections.bearing.clearance", 1e-4),
     (page("cycle"), 0, "loads.towels.unbalances.0.water.time_constant", 25.0),
@@ -187,6 +189,7 @@ OTHERS = [
     (page("designs"), 0, load_design),
     (page("gasket-drawing"), 0, load_gasket_drawing),
     (page("gasket-drawing"), 1, load_gasket_drawing),
+    (page("measure-next"), 0, load_candidates),
     (page("tolerances"), 0, load_tolerances),
     (page("tolerances"), 1, load_limits),
 ]
