@@ -7,7 +7,7 @@ from typing import Any
 from wm_drake.errors import InputError, input_error, problems_at
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
-from wm_drake.parameters import MachineParameters, SpinProfile, with_values
+from wm_drake.parameters import MachineParameters, SpinProfile
 from wm_drake.parameters.candidates import CANDIDATES, CandidateFile, load_candidates
 from wm_drake.parameters.machine import FrameOverride, Sensor
 from wm_drake.simulation.cases import Case
@@ -116,18 +116,24 @@ def next_block(
 
 
 def with_candidates(parameters: MachineParameters, file: CandidateFile) -> MachineParameters:
-    """Return a machine with the loads and the sensors of a file of candidates."""
-    changes: dict[str, Any] = {f"loads.{name}": load for name, load in file.loads.items()}
+    """Return a machine with the loads and the sensors of a file of candidates.
+
+    Raises:
+        InputError: a name is in the machine already.
+    """
+    frames, sensors = {}, {}
     for name, sensor in file.sensors.items():
         frame = f"sensor_{name}"
-        changes[f"frames.{frame}"] = FrameOverride(position=sensor.position, attached_to="tub")
-        changes[f"sensors.{name}"] = Sensor(frame=frame, axis=sensor.axis)
-    for key in changes:
-        group, name = key.split(".")
-        if name in getattr(parameters, group):
+        frames[frame] = FrameOverride(position=sensor.position, attached_to="tub")
+        sensors[name] = Sensor(frame=frame, axis=sensor.axis)
+    added = {"loads": file.loads, "frames": frames, "sensors": sensors}
+    for group, parts in added.items():
+        for name in parts.keys() & getattr(parameters, group).keys():
+            key = f"{group}.{name}"
             raise input_error("is in the machine already; choose another name", key=key)
-    bare = parameters.model_copy(update={"measured": ()}) if file.sensors else parameters
-    return with_values(bare, changes) if changes else parameters
+    changes = {group: {**getattr(parameters, group), **parts} for group, parts in added.items()}
+    changes |= {"measured": ()} if sensors else {}  # no measured value of a sensor that is new
+    return parameters.model_copy(update=changes)
 
 
 def check_sources(options: NextOptions) -> None:
