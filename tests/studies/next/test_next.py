@@ -5,9 +5,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from wm_drake.errors import InputError
+from wm_drake.model.build import build_machine
+from wm_drake.parameters import load_machine
+from wm_drake.parameters.candidates import load_candidates
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.measures.responses import Response
-from wm_drake.studies.next.measurements import CandidateMeasurement
+from wm_drake.studies.next.measurements import CandidateMeasurement, measurements_of
 from wm_drake.studies.next.question import Observed, Question
 from wm_drake.studies.next.study import (
     Model,
@@ -17,6 +21,7 @@ from wm_drake.studies.next.study import (
     singles_of,
     steps_of,
 )
+from wm_drake.studies.next.task import with_candidates
 
 GAP = Response("gap", MEASURES["gap"].variables[0])
 
@@ -163,3 +168,28 @@ def test_model_of_made_up_machines_has_their_slopes():
     assert model.question.worst(model.middle[None])[0, 0] == pytest.approx(5.0)
     assert len(model.drawn) < 512
     assert model.is_linear
+
+
+OWN = """
+about: one load and one sensor of the laboratory
+loads:
+  test_mass: {unbalances: [{mass: 300 g, radius: 235 mm, y: -100 mm, phase: 0 deg}]}
+sensors:
+  top: {position: '(0, -150, 262) mm', axis: x}
+candidates:
+  small_run: {kind: run, load: test_mass, sensors: [top], accuracy: 5 %}
+"""
+
+
+def test_candidates_add_loads_and_sensors_to_the_machine(tmp_path):
+    path = tmp_path / "lab.yaml"
+    path.write_text(OWN)
+    file, reference = load_candidates(path), load_machine("reference")
+    machine = build_machine(with_candidates(reference, file))
+    assert machine.parameters.loads["test_mass"].mass == pytest.approx(0.3)
+    assert "top" in machine.parameters.sensors
+    (run,) = measurements_of(machine, file)
+    assert run.run == ("test_mass", True)
+    taken = file.model_copy(update={"loads": {"middle": file.loads["test_mass"]}})
+    with pytest.raises(InputError, match=r"loads\.middle: is in the machine already"):
+        with_candidates(reference, taken)

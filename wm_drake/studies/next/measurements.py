@@ -310,7 +310,8 @@ def _measurement(
     deviations: Callable[[FloatArray], FloatArray],
     numbers: Callable[[TriedMachines], FloatArray],
 ) -> CandidateMeasurement:
-    words = (candidate.words or f"{shape_name(name)} {{}}").replace("{}", shape_name(label))
+    given = candidate.words or shape_name(name).replace(".", " ")  # a name ends with the label
+    words = given.replace("{}", shape_name(label))
     cost = np.nan if candidate.cost is None else candidate.cost
     return CandidateMeasurement(
         name, f"{words.strip()} (±{candidate.accuracy})", cost, deviations, numbers
