@@ -126,12 +126,14 @@ def with_candidates(parameters: MachineParameters, file: CandidateFile) -> Machi
         frame = f"sensor_{name}"
         frames[frame] = FrameOverride(position=sensor.position, attached_to="tub")
         sensors[name] = Sensor(frame=frame, axis=sensor.axis)
-    added = {"loads": file.loads, "frames": frames, "sensors": sensors}
+    added: dict[str, dict[str, Any]] = {"loads": file.loads, "frames": frames, "sensors": sensors}
     for group, parts in added.items():
         for name in parts.keys() & getattr(parameters, group).keys():
             key = f"{group}.{name}"
             raise input_error("is in the machine already; choose another name", key=key)
-    changes = {group: {**getattr(parameters, group), **parts} for group, parts in added.items()}
+    changes: dict[str, Any] = {
+        group: {**getattr(parameters, group), **parts} for group, parts in added.items()
+    }
     changes |= {"measured": ()} if sensors else {}  # no measured value of a sensor that is new
     return parameters.model_copy(update=changes)
 
