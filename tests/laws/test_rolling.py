@@ -29,14 +29,14 @@ def test_it_is_odd_and_never_more_than_its_coefficient(z, v):
 
 @given(bristles, velocities)
 def test_it_gives_back_no_more_than_the_bristle_stores(z, v):
-    """With N constant: power of the force, and the rate of mu N x_c z^2 / 2."""
+    """Add the power of the force, at constant N, to the rate of mu N x_c z^2 / 2."""
     given_back = rolling_resistance(N, v, z, MU, V_T) * v
     stored = MU * N * X_C * z * rolling_bristle_rate(v, z, X_C, V_T)
     assert given_back + stored <= 1e-12
 
 
 def test_a_creeping_ball_is_a_dahl_element():
-    """After a slow way x from rest the resistance is mu N (1 - exp(-x/x_c))."""
+    """Roll a slow way x from rest: the resistance is mu N (1 - exp(-x/x_c))."""
     slow = 1e-3 * V_T
     ends = solve_ivp(
         lambda _, z: [rolling_bristle_rate(slow, z[0], X_C, V_T)],

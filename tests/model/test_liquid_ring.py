@@ -80,7 +80,7 @@ def test_offsets_are_linear_while_the_surface_is_free_and_then_saturate():
 
 
 def test_the_moment_of_inertia_falls_by_the_work_of_the_field():
-    """The liquid lies where d(mean square radius) = -2 e dq: it is at rest in the field."""
+    """Check d(mean square radius) = -2 e dq: the liquid is at rest in the field."""
     ring, whirl = ring_of(), np.array([0.03, 0.04])
     (q, square), (other_q, other_square) = (sampled(ring, e, 3000) for e in whirl)
     assert other_square - square == pytest.approx(-2.0 * whirl.mean() * (other_q - q), rel=0.03)

@@ -57,7 +57,7 @@ class Evaluation:
 
     @property
     def machine(self) -> Machine:
-        """The built machine."""
+        """Return the built machine."""
         return self.experiment.machine
 
     @cached_property

@@ -84,7 +84,7 @@ class FreeNumbers(Protocol):
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
-        """The unknowns."""
+        """Return the unknowns."""
 
     def parameters_at(self, point: FloatArray) -> MachineParameters:
         """Return the machine at a point. [SI]"""
@@ -119,7 +119,7 @@ class RecordModel:
 
     @cached_property
     def pairs(self) -> tuple[Pair, ...]:
-        """All recordings."""
+        """Return all recordings."""
         return tuple(pair for load in self.loads for pair in load.pairs)
 
     @cached_property
@@ -158,7 +158,7 @@ class RecordModel:
 
     @cached_property
     def blocks(self) -> tuple[Block, ...]:
-        """The data."""
+        """Return the data."""
         if self.by == "history":
             pairs = ((load, pair) for load in self.loads for pair in load.pairs)
             return tuple(history_block(load, pair, self.sensors) for load, pair in pairs)

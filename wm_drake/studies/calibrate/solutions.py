@@ -29,7 +29,7 @@ class FreeQuantities:
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
-        """The unknowns."""
+        """Return the unknowns."""
         return self.parameter_map.unknowns
 
     def parameters_at(self, point: FloatArray) -> MachineParameters:
@@ -93,12 +93,12 @@ class Solution:
 
     @property
     def point(self) -> FloatArray:
-        """Values of the free quantities (n). [SI]"""
+        """Return the values of the free quantities (n). [SI]"""
         return self.fit.values
 
     @property
     def cost(self) -> float:
-        """Cost that the search minimizes: the sum of data cost and prior cost."""
+        """Return the cost that the search minimizes: the sum of data cost and prior cost."""
         return self.data_cost + self.prior_cost
 
     @property

@@ -160,7 +160,7 @@ class Fit:
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
-        """The unknowns."""
+        """Return the unknowns."""
         return self.problem.unknowns
 
     def without_intervals(self, reason: str) -> "Fit":
@@ -175,12 +175,12 @@ class Fit:
 
     @property
     def values(self) -> FloatArray:
-        """Values where the search ended (p,). [SI]"""
+        """Return the values where the search ended (p,). [SI]"""
         return np.array([estimate.value for estimate in self.estimates])
 
     @property
     def remaining(self) -> FloatArray:
-        """Part of the prior deviation that remains of each unknown (p,); NaN without a prior."""
+        """Return the part of each prior deviation that remains (p,); NaN without a prior."""
         priors = [np.nan if u.prior is None else u.prior[1] for u in self.unknowns]
         return np.asarray(np.sqrt(np.diag(self.covariance)) / priors)
 

@@ -273,7 +273,7 @@ class FitProblem:
 
     @cached_property
     def has_prior(self) -> np.ndarray:
-        """Whether each unknown has a prior (p,)."""
+        """Return whether each unknown has a prior (p,)."""
         return np.array([u.prior is not None for u in self.unknowns], dtype=bool)
 
     @cached_property

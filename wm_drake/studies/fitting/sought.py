@@ -113,7 +113,7 @@ class SoughtNumbers:
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
-        """The unknowns."""
+        """Return the unknowns."""
         return tuple(one.unknown for one in self.sought)
 
     def parameters_at(self, point: FloatArray) -> MachineParameters:

@@ -86,14 +86,14 @@ class Model:
 
     @cached_property
     def explained(self) -> FloatArray:
-        """Part of the variance of each answer that the linear model explains. (answers,)"""
+        """Return the part of each answer's variance that the linear model explains. (answers,)"""
         linear = self.question.worst(self.middle + self.scores @ self.slopes.T)
         real = self.question.worst(self.drawn)
         return np.asarray(1.0 - np.var(real - linear, axis=0) / np.var(real, axis=0))
 
     @property
     def is_linear(self) -> bool:
-        """Whether the linear model is used."""
+        """Return whether the linear model is used."""
         return bool(np.all(self.explained >= NEAR_LINEAR))
 
     @cached_property
