@@ -16,7 +16,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from scipy.stats import beta
 
 from wm_drake.batch.ledger import open_ledger
 from wm_drake.model.build import build_machine
@@ -30,6 +29,7 @@ from wm_drake.studies.calibrate.parameter_map import ParameterMap, parameter_map
 from wm_drake.studies.calibrate.study import Calibration, SearchPlan, calibrate, identity_of
 from wm_drake.studies.calibrate.targets import Targets
 from wm_drake.studies.experiment import Experiment, kept_in
+from wm_drake.studies.tolerance.shares import share_of
 
 LOADS = tuple((name, True) for name in ("middle", "counter", "back", "front"))
 QUANTITIES = ("spring_stiffness", "damper_friction", "damper_lean", "gasket_radial")
@@ -64,10 +64,10 @@ def main() -> None:
         print(f"seed {seed}: {int(inside[-1].sum())} of {len(QUANTITIES)}", file=sys.stderr)
     lines = []
     for name, hits in zip(parameter_map.names, np.transpose(inside), strict=True):
-        low, high = _binomial(int(hits.sum()), len(hits))
+        share = share_of(hits)
         lines.append(
             f"{name}: {hits.sum()} of {len(hits)} intervals hold the planted value; probability "
-            f"{100 * low:.0f} to {100 * high:.0f} %"
+            f"{100 * share.lower:.0f} to {100 * share.upper:.0f} %"
         )
     share = 100.0 * np.mean(inside)
     lines.append(f"all: {np.sum(inside)} of {np.size(inside)}, {share:.0f} %")
@@ -108,13 +108,6 @@ def _calibrated(
         identity = identity_of(machine, free, targets, plan)
         with open_ledger(Path(folder) / "ledger.sqlite", identity) as ledger:
             return calibrate(Experiment(machine, (), kept_in(ledger)), free, targets, plan)
-
-
-def _binomial(hits: int, count: int) -> tuple[float, float]:
-    """Return the 95 % interval of a probability by Clopper and Pearson."""
-    low = 0.0 if hits == 0 else float(beta.ppf(0.025, hits, count - hits + 1))
-    high = 1.0 if hits == count else float(beta.ppf(0.975, hits + 1, count - hits))
-    return low, high
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from scipy.stats import beta, norm
+from scipy.stats import norm
 
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import load_machine
@@ -28,6 +28,7 @@ from wm_drake.studies.next.options import NextOptions
 from wm_drake.studies.next.question import Question
 from wm_drake.studies.next.study import Model, half_widths, model_of, singles_of
 from wm_drake.studies.next.task import NextTask, question_of
+from wm_drake.studies.tolerance.shares import share_of
 
 FIRST = 5
 """Number of measurements that are checked, the first ones of the ranking."""
@@ -67,12 +68,12 @@ def main() -> None:
         "|---|---|---|---|",
         f"| none | {1e3 * before:.2f} | | |",
     ]
-    held, total = 0, 0
+    held = list[bool]()
     for name in names:
         place = known.index(name)
         results = [_refitted(model, place, seed) for seed in range(seeds)]
         widths, hits = np.array(results).T
-        held, total = held + int(hits.sum()), total + seeds
+        held += (hits > 0.0).tolist()
         predicted = half_widths(model.after([place]))[0]
         words = model.question.measurements[place].words
         lines.append(
@@ -81,11 +82,11 @@ def main() -> None:
             f"{int(hits.sum())} of {seeds} |"
         )
         print(lines[-1], file=sys.stderr)
-    low, high = _binomial(held, total)
+    share = share_of(np.array(held))
     lines.append("")
     lines.append(
-        f"All: {held} of {total} intervals of 95 % hold the gap of the planted machine; "
-        f"probability {100 * low:.0f} to {100 * high:.0f} %."
+        f"All: {share.count} of {share.samples} intervals of 95 % hold the gap of the "
+        f"planted machine; probability {100 * share.lower:.0f} to {100 * share.upper:.0f} %."
     )
     text = "\n".join(lines)
     print(text)
@@ -140,13 +141,6 @@ def _part(question: Question, place: int) -> Question:
         cases = tuple(case for case in experiment.loads if case.name == load)
         experiments = {gasket: replace(experiment, measures=("amplitudes",), loads=cases)}
     return replace(question, measurements=(measurement,), answers=(), experiments=experiments)
-
-
-def _binomial(hits: int, count: int) -> tuple[float, float]:
-    """Return the 95 % interval of a probability by Clopper and Pearson."""
-    low = 0.0 if hits == 0 else float(beta.ppf(0.025, hits, count - hits + 1))
-    high = 1.0 if hits == count else float(beta.ppf(0.975, hits + 1, count - hits))
-    return low, high
 
 
 if __name__ == "__main__":

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import beta
 
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
@@ -30,6 +29,7 @@ from wm_drake.studies.compare.pairs import paired, predicted_signals
 from wm_drake.studies.compare.recordings import TestRecording
 from wm_drake.studies.experiment import Experiment, record_here
 from wm_drake.studies.fitting.sought import SoughtNumbers, sought_of
+from wm_drake.studies.tolerance.shares import share_of
 
 UNKNOWNS = ("damper_types.friction.friction_force", "loads.middle.unbalances.0.mass")
 SENSORS = ("S1_x", "S1_z", "S2_x", "S2_z", "S3_x", "S3_z")
@@ -58,11 +58,11 @@ def main() -> None:
     lines = []
     for name, row in zip(UNKNOWNS, np.moveaxis(rows, 1, 0), strict=True):
         hits, error, half = row[:, 0] > 0.0, row[:, 1], row[:, 2]
-        low, high = _binomial(int(hits.sum()), len(hits))
+        share = share_of(hits)
         lines.append(
             f"{name}: {hits.sum()} of {len(hits)} intervals hold the planted value; probability "
-            f"{100 * low:.0f} to {100 * high:.0f} %; median half-width {100 * np.median(half):.1f} "
-            f"%, median error {100 * np.median(np.abs(error)):.1f} %"
+            f"{100 * share.lower:.0f} to {100 * share.upper:.0f} %; median half-width "
+            f"{100 * np.median(half):.1f} %, median error {100 * np.median(np.abs(error)):.1f} %"
         )
     text = "\n".join(lines)
     print(text)
@@ -131,12 +131,6 @@ def _recordings(
         clock = Synchronous(Path("planted"), time[late:] - time[late], values)
         recordings.append(TestRecording(clock))
     return recordings
-
-
-def _binomial(hits: int, count: int) -> tuple[float, float]:
-    """Return the 95 % interval of Clopper and Pearson of a probability."""
-    low = float(beta.ppf(0.025, hits, count - hits + 1)) if hits else 0.0
-    return low, float(beta.ppf(0.975, hits + 1, count - hits)) if hits < count else 1.0
 
 
 if __name__ == "__main__":

@@ -40,10 +40,10 @@ FREQUENCY, LENGTH, ANGLE = Unit("Hz", "Hz"), Unit("m", "mm"), Unit("rad", "deg")
 
 @dataclass(frozen=True)
 class TriedMachines:
-    """TriedMachines, and runs of each.
+    """Machines that were tried, and the runs of each.
 
     Attributes:
-        machine: Built machine with their elements.
+        machine: Built machine whose elements all of them have.
         parameters: The machines.
         runs: Measures over `point` and `load`, with the gasket (True) and without.
     """

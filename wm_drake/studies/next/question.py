@@ -103,7 +103,7 @@ class Question:
 
 @dataclass(frozen=True, eq=False)
 class Observed:
-    """TriedMachines at points; NaN if there is no such machine, or a run failed.
+    """What machines at points give; NaN where there is no such machine, or a run failed.
 
     Attributes:
         answers: Each answer of each load, signed so that less is better. (k, answers loads) [SI]
