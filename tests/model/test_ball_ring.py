@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
+from drum_rings import check_both_engines, with_rings
 from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, InitializeAutoDiff
 from scipy.spatial.transform import Rotation
 
 import wm_drake as wm
 from wm_drake.elements.ball_ring import BALL_RING, DAMPING_RATIO, FULL_CONTACT, BallRing
 from wm_drake.elements.kind import DrumPlace
-from wm_drake.elements.state_map import ELEMENT
-from wm_drake.engines.compiled.derivative import StateDerivative
 from wm_drake.errors import InputError
 from wm_drake.parameters import Load, MachineParameters, SpinProfile, load_machine
 from wm_drake.systems.element_system import ElementSystem
@@ -42,12 +41,6 @@ PLACE = DrumPlace(
 )
 
 
-def with_rings(parameters=None, **rings):
-    """Return a machine with rings."""
-    tree = (parameters or load_machine("reference")).model_dump(exclude_unset=True)
-    return MachineParameters.model_validate(tree | {"elements": rings})
-
-
 def moved(balls, rng, ring=RING, place=PLACE):
     """Return states of a ring (7 n,) that is deflected, turns and has two balls in contact."""
     angles = np.sort(rng.uniform(0.0, 2.0 * np.pi, balls))
@@ -65,36 +58,11 @@ def moved(balls, rng, ring=RING, place=PLACE):
 def test_both_engines_agree_at_random_states(name):
     """Compare the accelerations of tub and drum, prescribed or turned by a motor, and all balls."""
     rings = {"front": RING, "rear": {**RING, "y": 0.15, "balls": 2}}
-    machine = wm.build_machine(with_rings(load_machine(name), **rings))
-    setup = machine.set_up("middle")
-    derivative, context = StateDerivative(setup), setup.context
-    rng, sizes = np.random.default_rng(3), [0.2] * 3 + [0.05] * 3 + [30.0] + [1.0] * 6 + [30.0]
     upright = DrumPlace(np.zeros(3), np.eye(3), np.zeros(3))
-    ball_states, state = (
-        derivative.layout.states.span(ELEMENT),
-        np.zeros(derivative.layout.states.size),
+    check_both_engines(
+        wm.build_machine(with_rings(load_machine(name), **rings)),
+        lambda rng: [moved(n, rng, place=upright) for n in (3, 2)],
     )
-    parts = [system.GetMyContextFromRoot(context) for system in machine.others.values()]
-    for _ in range(20):
-        state[:14] = np.array(sizes) * rng.uniform(-1.0, 1.0, 14)
-        balls = [moved(n, rng, place=upright) for n in (3, 2)]
-        state[ball_states] = np.concatenate(balls)
-        machine.plant.SetPositionsAndVelocities(setup.plant_context, state[:14])
-        for part, values in zip(parts, balls, strict=True):
-            part.SetContinuousState(values)
-        if name == "reference":
-            machine.set_drum_acceleration(context, 3.0)
-        plant = machine.plant.get_generalized_acceleration_output_port().Eval(setup.plant_context)
-        pairs = zip(machine.others.values(), parts, strict=True)
-        drake = np.concatenate([s.EvalTimeDerivatives(c).CopyToVector() for s, c in pairs])
-        reference = setup.parameters.profile.speed[0]
-        ours = derivative(state, plant[6], reference=reference)
-        for part in (slice(0, 3), slice(3, 6), slice(6, 7)):
-            scale = np.abs(plant[part]).max()
-            np.testing.assert_allclose(ours[7:14][part], plant[part], rtol=0, atol=1e-9 * scale)
-        np.testing.assert_allclose(
-            ours[ball_states], drake, rtol=0, atol=1e-10 * np.abs(drake).max()
-        )
 
 
 def law_at(state, motion, ring):

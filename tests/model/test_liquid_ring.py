@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from drum_rings import check_both_engines, with_rings
 from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, InitializeAutoDiff
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
@@ -17,10 +18,8 @@ from wm_drake.elements.liquid_ring import (
     WALL_LOSS,
     LiquidRing,
 )
-from wm_drake.elements.state_map import ELEMENT
-from wm_drake.engines.compiled.derivative import StateDerivative
 from wm_drake.laws.table import stiffness_force
-from wm_drake.parameters import MachineParameters, load_machine
+from wm_drake.parameters import load_machine
 from wm_drake.systems.element_system import ElementSystem
 
 RING = {
@@ -98,12 +97,6 @@ def test_the_packed_curve_is_that_of_the_geometry(fill):
     np.testing.assert_allclose(ours[free], whirl[free], rtol=1e-6)
 
 
-def with_rings(parameters, **rings):
-    """Return a machine with rings."""
-    tree = parameters.model_dump(exclude_unset=True)
-    return MachineParameters.model_validate(tree | {"elements": rings})
-
-
 def moved(rng, spin=30.0):
     """Return random states of a ring: in the free range, near the wall, and along the axis."""
     place = rng.uniform(-0.15, 0.15, 3) * [1.0, 1e-3, 1.0]
@@ -117,32 +110,7 @@ def test_both_engines_agree_at_random_states(name):
     """Compare the accelerations of tub and drum, prescribed or turned by a motor, and the liquid."""
     full = {**RING, "y": 0.15, "fill": 1.0}
     machine = wm.build_machine(with_rings(load_machine(name), front=RING, rear=full))
-    setup = machine.set_up("middle")
-    derivative, context = StateDerivative(setup), setup.context
-    rng, sizes = np.random.default_rng(3), [0.2] * 3 + [0.05] * 3 + [30.0] + [1.0] * 6 + [30.0]
-    own, state = (
-        derivative.layout.states.span(ELEMENT),
-        np.zeros(derivative.layout.states.size),
-    )
-    parts = [system.GetMyContextFromRoot(context) for system in machine.others.values()]
-    for _ in range(20):
-        state[:14] = np.array(sizes) * rng.uniform(-1.0, 1.0, 14)
-        liquids = [moved(rng), moved(rng)]
-        state[own] = np.concatenate(liquids)
-        machine.plant.SetPositionsAndVelocities(setup.plant_context, state[:14])
-        for part, values in zip(parts, liquids, strict=True):
-            part.SetContinuousState(values)
-        if name == "reference":
-            machine.set_drum_acceleration(context, 3.0)
-        plant = machine.plant.get_generalized_acceleration_output_port().Eval(setup.plant_context)
-        pairs = zip(machine.others.values(), parts, strict=True)
-        drake = np.concatenate([s.EvalTimeDerivatives(c).CopyToVector() for s, c in pairs])
-        reference = setup.parameters.profile.speed[0]
-        ours = derivative(state, plant[6], reference=reference)
-        for part in (slice(0, 3), slice(3, 6), slice(6, 7)):
-            scale = np.abs(plant[part]).max()
-            np.testing.assert_allclose(ours[7:14][part], plant[part], rtol=0, atol=1e-9 * scale)
-        np.testing.assert_allclose(ours[own], drake, rtol=0, atol=1e-10 * np.abs(drake).max())
+    check_both_engines(machine, lambda rng: [moved(rng), moved(rng)])
 
 
 def system_of(ring, place=PLACE):
