@@ -77,6 +77,9 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--net", type=Path, default=Path("search_basins.sqlite"))
     parser.add_argument("--seed", type=int, default=0, help="seed of the net")
     parser.add_argument("--steady", type=int, default=40, help="fits by the steady motion")
+    parser.add_argument(
+        "--also", nargs="*", default=[], metavar="MACHINE", help="fit from these, such as 223.75"
+    )
     parser.add_argument("--starts", type=int, default=12, help="fits by runs from their ends")
     parser.add_argument(
         "--shipped",
@@ -116,8 +119,9 @@ def _steady_ends(arguments: argparse.Namespace) -> list[Begin]:
     ends: list[Begin] = []
     with open_ledger(arguments.net, identity_of(arguments.seed), resume=True) as ledger:
         stages = TwoStages(ledger, arguments.seed)
-        for (block, place), start in best_by_runs(stages)[: arguments.steady]:
-            words, law = f"{block}.{place}", law_of(block)
+        best = {f"{block}.{place}": of for (block, place), of in best_by_runs(stages)}
+        for words in dict.fromkeys([*arguments.also, *list(best)[: arguments.steady]]):
+            start, law = best[words], law_of(int(words.split(".")[0]))
             path, steady = _file(arguments, words, "steady"), stages.nets(law).steady
             known = steady.parameter_map
             if path.exists():
