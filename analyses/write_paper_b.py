@@ -292,7 +292,7 @@ def main() -> None:
         "python analyses/write_paper_b.py --page docs/paper-b.md",
         [
             f"Tables 4 and 5: `wm-drake study gasket --design orthogonal --trials {trials} "
-            "--tables linear`,\n  as in [B], where nothing else is said."
+            "--tables linear`, as in [B], where nothing else is said."
         ],
     )
     text = origin + short + amplitude_text(machines, arguments.quick) + study
