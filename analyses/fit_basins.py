@@ -108,7 +108,7 @@ def _best_ends(arguments: argparse.Namespace) -> list[Begin]:
     for end in _steady_ends(arguments) if arguments.starts else ():
         cost = _fit_of(arguments.out, end.law).costs(end.point[None])[0]
         costs[end.words] = float(cost), end
-    shown = {words: round(cost) for words, (cost, _) in costs.items()}
+    shown = {words: round(cost, 2) for words, (cost, _) in costs.items()}
     print(f"costs by runs: {shown}", file=sys.stderr, flush=True)
     order = sorted(costs.values(), key=lambda of: of[0])
     return [end for _, end in order[: arguments.starts]]
