@@ -10,7 +10,7 @@ from contextvars import ContextVar
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:  # slow to import, and not needed for declarations of options
+if TYPE_CHECKING:  # which imports this module
     from wm_drake.parameters.units import Unit
 
 SI, US = "si", "us"
@@ -42,6 +42,10 @@ _CUSTOMARY = {
     "g*m": "oz*in",
     "g*mm": "oz*in",
     "kg*m^2": "lb*ft^2",
+    "kg/m^3": "lb/ft^3",
+    "N/rad": "lbf/rad",
+    "N*s^2/m^2": "lbf*s^2/ft^2",
+    "s/m": "s/ft",
     "g*mm^2": "oz*in^2",
     "N*m/m": "lbf",
     "MPa": "psi",
