@@ -72,7 +72,8 @@ def motions_of(
             inertia, share = inertia_share(motion, driven_mass)
             say(
                 f"{motion.loop.name}: {MASS.reading(driven_mass)} at the driven end take up to "
-                f"{FORCE.reading(inertia, 3)}, {PART.text(share)} of the measured force; taken out.",
+                f"{FORCE.reading(inertia, 3)}, {PART.text(share)} of the measured force; "
+                "taken out.",
                 err=True,
             )
         motions = [without_inertia(motion, driven_mass) for motion in motions]
