@@ -18,7 +18,7 @@ SI, US = "si", "us"
 READING: ContextVar[str] = ContextVar("reading", default=SI)
 """Whether results are read in SI or in US units."""
 
-_CUSTOMARY = {
+CUSTOMARY = {
     "mm": "in",
     "m": "ft",
     "mm/s": "in/s",
@@ -59,7 +59,7 @@ def reading_unit(unit: "Unit") -> "Unit":
     """Return a unit with the display unit in which results are read."""
     if READING.get() == SI:
         return unit
-    return replace(unit, shown=_CUSTOMARY.get(unit.shown, unit.shown))
+    return replace(unit, shown=CUSTOMARY.get(unit.shown, unit.shown))
 
 
 def finer_decimals(unit: "Unit", decimals: int) -> int:
