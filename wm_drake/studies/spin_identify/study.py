@@ -174,7 +174,7 @@ def identify_from_spin(
         data[f"error_{name}"] = RELATIVE_ERROR.named(name).variable("case", error)
         words = f"{AVERAGE_ERROR.words} {name}"
         data[f"average_error_{name}"] = AVERAGE_ERROR.named(words).variable((), average)
-    norms = np.sqrt((measured**2).sum(DIMS[2:]))
+    norms = (measured**2).sum(DIMS[2:]) ** 0.5
     residual = (computed[1] - measured) / norms.where(norms > 0.0)
     data["residual"] = RESIDUAL.variable(DIMS, residual.transpose(*DIMS))
     halves = half_widths(fit)
