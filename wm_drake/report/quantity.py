@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from wm_drake.parameters.reading import finer_decimals, reading_unit
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import PureNumber, Unit
 from wm_drake.report.formatting import MISSING, number, significant
-from wm_drake.report.reading import finer_decimals, reading_unit
 
 if TYPE_CHECKING:  # slow to import, and not needed for declarations
     import xarray as xr

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import pandas as pd
 
 from wm_drake.parameters import MachineParameters, quantities, source_of
+from wm_drake.parameters.reading import reading_unit
 from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import MISSING, number, significant
-from wm_drake.report.reading import reading_unit
 
 if TYPE_CHECKING:  # not needed for pages
     import rich.table

@@ -10,7 +10,7 @@ from contextvars import ContextVar
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:  # slow to import, and not needed for declarations of options
+if TYPE_CHECKING:  # which imports this module
     from wm_drake.parameters.units import Unit
 
 SI, US = "si", "us"
@@ -18,7 +18,7 @@ SI, US = "si", "us"
 READING: ContextVar[str] = ContextVar("reading", default=SI)
 """Whether results are read in SI or in US units."""
 
-_CUSTOMARY = {
+CUSTOMARY = {
     "mm": "in",
     "m": "ft",
     "mm/s": "in/s",
@@ -42,6 +42,10 @@ _CUSTOMARY = {
     "g*m": "oz*in",
     "g*mm": "oz*in",
     "kg*m^2": "lb*ft^2",
+    "kg/m^3": "lb/ft^3",
+    "N/rad": "lbf/rad",
+    "N*s^2/m^2": "lbf*s^2/ft^2",
+    "s/m": "s/ft",
     "g*mm^2": "oz*in^2",
     "N*m/m": "lbf",
     "MPa": "psi",
@@ -55,7 +59,7 @@ def reading_unit(unit: "Unit") -> "Unit":
     """Return a unit with the display unit in which results are read."""
     if READING.get() == SI:
         return unit
-    return replace(unit, shown=_CUSTOMARY.get(unit.shown, unit.shown))
+    return replace(unit, shown=CUSTOMARY.get(unit.shown, unit.shown))
 
 
 def finer_decimals(unit: "Unit", decimals: int) -> int:
