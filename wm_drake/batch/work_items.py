@@ -156,7 +156,7 @@ class Preparation:
         return WorkItem(number, case, numbers, packed, layout, begin)
 
     def _bodies(self, parameters: MachineParameters, load: Load | None) -> FloatArray:
-        """Return the packed bodies; cases with the same bodies, frames, drive and load share them."""
+        """Return the packed bodies, which cases with the same bodies, drive and load share."""
         drawn = parameters.bodies, parameters.frames, parameters.drive  # which has the rotor
         if not self._drawn or self._drawn[0][0] != drawn:
             self._context = self.machine.set_up_bodies(None, parameters, self._context)
