@@ -3,15 +3,9 @@
 Files that a user writes may have any unit; this is about what commands print and write.
 """
 
-import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import replace
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:  # which imports this module
-    from wm_drake.parameters.units import Unit
 
 SI, US = "si", "us"
 
@@ -53,27 +47,6 @@ CUSTOMARY = {
     "mJ": "lbf*in",
 }
 """US units of units for reading; all others are the same in both: s, Hz, rpm, deg, W, %."""
-
-
-def reading_unit(unit: "Unit") -> "Unit":
-    """Return a unit with the display unit in which results are read."""
-    if READING.get() == SI:
-        return unit
-    return replace(unit, shown=CUSTOMARY.get(unit.shown, unit.shown))
-
-
-def finer_decimals(unit: "Unit", decimals: int) -> int:
-    """Return the decimals of a number in the unit in which it is read, for the same digits.
-
-    Args:
-        decimals: Decimals in the display unit of `unit`.
-    """
-    larger = unit.from_si(1.0) / reading_unit(unit).from_si(1.0)
-    return max(0, decimals + math.ceil(math.log10(larger) - ROUNDING))
-
-
-ROUNDING = 0.3
-"""Part of a decimal that is not worth another one."""
 
 
 @contextmanager

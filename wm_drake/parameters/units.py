@@ -4,7 +4,7 @@ import contextlib
 import functools
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
@@ -12,7 +12,7 @@ from pydantic_core import CoreSchema
 from pydantic_core.core_schema import with_info_before_validator_function
 
 from wm_drake.errors import shortened
-from wm_drake.parameters.reading import reading_unit
+from wm_drake.parameters.reading import CUSTOMARY, READING, SI
 
 if TYPE_CHECKING:  # importing pint and making its registry take 0.7 s: units not in FACTORS
     import pint
@@ -195,6 +195,12 @@ class Unit:
         return f"(1, 2, 3) {self.shown}" if is_list else f"1 {self.shown}".strip()
 
     @property
+    def for_reader(self) -> "Unit":
+        """The unit with the display unit in which results are read, see `parameters.reading`."""
+        shown = self.shown if READING.get() == SI else CUSTOMARY.get(self.shown, self.shown)
+        return self if shown == self.shown else replace(self, shown=shown)
+
+    @property
     def label(self) -> str:
         """Display unit for reading, such as ``N mm/rad``."""
         return self.shown.replace("*", " ")
@@ -221,7 +227,7 @@ class Unit:
 
     def reading(self, value: float, digits: int = 6) -> str:
         """Return an SI value as text for reading, rounded, in the unit in which it is read."""
-        read = reading_unit(self)
+        read = self.for_reader
         return f"{read.from_si(value):.{digits}g} {read.label}".rstrip()
 
     def text(self, value: Any) -> str:

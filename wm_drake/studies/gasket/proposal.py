@@ -12,7 +12,6 @@ import xarray as xr
 
 from wm_drake.parameters import GASKET_FACTORS, FactorLevels, MachineParameters, load_factors
 from wm_drake.parameters.elements import CurveTable
-from wm_drake.parameters.reading import reading_unit
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Share
 from wm_drake.parameters.variation import number_at
@@ -126,7 +125,7 @@ def text_at(machine: MachineParameters, factor: FactorLevels, place: float) -> t
         assert number.nominal
         text = PERCENT.text(value / number.nominal)
     else:
-        unit = reading_unit(number.unit)
+        unit = number.unit.for_reader
         text = f"{significant(unit.from_si(value), 3)} {unit.shown}".replace("−", "-")
     value = number.resolved(text)
     return text, float(np.interp(value, numbers, (-1.0, 0.0, 1.0)))

@@ -14,7 +14,6 @@ import xarray as xr
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.elements import CurveTable
 from wm_drake.parameters.keys import quantities
-from wm_drake.parameters.reading import reading_unit
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Share, Unit
 from wm_drake.parameters.variation import value_at
@@ -269,7 +268,7 @@ def _text(parameters: MachineParameters, key: str, factor: float) -> str:
     """Return a multiple of a number as the text that `--set` takes, so that it is what is run."""
     if isinstance(value_at(parameters, key), CurveTable):
         return f"{FACTOR.values(factor):.4g} %"
-    unit = reading_unit(next(unit for name, _, unit in quantities(parameters) if name == key))
+    unit = next(u for name, _, u in quantities(parameters) if name == key).for_reader
     return f"{unit.from_si(factor * value_at(parameters, key)):.4g} {unit.shown}"
 
 
