@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, Literal
 from pydantic import ValidationError
 
 from wm_drake.errors import InputError, InputNotice, Problem, input_error
-from wm_drake.parameters.reading import read_in
 from wm_drake.report.provenance import command_line
 from wm_drake.report.terminal import QUIET, say
 from wm_drake.studies.executor import Executor
@@ -199,6 +198,8 @@ def execute(order: Order) -> tuple[Result, Facts, tuple[str, ...]]:
         InputError: the input is wrong, or the folder must not or cannot be written to.
         StudyInterrupted: Ctrl-C was pressed.
     """
+    from wm_drake.parameters.reading import read_in
+
     with read_in(order.run.units):
         return _executed(order)
 
