@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from lab_writers import write_mdf
 
@@ -22,13 +23,13 @@ NOISE, GAIN, OFFSET, TILT = 0.02, 0.01, 0.1, np.deg2rad(2.0)
 """Noise [m/s^2], deviations of gains and offsets [1, m/s^2], and tilt [rad] of the sensors."""
 
 
-def plant(changes, seed=1, repeats=3, angle=0.0):
+def plant(changes, seed=1, repeats=3, angle=0.0, stem="run", of_load="middle"):
     """Write records of the reference machine with other numbers, by sensors that are not ideal."""
     parameters = load_machine("reference")
     Path("p.yaml").write_text(PROFILE)
     machine = build_machine(with_values(parameters, changes))
-    load = turned_load(machine.parameters.loads["middle"], angle)
-    case = Case("middle", load, load_profile("p.yaml"))
+    load = turned_load(machine.parameters.loads[of_load], angle)
+    case = Case(of_load, load, load_profile("p.yaml"))
     record, points = simulate(machine, case), machine.set_up().accelerometer_points
     generator = np.random.default_rng(seed)
     frames = parameters.accelerometer_frames()
@@ -49,8 +50,8 @@ def plant(changes, seed=1, repeats=3, angle=0.0):
             seen = signal[late:] * generator.normal(1.0, GAIN) + generator.normal(0.0, OFFSET)
             channels[name] = (seen + generator.normal(0.0, NOISE, len(seen)), "m/s^2")
         time = record.time.values[late:]
-        write_mdf(Path(f"run_{repeat}.mf4"), time - time[0], channels)
-    return [f"run_{repeat}.mf4" for repeat in range(repeats)]
+        write_mdf(Path(f"{stem}_{repeat}.mf4"), time - time[0], channels)
+    return [f"{stem}_{repeat}.mf4" for repeat in range(repeats)]
 
 
 @pytest.fixture
@@ -118,6 +119,27 @@ def test_signals_over_time_tell_the_angle_of_the_drum_and_the_clock(calibrate):
     assert found[FRICTION]["value"] == pytest.approx(truth, rel=0.03)
     assert found["drum angle of run_0.mf4"]["value"] == pytest.approx(40.0, abs=3.0)
     assert result["answer"].startswith("Good fit to 1 record: the signals ")
+
+
+@pytest.mark.slow
+def test_records_of_two_loads_are_fitted_together(calibrate):
+    """Plant two masses, each of which only the records of its load tell, and a friction of both."""
+    parameters = load_machine("reference")
+    keys = [f"loads.{name}.unbalances.0.mass" for name in ("middle", "counter")]
+    masses = [parameters.loads[name].unbalances[0].mass for name in ("middle", "counter")]
+    friction = parameters.damper_types["friction"].friction_force
+    truth = {FRICTION: 1.15 * friction, keys[0]: 1.1 * masses[0], keys[1]: 0.85 * masses[1]}
+    files = [*plant(truth, of_load="middle", stem="a", repeats=2)]
+    files += [f"counter={one}" for one in plant(truth, seed=2, of_load="counter", stem="b")]
+    words = [word for key in truth for word in ("--unknown", key)]
+    result = calibrate(files, *words)
+    found = {row["unknown"]: row for row in result["estimates"]}
+    for key, value in truth.items():
+        assert found[key]["value"] == pytest.approx(value, rel=0.03), key
+        assert found[key]["lower_95"] < value < found[key]["upper_95"], key
+    assert result["answer"].startswith("Good fit to 5 records")
+    table = pd.read_csv("out/fitted_acceleration.csv")
+    assert set(table["block"]) == {"middle", "counter"}
 
 
 FREE = """

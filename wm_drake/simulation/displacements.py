@@ -215,21 +215,32 @@ def peak_line(time: FloatArray, signal: FloatArray) -> FloatArray:
 def smooth_envelope(record: Record) -> xr.DataArray:
     """Return the smooth envelope (time, sensor) of the filtered displacements. [m]
 
-    It is the magnitude of the analytic signal d + i H(d), with the Hilbert transform H; the lower
-    envelope is its negative. Unlike a line from peak to peak it is a smooth function of all
-    parameters: a line jumps where a small peak appears. The record is mirrored at both ends,
-    because the transform continues it periodically.
+    The lower envelope is its negative.
+    """
+    displacement = filtered_displacement(record)
+    sizes = analytic_sizes(displacement.values, sample_period(record), band_of(record))
+    return displacement.copy(data=sizes)
+
+
+def analytic_sizes(signals: FloatArray, period: float, band: tuple[float, float]) -> FloatArray:
+    """Return the magnitudes (n, k) of analytic signals d + i H(d), with the Hilbert transform H.
+
+    Unlike a line from peak to peak a magnitude is a smooth function of all parameters: a line jumps
+    where a small peak appears, and noise of a slow signal has many. The signals are mirrored at
+    both ends, because the transform continues them periodically.
+
+    Args:
+        signals: Signals that are filtered to a band. (n, k)
+        period: Time between samples. [s]
+        band: The band. [Hz]
     """
     from scipy.signal import hilbert  # slow to import: envelopes
 
-    displacement = filtered_displacement(record)
-    values = displacement.values
-    length = PADDING_PERIODS / band_of(record)[0]
-    padding = min(round(length / sample_period(record)), len(values) - 1)
+    padding = min(round(PADDING_PERIODS / band[0] / period), len(signals) - 1)
     if padding < 1:
-        return displacement.copy(data=np.abs(values))
-    mirrored = np.pad(values, ((padding, padding), (0, 0)), mode="reflect")
-    return displacement.copy(data=np.abs(hilbert(mirrored, axis=0))[padding:-padding])
+        return np.abs(signals)
+    mirrored = np.pad(signals, ((padding, padding), (0, 0)), mode="reflect")
+    return np.asarray(np.abs(hilbert(mirrored, axis=0))[padding:-padding])
 
 
 def percent_difference(value: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:

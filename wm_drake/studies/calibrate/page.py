@@ -7,9 +7,10 @@ import xarray as xr
 
 from wm_drake.parameters import MachineParameters, machine_yaml
 from wm_drake.parameters.measured import EXPERIMENT
+from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import number
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import quantity_of, text_of
+from wm_drake.report.quantity import Quantity, quantity_of, text_of
 from wm_drake.simulation.displacements import band_of
 from wm_drake.simulation.records import Record
 from wm_drake.studies.answer import Answer, Part, Plot
@@ -33,7 +34,10 @@ from wm_drake.studies.calibrate.solutions import BEYOND, LIMIT, sizes_text, solv
 from wm_drake.studies.calibrate.study import BEYOND_LIMIT, Calibration
 from wm_drake.studies.calibrate.targets import AMPLITUDE, GASKET, case_title
 from wm_drake.studies.fitting.page import correlations_part
+from wm_drake.studies.modes.shapes import ANGLE_ARM
 from wm_drake.studies.spin.figures import envelopes_figure
+
+ARM = Quantity("arm of an angle", Unit("m", "m"), 2)
 
 
 def calibrate_answer(
@@ -395,7 +399,7 @@ def _modes(modes: Mapping[str, xr.Dataset]) -> Plot:
         f"Natural frequencies {alternative}.",
         "Rigid-body modes of the empty tub without dampers and with the drum at rest: natural "
         "frequency, drum speed of the same frequency, and mode shape. Angles are multiplied by "
-        "0.25 m. The largest component of each shape is 1.",
+        f"{ARM.text(ANGLE_ARM)}. The largest component of each shape is 1.",
     )
 
 

@@ -18,7 +18,7 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Share, Unit
 from wm_drake.report.quantity import SPEED, TIME, Quantity
 from wm_drake.simulation.band import pass_band
-from wm_drake.simulation.displacements import filtered, peak_line
+from wm_drake.simulation.displacements import analytic_sizes, filtered, peak_line
 from wm_drake.simulation.mount_forces import speed_ranges
 from wm_drake.simulation.orders import order_vectors
 from wm_drake.simulation.records import Record, profile_of, sample_period
@@ -229,9 +229,16 @@ def _largest_orders(signals: FloatArray, run: Record) -> FloatArray:
 
 
 def envelope_sizes(signals: FloatArray, run: Record, places: xr.DataArray) -> FloatArray:
-    """Return half the distances between the envelopes of signals (n, k) at places. (places, k)"""
-    upper, lower = envelopes_of(band_passed(signals, run), run.time.values)
-    return means_at(0.5 * (upper - lower), _place_numbers(run, places), places.size)
+    """Return the amplitudes of signals (n, k) at places, those of their smooth envelopes.
+
+    They are smooth functions of all parameters, and noise hardly changes them. (places, k)
+    """
+    period = sample_period(run)
+    band = pass_band(profile_of(run), period)
+    sizes = in_pieces(
+        signals, lambda part: analytic_sizes(filtered(part, period, band), period, band)
+    )
+    return means_at(sizes, _place_numbers(run, places), places.size)
 
 
 def order_one_sizes(signals: FloatArray, run: Record, places: xr.DataArray) -> FloatArray:
