@@ -14,6 +14,7 @@ import re
 import shutil
 import subprocess
 import tempfile
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -64,24 +65,29 @@ def in_chromium(folder: str, page: Path) -> Iterator[Evaluate]:
     driver = webdriver.Chrome(options, webdriver.ChromeService(shutil.which("chromedriver")))
     driver.set_script_timeout(600.0)
     driver.get(page.as_uri())
-    yield lambda script: driver.execute_async_script(f"{script}.then(arguments[0])")
-    driver.quit()
+    try:
+        yield lambda script: driver.execute_async_script(f"{script}.then(arguments[0])")
+    finally:
+        driver.quit()
 
 
 @contextmanager
 def in_firefox(folder: str, page: Path) -> Iterator[Evaluate]:
     """Open a page in Firefox, which is driven by WebDriver BiDi: it needs no other program."""
     command = ["firefox-esr", "--headless", "--remote-debugging-port", "0", "--profile", folder]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    )
     assert process.stderr
     address = next(m[0] for line in process.stderr if (m := re.search(r"ws://\S+", line)))
-    socket = create_connection(f"{address}/session", timeout=600.0)
+    threading.Thread(target=process.stderr.read, daemon=True).start()  # a full pipe would stop it
+    socket = create_connection(f"{address}/session", timeout=600.0, suppress_origin=True)
 
     def ask(method: str, **params: object) -> dict[str, object]:
         socket.send(json.dumps({"id": 1, "method": method, "params": params}))
         while "id" not in (answer := json.loads(socket.recv())):
             pass  # an event
-        return answer["result"]
+        return dict(answer["result"])
 
     ask("session.new", capabilities={})
     context = ask("browsingContext.getTree")["contexts"][0]["context"]
@@ -94,9 +100,11 @@ def in_firefox(folder: str, page: Path) -> Iterator[Evaluate]:
         )
         return json.loads(found["result"]["value"])
 
-    yield evaluate
-    ask("browser.close")
-    process.wait()
+    try:
+        yield evaluate
+    finally:
+        process.terminate()
+        process.wait()
 
 
 BROWSERS = {"chromium": in_chromium, "firefox-esr": in_firefox}
