@@ -14,19 +14,21 @@ import re
 import shutil
 import subprocess
 import tempfile
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from resource import RUSAGE_CHILDREN, getrusage
+from typing import Any
 
 import numpy as np
+import psutil
 from selenium import webdriver
 from websocket import create_connection
 
 import wm_drake as wm
 from wm_drake.live.exported import export_page
 
-Evaluate = Callable[[str], object]
+Evaluate = Callable[[str], Any]
 """Function that returns what a promise in the page resolves to; JSON."""
 HEADLESS = ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage")
 MOVES = """(async () => {
@@ -64,39 +66,46 @@ def in_chromium(folder: str, page: Path) -> Iterator[Evaluate]:
     driver = webdriver.Chrome(options, webdriver.ChromeService(shutil.which("chromedriver")))
     driver.set_script_timeout(600.0)
     driver.get(page.as_uri())
-    yield lambda script: driver.execute_async_script(f"{script}.then(arguments[0])")
-    driver.quit()
+    try:
+        yield lambda script: driver.execute_async_script(f"{script}.then(arguments[0])")
+    finally:
+        driver.quit()
 
 
 @contextmanager
 def in_firefox(folder: str, page: Path) -> Iterator[Evaluate]:
     """Open a page in Firefox, which is driven by WebDriver BiDi: it needs no other program."""
     command = ["firefox-esr", "--headless", "--remote-debugging-port", "0", "--profile", folder]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    )
     assert process.stderr
     address = next(m[0] for line in process.stderr if (m := re.search(r"ws://\S+", line)))
-    socket = create_connection(f"{address}/session", timeout=600.0)
+    threading.Thread(target=process.stderr.read, daemon=True).start()  # a full pipe would stop it
+    socket = create_connection(f"{address}/session", timeout=600.0, suppress_origin=True)
 
-    def ask(method: str, **params: object) -> dict[str, object]:
+    def ask(method: str, **params: object) -> dict[str, Any]:
         socket.send(json.dumps({"id": 1, "method": method, "params": params}))
         while "id" not in (answer := json.loads(socket.recv())):
             pass  # an event
-        return answer["result"]
+        return dict(answer["result"])
 
     ask("session.new", capabilities={})
     context = ask("browsingContext.getTree")["contexts"][0]["context"]
     ask("browsingContext.navigate", context=context, url=page.as_uri(), wait="complete")
 
-    def evaluate(script: str) -> object:
+    def evaluate(script: str) -> Any:
         expression = f"{script}.then(JSON.stringify)"
         found = ask(
             "script.evaluate", expression=expression, target={"context": context}, awaitPromise=True
         )
         return json.loads(found["result"]["value"])
 
-    yield evaluate
-    ask("browser.close")
-    process.wait()
+    try:
+        yield evaluate
+    finally:
+        process.terminate()
+        process.wait()
 
 
 BROWSERS = {"chromium": in_chromium, "firefox-esr": in_firefox}
@@ -104,11 +113,10 @@ BROWSERS = {"chromium": in_chromium, "firefox-esr": in_firefox}
 
 def measured(browser: str, page: Path, key: str, count: int) -> list[float]:
     """Return time to the first picture, median and 95 % of the moves, processor time. [s]"""
-    before = getrusage(RUSAGE_CHILDREN)
     with tempfile.TemporaryDirectory() as folder, BROWSERS[browser](folder, page) as evaluate:
         found = evaluate(MOVES.replace("KEY", key).replace("COUNT", str(count)))
-    after = getrusage(RUSAGE_CHILDREN)
-    busy = after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
+        started = psutil.Process().children(recursive=True)
+        busy = sum(sum(process.cpu_times()[:2]) for process in started)
     return [1e-3 * found["first"], *(1e-3 * np.quantile(found["times"], [0.5, 0.95])), busy]
 
 

@@ -1,6 +1,7 @@
 """Results that take long to compute, kept on disk beside the compiled code of the same sources."""
 
 import contextlib
+import functools
 import hashlib
 import os
 from collections.abc import Callable
@@ -9,6 +10,16 @@ from pathlib import Path
 from wm_drake.compiler.compilation import CACHE_FOLDER
 
 _DIGEST = hashlib.sha256().digest_size
+_PACKAGE = Path(__file__).parents[1]
+
+
+@functools.cache
+def all_sources() -> str:
+    """Return the hash of all sources: compiled code, and so its folder, depends on some only."""
+    digest = hashlib.sha256()
+    for source in sorted(_PACKAGE.rglob("*.py")):
+        digest.update(source.read_bytes())
+    return digest.hexdigest()
 
 
 def kept(key: str, compute: Callable[[], bytes]) -> bytes:

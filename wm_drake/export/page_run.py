@@ -42,6 +42,8 @@ from wm_drake.simulation.mount_histories import VECTOR_SIZE, VECTOR_SUMS, measur
 from wm_drake.simulation.signals import filter_both_ways, largest_peaks
 
 INT32S, INT64S = types.CPointer(types.int32), types.CPointer(types.int64)
+BOUNDS = LARGEST_ANGLE, LARGEST_DISPLACEMENT
+"""Largest roll, pitch and yaw [rad] and displacement [m] of a good sample."""
 
 
 @njit(**OPTIONS)
@@ -181,7 +183,7 @@ def measurer(plan: Any) -> Any:
     """
     at, count, elements, gasket = plan.at, plan.count, plan.elements, plan.gasket
     sample = elements.begins.size + elements.begins.rates
-    bounds, none = (LARGEST_ANGLE, LARGEST_DISPLACEMENT), np.empty(0, np.int64)
+    none = np.empty(0, np.int64)
     samples_of, points = for_one_run(measure_samples_lanes), count.points
     first = at.packed + count.numbers + count.springs
 
@@ -190,7 +192,7 @@ def measurer(plan: Any) -> Any:
         samples, p = part(history, 0, rows * sample), part(v, at.packed, count.numbers)
         extremes = part(v, at.extremes, points + 7)
         samples_of(
-            samples, rows, sample, bounds, p, gasket, elements.mounts.branches,
+            samples, rows, sample, BOUNDS, p, gasket, elements.mounts.branches,
             part(v, first, POINT_SIZE * points), points, none, part(moved, 0, rows * points),
             extremes, part(v, at.step, 0)
         )  # fmt: skip
@@ -205,10 +207,7 @@ def mount_measurer(plan: Any) -> Any:
     Arguments: v; samples and their number.
     """
     at, count, elements = plan.at, plan.count, plan.elements
-    sample, bounds = (
-        elements.begins.size + elements.begins.rates,
-        (LARGEST_ANGLE, LARGEST_DISPLACEMENT),
-    )
+    sample = elements.begins.size + elements.begins.rates
     mounts_of, sums = for_one_run(measure_mounts_lanes), at.answer - at.sums
     largest = VECTOR_SUMS.offsets["largest"]
 
@@ -217,7 +216,7 @@ def mount_measurer(plan: Any) -> Any:
         samples, p = part(history, 0, rows * sample), part(v, at.packed, count.numbers)
         numbers, total = numbers_at(v, 0), part(v, at.sums, sums)
         unused = part(v, at.step, 0)
-        mounts_of(samples, rows, sample, bounds, p, elements.mounts, count.mounts, unused, total)
+        mounts_of(samples, rows, sample, BOUNDS, p, elements.mounts, count.mounts, unused, total)
         for i in range(count.mounts):
             numbers[at.answer + GAP_SIZE + i] = sqrt(total[VECTOR_SIZE * i + largest])
 

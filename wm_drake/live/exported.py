@@ -9,7 +9,8 @@ import hashlib
 import html
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -78,7 +79,9 @@ def export_page(
     _check_place(path)
     notice_jumping_friction(parameters)
     text, data = page_text(parameters, given, sets)
-    _write(path, text)
+    with _part_of(path) as part:
+        part.write_text(text, encoding="utf-8")
+        part.replace(path)
     numbers = data["machine"]["numbers"]
     fixed = sum(1 for number in numbers if number["needs"])
     return ExportedPage(path, len(text.encode()), len(numbers) - fixed, fixed)
@@ -190,15 +193,19 @@ def _check_place(path: Path) -> None:
         raise input_error(f"'{path.name}' must end with .html", where="out")
     if not path.parent.is_dir():
         raise input_error(f"there is no folder '{path.parent}'", where="out")
+    with _part_of(path):
+        pass
 
 
-def _write(path: Path, text: str) -> None:
-    """Write the page as a whole or not at all."""
+@contextmanager
+def _part_of(path: Path) -> Iterator[Path]:
+    """Yield a file beside a file, which is removed, so that the file is written as a whole."""
     part = path.with_name(f".{path.name}.part")
     try:
-        part.write_text(text, encoding="utf-8")
-        part.replace(path)
+        part.touch()
+        yield part
     except OSError as error:
         raise input_error(f"cannot be written to: {reason_of(error)}", where=str(path)) from None
     finally:
-        part.unlink(missing_ok=True)
+        with suppress(OSError):
+            part.unlink()

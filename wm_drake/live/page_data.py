@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from wm_drake.compiler.kept import kept
+from wm_drake.compiler.kept import all_sources, kept
 from wm_drake.engines.compiled.multistep import STEPS_BEFORE
 from wm_drake.engines.compiled.stepping import LARGEST_TURN, LARGEST_TURN_OF_MIDPOINT
 from wm_drake.errors import input_error
@@ -69,7 +69,8 @@ AS_EXPORTED = "it is that of the exported file"
 
 def page_data(parameters: MachineParameters) -> dict[str, Any]:
     """Return all that the page knows of a machine, its compiled code too; kept on disk."""
-    key = f"page of {parameters.model_dump_json()} {sorted(parameters.sources.items())}"
+    machine = f"{parameters.model_dump_json()} {sorted(parameters.sources.items())}"
+    key = f"page by {all_sources()} of {machine}"
     data: dict[str, Any] = json.loads(
         kept(key, lambda: json.dumps(_page_data(parameters), allow_nan=False).encode())
     )
