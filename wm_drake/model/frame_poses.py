@@ -78,9 +78,7 @@ class FramePoses:
         check_known(pair, scene.pair_names(), f"no pair of shapes '{pair}'")
         distance, (tub_point, housing_point) = scene.nearest_points(np.zeros(6), *names)
         if not distance > 0.0:
-            raise input_error(
-                f"shapes '{pair}' overlap; as drawn they must be apart"
-            )
+            raise input_error(f"shapes '{pair}' overlap; as drawn they must be apart")
         return Ends(tub_point, np.eye(3), housing_point, np.eye(3))
 
     @property
