@@ -17,7 +17,14 @@ from wm_drake.batch import SimulationInterrupted, simulate_many, work_items
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.errors import InputError, InputNotice
 from wm_drake.model.build import build_machine
-from wm_drake.parameters import Load, MachineParameters, SpinProfile, Unbalance, with_value
+from wm_drake.parameters import (
+    Load,
+    MachineParameters,
+    SpinProfile,
+    Unbalance,
+    load_machine,
+    with_value,
+)
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import measure
 from wm_drake.simulation.runs import DivergenceWarning, simulate
@@ -100,6 +107,18 @@ def test_company_changes_no_bit(machine, cases, table):
     for name in VARIABLES:
         np.testing.assert_array_equal(backwards[name].values[::-1], table[name].values)
         np.testing.assert_array_equal(some[name].values, table[name].values[4:7])
+
+
+@pytest.mark.parametrize("key", ["rotor_inertia", "belt_ratio"])
+def test_a_run_has_its_own_rotor(key):
+    parameters = load_machine("motor")
+    changed = with_value(parameters, f"drive.{key}", 1.5 * getattr(parameters.drive, key))
+    built, load = build_machine(parameters), parameters.loads["middle"]
+    cases = [Case("run", load, SHORT, parameters=each) for each in (changed, parameters)]
+    together = simulate_many(built, cases)["amplitude"].values
+    alone = simulate_many(built, cases[1:])["amplitude"].values
+    np.testing.assert_array_equal(together[1], alone[0])
+    assert np.abs(together[0] / together[1] - 1.0).max() > 1e-4
 
 
 def test_scenes_are_used_again_and_change_no_bit(machine, cases):

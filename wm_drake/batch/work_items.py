@@ -156,8 +156,8 @@ class Preparation:
         return WorkItem(number, case, numbers, packed, layout, begin)
 
     def _bodies(self, parameters: MachineParameters, load: Load | None) -> FloatArray:
-        """Return the packed bodies, which cases with the same bodies, frames and load share."""
-        drawn = parameters.bodies, parameters.frames
+        """Return the packed bodies, which cases with the same bodies, drive and load share."""
+        drawn = parameters.bodies, parameters.frames, parameters.drive  # which has the rotor
         if not self._drawn or self._drawn[0][0] != drawn:
             self._context = self.machine.set_up_bodies(None, parameters, self._context)
             plant_context = self.machine.plant.GetMyContextFromRoot(self._context)

@@ -23,7 +23,13 @@ from wm_drake.export.kernel import (
 )
 from wm_drake.export.page_gap import gap_finder
 from wm_drake.export.page_run import force_binner, integrator, measurer, mount_measurer, smoother
-from wm_drake.export.page_statics import body_changer, foot_loader, settler, strut_placer
+from wm_drake.export.page_statics import (
+    body_changer,
+    foot_loader,
+    settler,
+    strut_placer,
+    taut_setter,
+)
 
 
 def page_kernel(plan: Any) -> dict[str, Any]:
@@ -47,7 +53,8 @@ def _set_up(plan: Any) -> Any:
     at, of, count = plan.at, plan.of, plan.count
     settles, size = plan.settles, plan.elements.begins.size
     write_rows, add_load = row_writer(plan), load_adder(plan)
-    add_bodies, place_struts, settle = body_changer(plan), strut_placer(plan), settler(plan)
+    add_bodies, set_taut = body_changer(plan), taut_setter(plan)
+    place_struts, settle = strut_placer(plan, set_taut), settler(plan, set_taut)
     load_feet, stands = foot_loader(plan), settles and plan.elements.cabinet is not None
 
     @cfunc(types.float64(POINTER, POINTER), **RUN_HERE)

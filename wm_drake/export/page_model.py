@@ -18,6 +18,7 @@ from wm_drake.elements.sensor import POINT_SIZE
 from wm_drake.engines.compiled.midpoint import TUBES
 from wm_drake.engines.compiled.multistep import PAST_INPUTS, PAST_RATES
 from wm_drake.engines.compiled.packing import initial_state
+from wm_drake.engines.compiled.step_check import slowest_state
 from wm_drake.engines.compiled.stepping import Stepping
 from wm_drake.errors import InputError
 from wm_drake.export.arrangement import drum_parts, entries_of, joined, pair_parts, places_of
@@ -188,7 +189,7 @@ def _constants(contents: Contents, chosen: _Chosen) -> dict[str, Any]:
         **drum_parts(contents.bodies),
         "bodies": [*chosen.bodies.values()],
         "initial": initial_state(contents.setup, contents.profile),
-        "relaxation": contents.stepping.relaxation,
+        "slowest": slowest_state(contents.setup, contents.layout),
         "sections": sections,
         "settled": settled,
         "pairs": [*pairs.ravel(), *distances],
@@ -216,7 +217,7 @@ def _counts(contents: Contents, chosen: _Chosen) -> Any:
 
 def _places(contents: Contents, count: Any) -> Any:
     begins = contents.layout.states.begins
-    solved = max(6, count.springs)
+    solved, dampers = max(TUBES, count.springs), len(contents.layout.tubes)
     sizes = {
         "time": 1,
         "parameters": count.parameters,
@@ -238,6 +239,9 @@ def _places(contents: Contents, count: Any) -> Any:
         "sum": max(begins.size, TUBES),
         "past_rates": PAST_RATES * begins.size,
         "past_inputs": PAST_INPUTS * max(begins.inputs, 1),
+        "length": 1,
+        "jacobian": (2 * TUBES) ** 2,
+        "relaxation": TUBES**2 * dampers,
         "extremes": count.points + 7,
         "sums": sums_size(count.mounts),
         "answer": GAP_SIZE + count.mounts,

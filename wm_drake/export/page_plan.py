@@ -17,7 +17,8 @@ PUSHES = 4
 Places = namedtuple(
     "Places",
     "time parameters bodies unbalances of_load speed packed total state rest trial wrenches slopes "
-    "step rate inputs stage sum past_rates past_inputs extremes sums answer size",
+    "step rate inputs stage sum past_rates past_inputs length jacobian relaxation extremes sums "
+    "answer size",
 )
 """Indices in the array of an instance.
 
@@ -25,18 +26,20 @@ parameters: numbers of the machine file by straight lines; bodies: `BODY_SIZE` e
 those of the load, the residual imbalance of the drum last; of_load: what else the load adds to the
 harmonics of the drum; speed: of the drum at the start [rad/s]; packed: packed numbers, then the
 free length of each spring, the measured points and the numbers of the feet; rest: pose of the tub
-at rest; extremes, sums: what `measure_samples_lanes` and `measure_mounts_lanes` write; answer: the
-gap (`GAP_SIZE`), then the peak force of each mount; the others are arrays to work in.
+at rest; length: largest step of the run [s]; relaxation: matrices of the midpoint rule; extremes,
+sums: what `measure_samples_lanes` and `measure_mounts_lanes` write; answer: the gap (`GAP_SIZE`),
+then the peak force of each mount; the others are arrays to work in.
 """
 Constants = namedtuple(
     "Constants",
-    "packed start entries harmonics drum bodies initial relaxation sections settled pairs size",
+    "packed start entries harmonics drum bodies initial slowest sections settled pairs size",
 )
 """Indices in the array of constants.
 
 packed, start, entries, harmonics, drum: as in `wm_drake.export.kernel`; bodies: `BODY_CONSTANTS`
-each; initial: state before a run; relaxation: of the midpoint rule; sections, settled: of the
-filter; pairs: shapes, `PAIR_SIZE` each, then the distance of each pair at the initial pose.
+each; initial: state before a run; slowest: state at which the machine is linearised for the
+midpoint rule; sections, settled: of the filter; pairs: shapes, `PAIR_SIZE` each, then the distance
+of each pair at the initial pose.
 """
 Counts = namedtuple(
     "Counts",

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numba import carray, cfunc, njit, types
 
-from wm_drake.compiler.compilation import for_one_run
+from wm_drake.compiler.compilation import for_one_run, law
 from wm_drake.compiler.elementary import sqrt
 from wm_drake.compiler.matrices import plus, six
 from wm_drake.compiler.vectors import dot
@@ -19,14 +19,23 @@ from wm_drake.elements.motion import tub_motion
 from wm_drake.elements.mount import WRENCH_SIZE, write_mount_wrenches
 from wm_drake.elements.rubber import bushing_wrench
 from wm_drake.elements.sensor import POINT_SIZE
+from wm_drake.elements.telescopic_damper import TUBES_STATE_SIZE
 from wm_drake.engines.compiled.bearing import carrier_motion
 from wm_drake.engines.compiled.cabinet import FEET_BEGIN, SLIPS_BEGIN
 from wm_drake.engines.compiled.integration import Work, integrate_lanes
-from wm_drake.engines.compiled.midpoint import MidpointWork, integrate_midpoint_lanes
+from wm_drake.engines.compiled.linear import jacobian_lanes
+from wm_drake.engines.compiled.midpoint import (
+    TUBES,
+    VELOCITIES,
+    MidpointWork,
+    integrate_midpoint_lanes,
+)
 from wm_drake.engines.compiled.multistep import PAST_INPUTS, PAST_RATES
+from wm_drake.engines.compiled.stepping import ACROSS_JUMPS
 from wm_drake.engines.trajectory import LARGEST_ANGLE, LARGEST_DISPLACEMENT
 from wm_drake.export.kernel import OPTIONS, POINTER, numbers_at, pointer_at
 from wm_drake.export.page_plan import GAP_SIZE
+from wm_drake.export.page_statics import solve
 from wm_drake.laws.feet import normal_loads
 from wm_drake.simulation.histories import measure_samples_lanes
 from wm_drake.simulation.mount_histories import VECTOR_SIZE, VECTOR_SUMS, measure_mounts_lanes
@@ -89,12 +98,14 @@ def _advance(plan: Any) -> Any:
 
 def _midpoint(plan: Any) -> Any:
     """Return the function (steps, n, v, c, history) of steps of the midpoint rule."""
-    at, of, elements, count = plan.at, plan.of, plan.elements, plan.count.numbers
-    size, inputs, matrices = elements.begins.size, at.stage - at.inputs, of.sections - of.relaxation
-    run = for_one_run(integrate_midpoint_lanes)
+    at, elements, count = plan.at, plan.elements, plan.count.numbers
+    size, inputs, dampers = elements.begins.size, at.stage - at.inputs, len(elements.tubes)
+    run, relax_tubes = for_one_run(integrate_midpoint_lanes), _relaxer(plan)
 
     @njit(**OPTIONS)
     def advance(steps, n, v, c, history):
+        for i in range(dampers):
+            relax_tubes(v, c, i)
         work = MidpointWork(
             part(v, at.rate, size),
             part(v, at.inputs, inputs),
@@ -103,10 +114,64 @@ def _midpoint(plan: Any) -> Any:
             part(v, at.sum, size),
         )
         p, x = part(v, at.packed, count), part(v, at.state, size)
-        relaxation = part(c, of.relaxation, matrices)
+        relaxation = part(v, at.relaxation, TUBES * TUBES * dampers)
         run(steps[:4], 0, n, p, elements, relaxation, x, work, history)
 
     return advance
+
+
+def _relaxer(plan: Any) -> Any:
+    """Return the function (v, c, i) that computes the matrix R of damper i.
+
+    It does what `wm_drake.engines.compiled.midpoint_check.relaxation_matrices` does.
+    """
+    at, of, elements, count = plan.at, plan.of, plan.elements, plan.count.numbers
+    size, inputs, n = elements.begins.size, at.stage - at.inputs, 2 * TUBES
+    begins = elements.begins.tubes + TUBES_STATE_SIZE * np.arange(len(elements.tubes))
+    moving = np.array([*range(TUBES), *range(VELOCITIES, VELOCITIES + TUBES)])
+    free, write_jacobian = begins[:, None] + moving, for_one_run(jacobian_lanes)
+
+    @njit(**OPTIONS)
+    def relax_tubes(v, c, i):
+        p, x, work = (
+            part(v, at.packed, count), part(v, at.trial, size), part(v, at.rate, size + inputs)
+        )  # fmt: skip
+        start, jacobian, newton, right, relaxation = (
+            numbers_at(c, of.slowest), numbers_at(v, at.jacobian), numbers_at(v, at.slopes),
+            numbers_at(v, at.step), numbers_at(v, at.relaxation + TUBES * TUBES * i)
+        )  # fmt: skip
+        for k in range(size):
+            x[k] = start[k]
+        whole, none = part(v, at.jacobian, n * n), part(v, at.jacobian, 0)
+        write_jacobian(x, work, free[i], ACROSS_JUMPS, p, elements, whole, none)
+        for column in range(TUBES):
+            write_newton_matrix(jacobian, numbers_at(v, at.length)[0], newton)
+            for row in range(TUBES):
+                right[row] = 1.0 if row == column else 0.0
+            solve(newton, right, TUBES)
+            for row in range(TUBES):
+                relaxation[TUBES * row + column] = right[row]
+
+    return relax_tubes
+
+
+@law
+def write_newton_matrix(jacobian, h, newton):
+    """Write 1 - h/2 da/dv - h^2/4 da/dq E of a damper, by rows.
+
+    Args:
+        jacobian: Of the positions and velocities of its tubes, by rows.
+        h: Length of a step. [s]
+        newton: Written. (49,)
+    """
+    for row in range(TUBES):
+        a = 2 * TUBES * (TUBES + row)
+        for column in range(TUBES):
+            total = (1.0 if row == column else 0.0) - 0.5 * h * jacobian[a + TUBES + column]
+            for k in range(TUBES):
+                e = jacobian[2 * TUBES * k + TUBES + column]
+                total = total - 0.25 * h * h * jacobian[a + k] * e
+            newton[TUBES * row + column] = total
 
 
 def measurer(plan: Any) -> Any:

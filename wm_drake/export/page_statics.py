@@ -104,7 +104,7 @@ def body_changer(plan: Any) -> Any:
     return add_bodies
 
 
-def strut_placer(plan: Any) -> Any:
+def strut_placer(plan: Any, set_taut: Any) -> Any:
     """Return the function (v) that computes what follows from the ends of struts.
 
     These are drawn lengths and given preloads of springs, and the axes of dampers.
@@ -112,7 +112,6 @@ def strut_placer(plan: Any) -> Any:
     at, first, mounts, settles = plan.at, plan.count.numbers, plan.elements.mounts, plan.settles
     axis, length = FRICTION_DAMPER.offsets["axis"], SPRING.offsets["rest_length"]
     preload, kinds = SPRING.offsets["preload"], np.array([k % PUSHES for k in (*plan.springs, 0)])
-    set_taut = taut_setter(plan)
 
     @njit(**OPTIONS)
     def place_struts(v):
@@ -164,15 +163,15 @@ def taut_setter(plan: Any) -> Any:
     return set_taut
 
 
-def settler(plan: Any) -> Any:
+def settler(plan: Any, set_taut: Any) -> Any:
     """Return the function (v) that finds preloads and rest pose of the empty machine.
 
     It does what `wm_drake.model.equilibrium` does: preloads that balance the tub as drawn as well
     as they can, then the pose at which nothing remains, by Newton's method. It returns 0, or why
     there is no such pose.
     """
-    at, size, limits = plan.at, plan.elements.begins.size, plan.limits
-    preload_springs, newton_step = _preloads(plan), _newton_step(plan)
+    at, size, limits, on_tub = plan.at, plan.elements.begins.size, plan.limits, _on_tub(plan)
+    preload_springs, newton_step = _preloads(plan, set_taut, on_tub), _newton_step(plan, on_tub)
 
     @njit(**OPTIONS)
     def settle(v):
@@ -199,12 +198,12 @@ def settler(plan: Any) -> Any:
     return settle
 
 
-def _newton_step(plan: Any) -> Any:
+def _newton_step(plan: Any, on_tub: Any) -> Any:
     """Return the function (v) that moves the rest pose by a step.
 
     It returns 0 if the pose is one of rest, 1 after a step, -1 if there is none.
     """
-    at, on_tub = plan.at, _on_tub(plan)
+    at = plan.at
 
     @njit(**OPTIONS)
     def newton_step(v):
@@ -232,7 +231,7 @@ def _newton_step(plan: Any) -> Any:
     return newton_step
 
 
-def _preloads(plan: Any) -> Any:
+def _preloads(plan: Any, set_taut: Any, on_tub: Any) -> Any:
     """Return the function (v) that finds the preloads which balance the machine as drawn.
 
     They solve the normal equations of the least squares of force and moment.
@@ -242,7 +241,6 @@ def _preloads(plan: Any) -> Any:
     count, numbers = len(solved), np.array([*solved, 0])
     begins = np.array([*plan.elements.mounts.springs[solved], 0], dtype=np.int64)
     pushes = np.array([*(plan.springs[k] >= PUSHES for k in solved), False])
-    set_taut, on_tub = taut_setter(plan), _on_tub(plan)
 
     @njit(**OPTIONS)
     def preload_springs(v):

@@ -9,7 +9,7 @@ from typing import Any
 
 from wm_drake.compiler.kept import kept
 from wm_drake.engines.compiled.multistep import STEPS_BEFORE
-from wm_drake.engines.compiled.stepping import LARGEST_TURN
+from wm_drake.engines.compiled.stepping import LARGEST_TURN, LARGEST_TURN_OF_MIDPOINT
 from wm_drake.errors import input_error
 from wm_drake.export.page_contents import Contents
 from wm_drake.export.page_kernel import page_kernel
@@ -54,11 +54,17 @@ SOURCES = {
 }
 """Measures that the compiled machine has: name of the variable, array of a worker's answer and
 index in it, from the sensors or the points on."""
+LARGEST = 1e300
+"""In place of an infinite number, which JSON does not have."""
+LARGEST_TURNS = {
+    "multistep": LARGEST_TURN,
+    "midpoint": LARGEST_TURN_OF_MIDPOINT,
+    "runge_kutta": LARGEST,
+}
+"""Largest turn of the drum in a step, by integrator. [rad]"""
 NOT_HERE = ("loads.", "profile.", "step", "output_period")
 """Numbers that do not enter the packed numbers: the page changes loads and profile itself."""
 AS_EXPORTED = "it is that of the exported file"
-LARGEST = 1e300
-"""In place of an infinite number, which JSON does not have."""
 
 
 def page_data(parameters: MachineParameters) -> dict[str, Any]:
@@ -110,7 +116,7 @@ def _page_data(parameters: MachineParameters) -> dict[str, Any]:
                 "integrator": model.stepping.integrator,
                 "step": model.stepping.step,
                 "period": contents.period,
-                "largestTurn": LARGEST_TURN,
+                "largestTurn": LARGEST_TURNS[model.stepping.integrator],
                 "control": contents.layout.control_period,
                 "stepsBefore": STEPS_BEFORE,
             },

@@ -122,9 +122,9 @@ def _attachments(
                 bodies |= dict(zip(("outer", "inner"), tubes, strict=True))
             for end, body in bodies.items():
                 frame = getattr(element, f"{end}_frame", None)  # an element on the drum has none
-                is_shape = isinstance(element, Element) and frame.startswith(SHAPE)
-                if frame is not None and not is_shape:
-                    yield f"{section.key(name)}.{end}_frame", body, frame
+                if frame is None or (isinstance(element, Element) and frame.startswith(SHAPE)):
+                    continue
+                yield f"{section.key(name)}.{end}_frame", body, frame
     for table in ("sensors", "accelerometers"):
         for name, sensor in getattr(parameters, table).items():
             yield f"{table}.{name}.frame", "tub", sensor.frame

@@ -151,6 +151,12 @@ def linearised(setup: Setup, packed: FloatArray, layout: Layout, difference: flo
     return Linearised(of_states, kinds.treatment, cabinet)
 
 
+def slowest_state(setup: Setup, layout: Layout) -> FloatArray:
+    """Return the first state of `linearised`: the rest pose, with almost no speed. (size,)"""
+    state: FloatArray = _states(setup, _state_kinds(setup, layout))[0]
+    return state
+
+
 @dataclass(frozen=True)
 class StateKinds:
     """What the numbers of the state of a machine are.

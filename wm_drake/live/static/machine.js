@@ -72,7 +72,7 @@ export function scheduleOf({time: corners, speed}, {step, period, control, steps
 export function steppingOf({speed}, {step, largestTurn, integrator, ...rest}) {
   const fastest = Math.max(...speed.map(Math.abs));
   let length = step;
-  while (integrator === 'multistep' && fastest * length > largestTurn) length *= 0.5;
+  while (fastest * length > largestTurn) length *= 0.5;
   return {...rest, step: length, stepsBefore: integrator === 'multistep' ? rest.stepsBefore : -1};
 }
 
@@ -143,9 +143,11 @@ export class Machine {
     this.free = this.kept;
     const key = JSON.stringify(profile);
     if (key !== this.profile) {
-      this.schedule = scheduleOf(profile, steppingOf(profile, model.stepping));
+      this.stepping = steppingOf(profile, model.stepping);
+      this.schedule = scheduleOf(profile, this.stepping);
       this.profile = key;
     }
+    this.view(this.v, model.at.size)[model.at.length] = this.stepping.step;
     const s = this.schedule;
     const rows = s.time.length;
     const [motion, marks] = [this.put(s.motion), this.put(s.marks)];
