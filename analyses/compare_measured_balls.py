@@ -10,6 +10,8 @@ um, whose phase it does not print. The level left above the resonances follows f
 washers, also for those whose measured curves are not at hand:
 
     python analyses/compare_measured_balls.py --page docs/rotor-rig.md
+
+`--noise` prints how far measured points scatter from point to point, without a run.
 """
 
 import argparse
@@ -40,6 +42,8 @@ RANGES = {
 }
 BEARING = (3000.0, 3600.0)
 """Resonance of a bearing of the rig, which no rigid model has. [rpm]"""
+STILL = (400.0, 700.0), (4000.0, 5000.0)
+"""Speeds without a resonance, in which amplitudes follow a cubic. [rpm]"""
 RUNOUT = 5e-6
 """Eccentricity of the race, of the paper. [m]"""
 ROLLING = 1e-4
@@ -121,6 +125,22 @@ def left_at_full_speed(races: Sequence[str], stair: float) -> str:
     return table(["race", *(f"{n} washers, mm" for n in range(5))], rows)
 
 
+def noise(measured: pd.DataFrame) -> str:
+    """Return level of measured points and their scatter about a cubic over speed, as a table."""
+    rows = []
+    for way, points in measured.groupby("direction"):
+        for ends in STILL:
+            inside = points[points.speed_rpm.between(*ends)]
+            speed, size = inside.speed_rpm / 1e3, 1e3 * inside.A_max_mm
+            missed = size - np.polyval(np.polyfit(speed, size, 3), speed)
+            scatter = np.sqrt(np.sum(missed**2) / (len(inside) - 4))
+            numbers = size.median(), scatter, size.min()
+            span = f"{ends[0]:.0f} to {ends[1]:.0f}"
+            rows.append([way, span, str(len(inside)), *(f"{number:.1f}" for number in numbers)])
+    heads = ["points", "speed, rpm", "number", "median, um", "scatter, um", "smallest, um"]
+    return table(heads, rows)
+
+
 def rows_of(race: str, way: str, curve: pd.DataFrame, points: pd.DataFrame) -> list[list[str]]:
     """Return a row of the table for each range of speed."""
     rows = []
@@ -183,8 +203,12 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="few holds of one race")
     parser.add_argument("--out", type=Path, help="also write the table to this file")
     parser.add_argument("--page", type=Path, help="renew this page and its picture")
+    parser.add_argument("--noise", action="store_true", help="scatter of the measured points")
     arguments = parser.parse_args()
     measured = pd.read_csv(HERE / "rodrigues_2010_fig9.csv", comment="#")
+    if arguments.noise:
+        print(noise(measured))
+        return
     stair, races = (1000.0, [QUICK]) if arguments.quick else (10.0, list(RACES))
     curves = as_on_the_rig(races, stair)
     rows = [

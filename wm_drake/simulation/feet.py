@@ -1,5 +1,6 @@
 """Loads of the feet of the cabinet and margins against lift-off, sliding, turning and tilting."""
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -46,19 +47,41 @@ def cabinet_of(parameters: MachineParameters) -> Cabinet:
 
 @dataclass(frozen=True)
 class FootLoads:
-    """Loads and margins of the feet over time.
+    """Loads of the feet over time.
 
     Attributes:
         feet: Names of the feet, in the order of the columns.
-        normal, tangential: (n, 4) loads of each foot. [N]
-        margins: (n, 4) smallest normal load of the feet [N] and margins of sliding [N], turning
-            [N m] and tilting [N m].
+        total: (n, 6) load on all feet, as of `fixed_feet_history`. [N, N m]
+        of_feet: (n, 2, 4) normal and tangential load of each foot. [N]
+        packed: Numbers of `wm_drake.elements.feet`.
     """
 
     feet: tuple[str, ...]
-    normal: FloatArray
-    tangential: FloatArray
-    margins: FloatArray
+    total: FloatArray
+    of_feet: FloatArray
+    packed: FloatArray
+
+    @property
+    def normal(self) -> FloatArray:
+        """Return the normal load of each foot. (n, 4) [N]"""
+        return self.of_feet[:, 0]
+
+    @property
+    def tangential(self) -> FloatArray:
+        """Return the tangential load of each foot. (n, 4) [N]"""
+        return self.of_feet[:, 1]
+
+    @functools.cached_property
+    def margins(self) -> FloatArray:
+        """Return the margins of the feet.
+
+        Returns:
+            (n, 4) smallest normal load of the feet [N] and margins of sliding [N], turning [N m]
+            and tilting [N m].
+        """
+        margins = np.empty((len(self.total), len(MARGINS)))
+        foot_history(self.total, self.of_feet, self.packed, margins)
+        return margins
 
 
 def foot_loads(
@@ -68,7 +91,7 @@ def foot_loads(
     *,
     floor_forces: FloatArray | None = None,
 ) -> FootLoads:
-    """Return loads and margins of the feet over time.
+    """Return the loads of the feet over time.
 
     Args:
         gravity: [m/s^2]
@@ -78,10 +101,7 @@ def foot_loads(
             frame [N]; None for a fixed one, whose loads follow from statics.
     """
     p = packed_feet(cabinet, gravity)
-    loads, of_feet = _loads(p, wrenches, floor_forces)
-    margins = np.empty((len(loads), len(MARGINS)))
-    foot_history(loads, of_feet, p, margins)
-    return FootLoads(cabinet.corners, of_feet[:, 0], of_feet[:, 1], margins)
+    return FootLoads(cabinet.corners, *_loads(p, wrenches, floor_forces), p)
 
 
 def _loads(

@@ -1,5 +1,6 @@
 """Design of measurements on problems of known answer: variances in closed form, no machine runs."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -117,6 +118,19 @@ def test_curved_answer_is_judged_by_samples_that_keep_what_a_line_misses():
     explained = 1.0 - 2.0 * 0.36 / (1.0 + 2.0 * 0.36)
     assert model.explained[0] == pytest.approx(explained, abs=0.05)
     assert model.remaining([0]) == pytest.approx(1.0 - explained, abs=0.05)
+
+
+def test_wrong_slopes_never_widen_an_interval():
+    """Machines tell how far data go with the answer, also where the slopes are wrong."""
+    model = linear_model([1.0], [[2.0], [0.05], [0.0]], samples=400, bend=0.6)
+    wrong = replace(model, data_slopes=tuple(-5.0 * rows for rows in model.data_slopes[:2]))
+    wrong = replace(wrong, drawn_data=model.drawn_data[:2])
+    # data u + e / 2 hold 1 / (1 + 1/4) of the straight part of u + b (u^2 - 1)
+    straight = 1.0 / (1.0 + 2.0 * 0.36)
+    for one in (model, wrong):
+        assert not one.is_linear
+        assert one.remaining([0]) == pytest.approx(1.0 - 0.8 * straight, abs=0.06)
+        assert 1.0 - 0.03 < one.remaining([1]) <= 1.0
 
 
 class Bent(Question):

@@ -29,16 +29,18 @@ class Knowledge:
     """Uncertain numbers of a machine.
 
     Attributes:
-        machine: Built machine with the elements of all that `at` returns.
+        machine: Built machine with the elements of all that `machine_of` returns.
         names: Names of the quantities, one for each score.
-        at: Function of scores (p,) with the machine there. It raises an InputError if the numbers
-            are no machine.
+        values: Function of scores (k, p) with the values of the quantities (k, p). [SI]
+        machine_of: Function of values (p,) with the machine that has them. It raises an InputError
+            if they are no machine.
         about: Where this knowledge comes from, in words.
     """
 
     machine: Machine
     names: tuple[str, ...]
-    at: Callable[[FloatArray], MachineParameters]
+    values: Callable[[FloatArray], FloatArray]
+    machine_of: Callable[[FloatArray], MachineParameters]
     about: str
 
 
@@ -65,11 +67,11 @@ def of_tolerances(machine: Machine, uncertain: UncertainMachine, about: str) -> 
         factor = np.asarray(np.linalg.cholesky(correlation[np.ix_(kept, kept)]))
     joint = Joint(tuple(uncertain.joint.marginals[k] for k in kept), factor)
 
-    def at(scores: FloatArray) -> MachineParameters:
-        return apply(uncertain.parameters, variations, joint.values(scores[None])[0].tolist())
+    def machine_of(values: FloatArray) -> MachineParameters:
+        return apply(uncertain.parameters, variations, values.tolist())
 
     names = tuple(variation.name for variation in variations)
-    return Knowledge(machine, names, at, about)
+    return Knowledge(machine, names, joint.values, machine_of, about)
 
 
 def of_free_file(machine: Machine, path: Path) -> Knowledge:
@@ -88,11 +90,7 @@ def of_free_file(machine: Machine, path: Path) -> Knowledge:
         )
     )
 
-    def at(scores: FloatArray) -> MachineParameters:
-        return parameters.parameters_at(joint.values(scores[None])[0])
-
-    about = f"priors of {path.name}"
-    return Knowledge(build_machine(parameters.base), tuple(parameters.names), at, about)
+    return _of_map(parameters, joint.values, f"priors of {path.name}")
 
 
 def of_calibration(
@@ -109,12 +107,10 @@ def of_calibration(
     # numbers from a file are rounded, so that an eigenvalue of 0 may be a little below
     root = deviation[:, None] * directions * np.sqrt(np.maximum(sizes, 0.0))
 
-    def at(scores: FloatArray) -> MachineParameters:
-        moved = point + root @ scores
-        return parameters.parameters_at(np.clip(moved, parameters.lower, parameters.upper))
+    def values(scores: FloatArray) -> FloatArray:
+        return np.clip(point + scores @ root.T, parameters.lower, parameters.upper)
 
-    built = build_machine(parameters.base)
-    return Knowledge(built, tuple(parameters.names), at, "posterior of a calibration")
+    return _of_map(parameters, values, "posterior of a calibration")
 
 
 def of_calibration_folder(machine: Machine, free: Path, folder: Path) -> Knowledge:
@@ -149,6 +145,14 @@ def of_calibration_folder(machine: Machine, free: Path, folder: Path) -> Knowled
     point, deviation = (column / units for column in numbers.T)
     covariance = correlation * np.outer(deviation, deviation)
     return of_calibration(parameters, point, covariance)
+
+
+def _of_map(
+    parameters: ParameterMap, values: Callable[[FloatArray], FloatArray], about: str
+) -> Knowledge:
+    """Return what is known of the quantities of a free file."""
+    machine, names = build_machine(parameters.base), tuple(parameters.names)
+    return Knowledge(machine, names, values, parameters.parameters_at, about)
 
 
 def _map(machine: Machine, path: Path) -> ParameterMap:

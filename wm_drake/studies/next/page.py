@@ -11,10 +11,10 @@ from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.quantity import quantity_of
 from wm_drake.studies.answer import Answer, Part, Plot
 from wm_drake.studies.next.study import (
-    LEAST_GAIN,
     NEAR_LINEAR,
     SHARE,
     Model,
+    least_gain,
     pairs_of,
     sequence_of,
     singles_of,
@@ -80,7 +80,7 @@ def answer_text(steps: xr.Dataset) -> str:
     words = steps.words.values.tolist()[1:]
     now = " ".join(f"{_now(steps.sel(answer=name))}." for name in names)
     if not words:
-        return f"{now} No measurement of the file tells anything about it."
+        return f"{now} No measurement of the file certainly narrows it."
     first, *others = words
     then = [_then(steps.sel(answer=name), len(names) > 1) for name in names]
     taken = f"{first}, then {listed(others)}" if others else first
@@ -104,14 +104,21 @@ def _interval(one: xr.Dataset, step: int) -> str:
 
 
 def worthless_text(singles: xr.Dataset) -> str:
-    """Return which measurements are not worth making; "" if all are."""
-    useless = singles.candidate.values[(singles.gain < LEAST_GAIN).values].tolist()
-    useless = list(dict.fromkeys(text.partition(" (±")[0] for text in useless))
-    if not useless:
+    """Return which measurements are not worth making; "" if all are.
+
+    Of gains that come from drawn machines, those below twice their error are named.
+    """
+    is_sampled = bool(singles.error.any())
+    useless = singles.gain < least_gain(singles.error)
+    words = singles.candidate.values[useless.values].tolist()
+    words = list(dict.fromkeys(text.partition(" (±")[0] for text in words))
+    if not words:
         return ""
-    more = len(useless) - MOST_NAMED
-    named = useless if more <= 0 else [*useless[:MOST_NAMED], f"{more} more"]
-    return f"Not worth measuring: {', '.join(named)}."
+    more = len(words) - MOST_NAMED
+    named = ", ".join(words if more <= 0 else [*words[:MOST_NAMED], f"{more} more"])
+    if is_sampled:
+        return f"No gain that can be told from the scatter of the drawn machines: {named}."
+    return f"Not worth measuring: {named}."
 
 
 def _facts(model: Model) -> list[tuple[str, str]]:
@@ -121,8 +128,9 @@ def _facts(model: Model) -> list[tuple[str, str]]:
     how = (
         "so the intervals are those of the linear model, with the worst of all loads"
         if model.is_linear
-        else f"which is less than {SHARE.text(NEAR_LINEAR)}: the intervals are those of an "
-        "estimate by the linear model over the drawn machines; a fit can reach narrower ones"
+        else f"which is less than {SHARE.text(NEAR_LINEAR)}: the intervals follow from how well "
+        "the linear model guesses the answers of the drawn machines from their data; a fit can "
+        "reach narrower ones, and more machines (--samples) show smaller gains"
     )
     return [
         ("Linear model", f"explains {explained} over {len(model.drawn)} drawn machines, {how}"),
@@ -146,7 +154,8 @@ def _singles(singles: xr.Dataset) -> LabelledTable:
         singles,
         "Candidates",
         "Each measurement alone: half the width of the 95 % interval after it, by how much it is "
-        "narrower, the part of the variance that remains, and the gain per cost.",
+        "narrower, with the standard error of drawn machines, the part of the variance that "
+        "remains, and the gain per cost.",
         across="answer",
     )
 

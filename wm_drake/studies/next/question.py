@@ -70,9 +70,9 @@ class Question:
     def _machines(self, scores: FloatArray) -> dict[int, MachineParameters]:
         """Return the machines at scores by their places, without those that do not exist."""
         machines = dict[int, MachineParameters]()
-        for place, score in enumerate(scores):
+        for place, values in enumerate(self.knowledge.values(scores)):
             with contextlib.suppress(InputError):
-                machines[place] = self.knowledge.at(score)
+                machines[place] = self.knowledge.machine_of(values)
         return machines
 
     def _that_run(self, machines: Mapping[int, MachineParameters]) -> dict[int, MachineParameters]:

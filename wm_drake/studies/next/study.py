@@ -12,15 +12,17 @@ so that after the measurements of rows J_c the covariance of y is
 (Chaloner and Verdinelli, Statistical Science 10 (1995) 273-304, section 2: the expected variance of
 linear functions). G and J are central differences over a step of one deviation. An answer is the
 worst of several loads, thus not linear: its variance is that of the worst of y, over draws of
-N(y0, S). Where y and d themselves are not near linear, the same estimate y0 + K (d - d0) is applied
-to machines that are drawn and run, and the variance is that of what it misses; a fit that is not
-linear misses less. Derivation and limits: docs/theory/next.md.
+N(y0, S). Where y and d themselves are not near linear, machines are drawn and run, their answers
+are regressed on the worst of y0 + K (d - d0) of their own data, and the variance is that of what
+the regression misses; a fit that is not linear misses less. Derivation and limits:
+docs/theory/next.md.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -119,13 +121,41 @@ class Model:
         root = directions * np.sqrt(np.maximum(sizes, 0.0))
         return self.question.worst(self.middle + self._normal @ root.T)
 
+    def missed(self, chosen: Sequence[int]) -> FloatArray:
+        """Return what estimates from the data of drawn machines miss of the answers. (N, answers)
+
+        Each estimate is the line through the real answers over the worst of y0 + K (d - d0).
+        """
+        real = self.question.worst(self.drawn)
+        missed = real - real.mean(axis=0)
+        if not chosen:
+            return missed
+        data = np.hstack([self.drawn_data[k] for k in chosen])
+        guessed = self.question.worst(self.middle + data @ self._gain(chosen)[0].T)
+        guessed -= guessed.mean(axis=0)
+        size = np.maximum(np.sum(guessed**2, axis=0), np.finfo(float).tiny)
+        return np.asarray(missed - np.sum(guessed * missed, axis=0) / size * guessed)
+
     def sampled(self, chosen: Sequence[int]) -> FloatArray:
-        """Return the answers plus what the linear estimate misses of drawn machines. (N, a)"""
-        missed = self.drawn
-        if chosen:
-            data = np.hstack([self.drawn_data[k] for k in chosen])
-            missed = self.drawn - data @ self._gain(chosen)[0].T
-        return self.question.worst(missed)
+        """Return the answers of the drawn machines, drawn together as measurements do. (N, a)"""
+        real = self.question.worst(self.drawn)
+        mean = real.mean(axis=0)
+        share = np.mean(self.missed(chosen) ** 2, axis=0) / np.var(real, axis=0)
+        return np.asarray(mean + np.sqrt(share) * (real - mean))
+
+    def gain_error(self, chosen: Sequence[int], known: Sequence[int] = ()) -> float:
+        """Return the standard error, by the drawn machines, of a gain of the first answer.
+
+        Args:
+            chosen: Measurements.
+            known: Those of them that are made already.
+        """
+        if self.is_linear:
+            return 0.0
+        before, after = (self.missed(some)[:, 0] ** 2 for some in (known, chosen))
+        share = after.mean() / before.mean()
+        error = np.std(after - share * before) / (before.mean() * np.sqrt(len(before)))
+        return float(0.5 * error / np.sqrt(share))
 
     def after(self, chosen: Sequence[int]) -> FloatArray:
         """Return draws of the answers after measurements, by the method that holds. (k, a)"""
@@ -223,7 +253,10 @@ def _slopes(values: FloatArray) -> FloatArray:
 
 
 def sequence_of(model: Model, budget: int) -> list[int]:
-    """Return the measurements that a greedy search takes one after the other."""
+    """Return the measurements that a greedy search takes one after the other.
+
+    It ends where no gain can be told from the scatter of drawn machines.
+    """
     taken, measurements = list[int](), model.question.measurements
     for _ in range(budget):
         left = [
@@ -234,8 +267,17 @@ def sequence_of(model: Model, budget: int) -> list[int]:
         if not left:
             break
         remaining = [model.remaining([*taken, k]) for k in left]
-        taken.append(left[int(np.argmin(remaining))])
+        best = left[int(np.argmin(remaining))]
+        gain = 1.0 - np.sqrt(min(remaining) / model.remaining(taken))
+        if not model.is_linear and gain < least_gain(model.gain_error([*taken, best], taken)):
+            break
+        taken.append(best)
     return taken
+
+
+def least_gain(error: Any) -> Any:
+    """Return the gain from which a measurement is worth making, with the error of gains."""
+    return np.maximum(LEAST_GAIN, 2.0 * error)
 
 
 def singles_of(model: Model) -> xr.Dataset:
@@ -243,8 +285,9 @@ def singles_of(model: Model) -> xr.Dataset:
 
     Returns:
         Over `candidate`, in words: its `name` in the file; `gain`, the part by which the interval
-        of the first answer becomes narrower; `remaining`, the part of the variance that remains;
-        `cost`, and `gain_per_cost`. Over `answer` too `half_width` of the interval of 95 %.
+        of the first answer becomes narrower, and its standard `error` by the drawn machines, 0 if
+        the linear model is used; `remaining`, the part of the variance that remains; `cost`, and
+        `gain_per_cost`. Over `answer` too `half_width` of the interval of 95 %.
     """
     measurements = model.question.measurements
     every = [[k] for k in range(len(measurements))]
@@ -255,6 +298,7 @@ def singles_of(model: Model) -> xr.Dataset:
     order = np.argsort(remaining, kind="stable")
     costs = np.array([m.cost for m in measurements])
     gain = 1.0 - widths[:, 0] / before[0]
+    error = [model.gain_error(chosen) for chosen in every]
     of_answer = quantities_of(model.question)
     width = Quantity("± after").of_each("answer", of_answer, ("candidate", "answer"), widths)
     data = xr.Dataset(
@@ -262,6 +306,7 @@ def singles_of(model: Model) -> xr.Dataset:
             "name": ("candidate", [m.name for m in measurements], {HIDDEN: True}),
             "half_width": width,
             "gain": SHARE.named("narrower by").variable("candidate", gain),
+            "error": SHARE.named("± by sampling").variable("candidate", error),
             "remaining": SHARE.named("variance that remains").variable("candidate", remaining),
             "cost": COST.variable("candidate", costs),
             "gain_per_cost": SHARE.named("narrower per cost").variable("candidate", gain / costs),

@@ -185,14 +185,14 @@ def question_of(
         cases: Case of each load of the answers; their profile is that of all runs.
     """
     parameters = knowledge.machine.parameters
-    needed = {*measures_of(parameters, answers), "amplitudes"}
-    measures = tuple(name for name in MEASURES if name in needed)
+    read = {"amplitudes"}  # by sensors; the answers are those with the gasket
+    needed = {True: {*measures_of(parameters, answers), *read}, False: read}
     loads = tuple(case.name for case in cases)
     runs = dict.fromkeys([*((load, True) for load in loads), *(m.run for m in measurements)])
     experiments = {
         gasket: Experiment(
             knowledge.machine,
-            measures,
+            tuple(name for name in MEASURES if name in needed[gasket]),
             executor.simulate,
             tuple(
                 Case(run[0], parameters.loads[run[0]], cases[0].profile, gasket)
