@@ -121,19 +121,21 @@ def prepare(folder, page, chosen):
 
 
 def write_runs(folder, page):
-    """Write three recordings of the test that a page declares, with gains that scatter by 1 %."""
+    """Write four recordings of the test that a page declares, with gains that scatter by 1 %.
+
+    Three are of its own load, one of another.
+    """
     from lab_writers import write_mdf
 
     block = next(block for block in blocks_of(page) if block.language == "yaml")
     (folder / "test.yaml").write_text("\n".join(block.lines) + "\n", encoding="utf-8")
     test, machine = load_recorded_test(folder / "test.yaml"), build_machine(load_machine())
-    record = simulate(machine, test.load)
-    time, angle = record.time.values, record.drum_angle.values
-    fine = np.arange(0.0, time[-1], 2.5e-4)
-    turns = test.speed.pulses_per_turn * test.speed.ratio * np.interp(fine, time, angle)
-    points = sensor_points(machine, test)
-    generator = np.random.default_rng(1)
-    for number in (1, 2, 3):
+    points, generator = sensor_points(machine, test), np.random.default_rng(1)
+    records = {load: simulate(machine, load) for load in (test.load, "counter")}
+    for number, record in enumerate([records[test.load]] * 3 + [records["counter"]], 1):
+        time, angle = record.time.values, record.drum_angle.values
+        fine = np.arange(0.0, time[-1], 2.5e-4)
+        turns = test.speed.pulses_per_turn * test.speed.ratio * np.interp(fine, time, angle)
         channels = {"Tacho": (5.0 * (np.sin(turns) > 0.0), "V")}
         for name, sensor in test.sensors.items():
             signal = recorded_signal(record, sensor, points[name])
