@@ -82,20 +82,21 @@ def peak_mb() -> float:
 
 
 def measured(place: str, count: int) -> dict[str, float]:
-    """Return time per run [ms] and growth of the memory [MB] of a batch, from a new process."""
+    """Return times per run [ms] and growth of the memory [MB] of a batch, from a new process."""
     command = [sys.executable, __file__, "--place", place, "--count", str(count)]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     return dict(json.loads(done.stdout.splitlines()[-1]))
 
 
 def measure_here(place: str, count: int) -> None:
-    """Print time per run and growth of the memory of a batch in this process."""
+    """Print times per run and growth of the memory of a batch in this process."""
     with growing(place) as run:
         run(min(WARM, count // 2))
-        before, begin = peak_mb(), time.perf_counter()
+        before, begin, used = peak_mb(), time.perf_counter(), time.process_time()
         run(count)
-        spent = time.perf_counter() - begin
-    print(json.dumps({"ms": 1e3 * spent / count, "mb": peak_mb() - before}))
+        spent, used = time.perf_counter() - begin, time.process_time() - used
+    each = 1e3 / count
+    print(json.dumps({"ms": each * spent, "cpu_ms": each * used, "mb": peak_mb() - before}))
 
 
 def figure(sizes: tuple[int, ...], found: dict[str, list[dict[str, float]]]) -> Figure:
@@ -131,8 +132,11 @@ def main() -> None:
     for place, rows in found.items():
         for count in sizes:
             rows.append(measured(place, count))
-            spent, more = rows[-1]["ms"], rows[-1]["mb"]
-            lines.append(f"{place}, {count} runs: {spent:.2f} ms a run, {more:.0f} MB more")
+            spent, used, more = (rows[-1][name] for name in ("ms", "cpu_ms", "mb"))
+            lines.append(
+                f"{place}, {count} runs: {spent:.2f} ms a run, {used:.2f} ms of processor time in "
+                f"the process that asks, {more:.0f} MB more"
+            )
             print(lines[-1], file=sys.stderr)
     text = "\n".join(lines)
     print(text)

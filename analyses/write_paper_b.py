@@ -62,6 +62,8 @@ FREE_DAMPING = {
     },
 }
 """Free quantities of the search of the damping."""
+SPONGE = {"sponge", "sponge_stiffness"}
+"""Fields of a damper law with a sponge: its curve or its stiffness."""
 
 
 def amplitudes_of(machine: MachineParameters) -> Amplitudes:
@@ -117,7 +119,7 @@ def sponge_line(machines: dict[str, MachineParameters]) -> list[str]:
     cells = []
     for machine in machines.values():
         laws = {damper.law: damper for damper in machine.damper_types.values()}
-        has_sponge = all(hasattr(damper, "sponge_stiffness") for damper in laws.values())
+        has_sponge = all(SPONGE & type(damper).model_fields.keys() for damper in laws.values())
         cells.append(f"{HOLDS if has_sponge else FAILS}: {', '.join(laws)}")
     words = "3: the model of the dampers considers the friction sponge"
     return [words, "nonlinear, from its reference 27", *cells]
@@ -290,7 +292,7 @@ def main() -> None:
         "python analyses/write_paper_b.py --page docs/paper-b.md",
         [
             f"Tables 4 and 5: `wm-drake study gasket --design orthogonal --trials {trials} "
-            "--tables linear`,\n  as in [B], where nothing else is said."
+            "--tables linear`, as in [B], where nothing else is said."
         ],
     )
     text = origin + short + amplitude_text(machines, arguments.quick) + study

@@ -36,6 +36,11 @@ def pytest_configure():
     threadpool_limits(1, "blas")  # of this process, which has numpy already
 
 
+def pytest_collection_modifyitems(items):
+    """Begin with the longest test: at the end, it would keep one of two workers waiting."""
+    items.sort(key=lambda item: item.name != "test_each_command_runs_from_an_empty_folder")
+
+
 @pytest.fixture(scope="session")
 def reference():
     """Return the shipped reference machine; it is frozen, so tests may share it."""

@@ -140,18 +140,20 @@ KINDS = {
 }  # fmt: skip
 
 
-def write_page(name: str, folder: Path) -> Path:
+def write_page(name: str, folder: Path, *more: str) -> Path:
     """Run the commands of a kind of page in a folder, and return the page.
 
     Args:
         name: Name in `KINDS`.
         folder: Empty folder.
+        more: More words of the last command.
     """
     kind = KINDS[name]
     _write_inputs(folder)
     with contextlib.chdir(folder):
         for command in kind.commands:
-            _run([*_with_files(command, folder), "--quiet"])
+            added = more if command is kind.commands[-1] else ()
+            _run([*_with_files(command, folder), "--quiet", *added])
     return folder / "out" / kind.page
 
 

@@ -76,6 +76,7 @@ FILES = {  # what a block with a file is called in the commands of its page
         "four_springs.yaml",
         "imperfect.yaml",
         "with_buffer.yaml",
+        "bare_parts.yaml",
     ],
     "docs/how-to/rubber.md": ["rubber.yaml"],
     "docs/how-to/tolerances.md": ["mine.yaml", "limits.yaml"],

@@ -105,42 +105,60 @@ def test_package_and_bodies_come_from_the_wheel(python, tmp_path):
 
 
 EACH_COMMAND = """
-wm-drake machine list --json
-wm-drake machine schema file
-wm-drake machine new mine --tub-mass '40 kg' --springs 2
-wm-drake machine check mine.yaml
-wm-drake machine show mine.yaml
-wm-drake rig damper --component mstv_damper -f '1,5 Hz' -a '0.3,1 mm' --out damper
-wm-drake identify damper damper/loop_*.csv --law mstv --quick --out damper_fit
-wm-drake rig bushing --machine free_stroke --axis axial -f '1,5 Hz' -a '0.4 mm' --out bushing
-wm-drake identify bushing bushing/loop_*.csv --machine free_stroke --axis axial --law voigt --out bushing_fit
-wm-drake rig gasket --axis axial -f '1,5 Hz' -a '1 mm' --out ring
-wm-drake identify gasket ring/loop_*.csv --axis axial --law voigt --out ring_fit
-wm-drake gasket curves folded --points 2 --elements 6 --around 3 --axial '1 mm' --radial '1 mm' --tilt '1 deg' --twist '1 deg' --out curves
-wm-drake spin --load middle --out spin
-wm-drake record channels spin/record_middle.nc
-wm-drake record orders spin/record_middle.nc --out orders
-wm-drake record compare spin/record_middle.nc --load middle --channels 'Xr=displacement(Xr)' --out compare
-wm-drake calibrate spin/record_middle.nc --load middle --channels 'Xr=displacement(Xr)' --unknown 'damper_types.friction.friction_force=(30, 40) N' --quick --out record_calibrate
-wm-drake calibrate --machine short.yaml --free free.yaml --targets measured.csv --quick --out calibrate
-wm-drake verdict short.yaml --samples 16 --out verdict
-wm-drake export fmu --load middle --out machine.fmu
-wm-drake export page --load middle --out machine.html
-wm-drake study balancer --quick --place '0 mm' --damping '100 %' --release '80 rpm' --to '110 rpm' --rate '80 rpm/s' --out balancer
-wm-drake study cycle --profile short_cycle.yaml --out cycle
-wm-drake study design gasket --quick --profile short_cycle.yaml --out design
-wm-drake study drive --quick --load middle --out drive
-wm-drake study gasket --quick --response D --profile short_cycle.yaml --out gasket
-wm-drake study gasket-damping --mesh 20 --record middle=spin/record_middle.nc --out gasket_damping
-wm-drake study gasket-geometry --quick --profile short_cycle.yaml --out gasket_geometry
-wm-drake study modes --quick --out modes
-wm-drake study next short.yaml --quick --free free.yaml --out next
-wm-drake study response --quick --load middle --out response
-wm-drake study spin-cycle --quick --profile eight_regions.yaml --out spin_cycle
-wm-drake study spin-identify --quick --case 2 --unknown 'gasket.stiffness_y=(1, 4) N/mm' --profile short_cycle.yaml --out spin_identify
-wm-drake study tolerance laundry --samples 32 --subset 0 --profile short_cycle.yaml --out tolerance
-wm-drake studio --no-browser > studio.txt & until grep -q http studio.txt; do kill -0 $!; sleep 1; done; kill $!; wait $! || test $? = 143
+machine list --json
+machine schema file
+machine new mine --tub-mass '40 kg' --springs 2
+machine check mine.yaml
+machine show mine.yaml
+rig damper --component mstv_damper -f '1,5 Hz' -a '0.3,1 mm' --out damper
+identify damper damper/loop_*.csv --law mstv --quick --out damper_fit
+rig bushing --machine free_stroke --axis axial -f '1,5 Hz' -a '0.4 mm' --out bushing
+identify bushing bushing/loop_*.csv --machine free_stroke --axis axial --law voigt --out bushing_fit
+rig gasket --axis axial -f '1,5 Hz' -a '1 mm' --out ring
+identify gasket ring/loop_*.csv --axis axial --law voigt --out ring_fit
+gasket curves folded --points 2 --elements 6 --around 3 --axial '1 mm' --radial '1 mm' --tilt '1 deg' --twist '1 deg' --out curves
+spin --load middle --out spin
+record channels spin/record_middle.nc
+record orders spin/record_middle.nc --out orders
+record compare spin/record_middle.nc --load middle --channels 'Xr=displacement(Xr)' --out compare
+calibrate spin/record_middle.nc --load middle --channels 'Xr=displacement(Xr)' --unknown 'damper_types.friction.friction_force=(30, 40) N' --quick --out record_calibrate
+calibrate --machine short.yaml --free free.yaml --targets measured.csv --quick --out calibrate
+verdict short.yaml --samples 16 --out verdict
+export fmu --load middle --out machine.fmu
+export page --load middle --out machine.html
+study balancer --quick --place '0 mm' --damping '100 %' --release '80 rpm' --to '110 rpm' --rate '80 rpm/s' --out balancer
+study cycle --profile short_cycle.yaml --out cycle
+study design gasket --quick --profile short_cycle.yaml --out design
+study drive --quick --load middle --out drive
+study gasket --quick --response D --profile short_cycle.yaml --out gasket
+study gasket-damping --mesh 20 --record middle=spin/record_middle.nc --out gasket_damping
+study gasket-geometry --quick --profile short_cycle.yaml --out gasket_geometry
+study modes --quick --out modes
+study next short.yaml --quick --free free.yaml --out next
+study response --quick --load middle --out response
+study spin-cycle --quick --profile eight_regions.yaml --out spin_cycle
+study spin-identify --quick --case 2 --unknown 'gasket.stiffness_y=(1, 4) N/mm' --profile short_cycle.yaml --out spin_identify
+study tolerance laundry --samples 32 --subset 0 --profile short_cycle.yaml --out tolerance
 """  # fmt: skip
+STUDIO = (
+    "wm-drake studio --no-browser > studio.txt & "
+    "until grep -q http studio.txt; do kill -0 $!; sleep 1; done; kill $!; wait $! || test $? = 143"
+)
+IN_ONE_PROCESS = """
+import glob, shlex, sys
+from wm_drake.cli import main
+
+for line in sys.argv[1].split("\\n"):
+    print(line, file=sys.stderr)
+    words = [sorted(glob.glob(word)) if "*" in word else [word] for word in shlex.split(line)]
+    sys.argv = ["wm-drake", *sum(words, [])]
+    try:
+        main()
+    except SystemExit as end:
+        if end.code:
+            raise
+"""
+"""Imports take most of the time of a command."""
 
 
 def names_of_commands(group, words=()):
@@ -154,7 +172,9 @@ def names_of_commands(group, words=()):
 
 def test_each_command_runs_from_an_empty_folder(python, tmp_path, monkeypatch):
     names = set(names_of_commands(get_command(app)))
-    assert {name for name in names if f"\nwm-drake {name} " in EACH_COMMAND} == names
+    run_here = {name for name in names if f"\n{name} " in f"\n{EACH_COMMAND}"}
+    assert run_here == names - {"studio"}
     write_inputs_of_studies(tmp_path)
+    run(python, "-c", IN_ONE_PROCESS, EACH_COMMAND.strip(), cwd=tmp_path)
     monkeypatch.setenv("PATH", str(python.parent), prepend=os.pathsep)
-    run("bash", "-euxc", EACH_COMMAND, cwd=tmp_path)
+    run("bash", "-euxc", STUDIO, cwd=tmp_path)

@@ -172,6 +172,7 @@ MACHINES = [  # page, index of the block, a number in it by key path
     (page("own-machine"), 1, "spring_types.suspension.stiffness", None),
     (page("own-machine"), 2, "imperfections.residual_imbalance.mass", 0.02),
     (page("own-machine"), 3, "elements.left_buffer.loss", 0.4),
+    (page("own-machine"), 4, "elements.shell_and_box.loss", None),
     (page("balancers"), 0, "elements.front_ring.fill", 0.6),
     (page("compliant-bearing"), 0, "imperfections.bearing.y", None),
     (page("compliant-bearing"), 1, "imperfections.bearing.clearance", 1e-4),

@@ -9,13 +9,15 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from calibrate_reference import PLAN, REFERENCE, adams_targets
+from choose_damper_law import FREE
 
 from analysis_tools.goals import changes_of, printed_changes
 from analysis_tools.steady_net import SteadyNet
 from wm_drake.batch.ledger import open_ledger
+from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import load_machine
-from wm_drake.parameters.free import FreeFile
+from wm_drake.parameters.free import FreeFile, load_free
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.calibrate.computed import Evaluation
 from wm_drake.studies.calibrate.parameter_map import ParameterMap, parameter_map_of
@@ -104,6 +106,23 @@ def _with_changes(
 
     changes = Measurement("changes", np.zeros(printed.size), errors="known")
     return replace(problem, measurements=(*problem.measurements, changes), evaluate=evaluate)
+
+
+def shipped_point(parameter_map: ParameterMap) -> FloatArray:
+    """Return the free quantities of the shipped machine, with its gasket alike in x and z.
+
+    Args:
+        parameter_map: That of a free file of the net. A quantity that the file of the shipped
+            machine does not have is at its expected value, as the numbers of another damper law.
+
+    Returns:
+        (quantity,) [SI]
+    """
+    shipped = parameter_map_of(build_machine(load_machine(REFERENCE)), load_free(FREE))
+    values = dict(zip(shipped.names, shipped.start.tolist(), strict=True))
+    values["gasket_vertical"] = values["gasket_radial"]
+    pairs = zip(parameter_map.names, parameter_map.expected.tolist(), strict=True)
+    return np.array([values.get(name, expected) for name, expected in pairs])
 
 
 def _report(evaluations: int, least: float) -> None:

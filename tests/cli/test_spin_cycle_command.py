@@ -91,6 +91,8 @@ def test_second_time_nothing_is_run_and_its_own_table_is_a_perfect_measurement(s
     shown = json.loads(again.out)
     assert shown["rms"] == first["rms"]
     assert max(region["mean_error_percent"] for region in shown["regions"]) < 1e-3
+    assert pd.read_csv("out/measured.csv").equals(pd.read_csv("out/rms.csv"))
+    assert "measured" not in first
 
 
 def test_drakes_engine_runs_a_case_too(study):

@@ -17,6 +17,7 @@ from wm_drake.elements.layouts import packed_stiffness
 from wm_drake.elements.stop import NUMBERS, STOP, Stop
 from wm_drake.laws.stop import rubbing_force, stop_force
 from wm_drake.model.build import build_machine
+from wm_drake.model.scene import Scene
 from wm_drake.parameters import MachineParameters, SpinProfile, load_machine
 from wm_drake.parameters.elements import ForceTable
 from wm_drake.simulation.cases import Case
@@ -147,6 +148,23 @@ def test_both_engines_agree_at_random_states():
     assert difference(build_machine(with_stop())) < 1e-10
 
 
+SHAPES = {"tub_frame": "shape tub_shell", "housing_frame": "shape detergent_box", "gap": None}
+
+
+def test_bare_shapes_touch_where_their_distance_is_zero():
+    machine = build_machine(with_stop(**SHAPES))
+    placed, scene = machine.set_up().elements.others["left"], Scene(machine.parameters)
+    numbers = NUMBERS.read(placed.packed(), 0)
+    axis, point = np.array(numbers.axis), np.array(numbers.point)
+    for moved in (0.0, 0.01, 0.02):
+        pose = np.concatenate([np.zeros(3), -moved * axis])
+        distance, _ = scene.nearest_points(pose, "tub_shell", "detergent_box")
+        compression = numbers.reach - axis @ (pose[3:] + point)
+        assert distance == pytest.approx(-compression, abs=2e-6)
+    assert distance < 0.025
+    assert difference(machine) < 1e-10
+
+
 @pytest.mark.slow
 def test_both_engines_move_alike():
     machine = build_machine(with_stop())
@@ -220,6 +238,12 @@ def test_energy_balances():
             "elements.left.*: the first point of the table must be 0 N at 0 mm",
         ),
         ("loss", "los", "unknown key 'los'.*loss"),
+        ("damper_left_tub", "shape tub_shell", "elements.left: .* a shape and a frame"),
+        (
+            f"{FRAMES['tub_frame']}\n    housing_frame: {FRAMES['housing_frame']}",
+            "shape tub_shell\n    housing_frame: shape box",
+            "elements.left: no pair of shapes 'tub_shell|box'",
+        ),
     ],
 )
 def test_errors_of_a_machine_file_name_the_key(old, new, message, tmp_path, wm_drake):

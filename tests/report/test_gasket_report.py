@@ -174,8 +174,9 @@ def test_factor_table_has_every_level_and_its_unit(trials, words):
     rows = factors_table(trials, words).frame().set_index("key")
     for factor in trials.factors:
         for key, numbers in factor.numbers.items():
-            assert rows.loc[key, "unit"] == factor.units[key]
-            assert rows.loc[key, ["-1", "0", "1"]].tolist() == pytest.approx(list(numbers))
+            assert rows.loc[key, "unit"] == factor.units[key].label
+            levels = [factor.units[key].from_si(number) for number in numbers]
+            assert rows.loc[key, ["-1", "0", "1"]].tolist() == pytest.approx(levels)
 
 
 @pytest.mark.parametrize("model", ["main", "main+2fi"])

@@ -3,12 +3,12 @@
 import pytest
 import xarray as xr
 
+from wm_drake.parameters.reading import US, read_in
 from wm_drake.parameters.units import Unit
 from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.quantity import SPEED, Quantity
-from wm_drake.report.reading import US, read_in
 from wm_drake.studies.answer import Answer, Part
-from wm_drake.studies.study import SI_ONLY, STUDIES, Facts
+from wm_drake.studies.study import Facts
 
 LENGTH = Quantity("gap", Unit("m", "mm"), 1)
 CASES = [
@@ -50,14 +50,3 @@ def test_an_answer_keeps_the_units_in_which_it_was_made():
     assert made.as_json()["gaps"] == [{"run": "a", "gap_in": pytest.approx(1.0)}]
     assert "1.000" in shown_by(made)
     assert "25.4" in shown_by(made_in_si)
-
-
-def test_commands_without_quantities_refuse_other_units(wm_drake):
-    ended = wm_drake("spin", "--units", "us")
-    assert (ended.code, ended.out) == (2, "")
-    assert "--units: 'spin' has no other units than si" in ended.err
-
-
-def test_studies_that_show_si_only_exist():
-    known = {study.command for study in STUDIES.values()}
-    assert {name for name in SI_ONLY if not name.startswith(("rig", "identify"))} <= known

@@ -142,53 +142,11 @@ class Runner:
         schedule = schedule_of(
             key.profile, key.stepping.step, key.period, key.layout.control_period
         )
-        one_derivative = key.stepping.one_derivative(schedule)
-        # without amplitudes only the detergent point is followed, which comes last
-        first = 0 if "sensors" in self.needs else -3 * POINT_SIZE
-        points = [item.numbers.points[first:] for item in work_items]
-        rows, count = len(schedule.time), len(points[0]) // POINT_SIZE
-        size = len(work_items[0].begin) + key.layout.states.begins.rates
-        p = self._lanes("packed", [item.packed for item in work_items])
-        x = self._lanes("begin", [item.begin for item in work_items])
-        samples = self._array("samples", rows * size)
-        relaxation = None
-        if key.stepping.integrator == "midpoint":
-            matrices = [item.numbers.stepping.relaxation for item in work_items]
-            relaxation = self._lanes("relaxation", matrices)
-        lanes = RunLanes(p, x, samples, relaxation)
-        for done in integrate_runs(schedule, one_derivative, key.layout, lanes):
-            if self.stopped.is_set():
-                return []
-            progress(done)
-        moved, extremes = self._array("moved", count * rows), self._array("extremes", count + 7)
-        springs = key.layout.mounts.springs if "springs" in self.needs else _NONE
-        lengths = self._array("spring lengths", len(springs))
-        measure_samples_lanes(
-            samples,
-            rows,
-            size,
-            (LARGEST_ANGLE, LARGEST_DISPLACEMENT),
-            p,
-            key.layout.gasket,
-            key.layout.mounts.branches,
-            self._lanes("points", points),
-            count,
-            springs,
-            moved,
-            extremes,
-            lengths,
-        )
-        by_point = moved.reshape(count, rows, WIDTH)
-        filtered = self._filtered(by_point, extremes[-WIDTH:], key)
-        arrays = (
-            samples.reshape(rows, size, WIDTH),
-            by_point.transpose(1, 0, 2),
-            extremes.reshape(-1, WIDTH),
-            *self._forces_of_mounts(key, samples, rows, size, p),
-            lengths.reshape(-1, WIDTH),
-            filtered.transpose(1, 0, 2),
-            *_peaks(filtered),
-        )
+        packed = self._lanes("packed", [item.packed for item in work_items])
+        samples = self._samples(key, schedule, work_items, packed, progress)
+        if samples is None:
+            return []
+        arrays = self._measured(key, work_items, packed, samples)
         paths: list[Path | None] = [None] * len(work_items)
         if "shapes" in self.needs:
             good = arrays[2][-1, : len(work_items)].astype(int).tolist()
@@ -200,6 +158,78 @@ class Runner:
         ]
         blocks = [measure.evaluate(runs) for measure in self.measures]
         return [self._result(run, lane, blocks) for lane, run in enumerate(runs)]
+
+    def _samples(
+        self,
+        key: BatchKey,
+        schedule: Schedule,
+        work_items: list[WorkItem],
+        packed: FloatArray,
+        progress: Callable[[float], None],
+    ) -> FloatArray | None:
+        """Return the samples of runs side by side (rows, state and rates, lanes).
+
+        Args:
+            key, work_items, progress: As for `run`.
+            schedule: Steps of the runs.
+            packed: Packed numbers of all lanes.
+
+        Returns:
+            None if `stopped` was set meanwhile.
+        """
+        rows = len(schedule.time)
+        size = len(work_items[0].begin) + key.layout.states.begins.rates
+        state = self._lanes("begin", [item.begin for item in work_items])
+        samples = self._array("samples", rows * size)
+        relaxation = None
+        if key.stepping.integrator == "midpoint":
+            matrices = [item.numbers.stepping.relaxation for item in work_items]
+            relaxation = self._lanes("relaxation", matrices)
+        lanes = RunLanes(packed, state, samples, relaxation)
+        one_derivative = key.stepping.one_derivative(schedule)
+        for done in integrate_runs(schedule, one_derivative, key.layout, lanes):
+            if self.stopped.is_set():
+                return None
+            progress(done)
+        return samples.reshape(rows, size, WIDTH)
+
+    def _measured(
+        self, key: BatchKey, work_items: list[WorkItem], packed: FloatArray, samples: FloatArray
+    ) -> tuple[np.ndarray, ...]:
+        """Return the arrays of `Lane` of runs side by side, lanes last."""
+        # without amplitudes only the detergent point is followed, which comes last
+        first = 0 if "sensors" in self.needs else -3 * POINT_SIZE
+        points = [item.numbers.points[first:] for item in work_items]
+        rows, size, count = *samples.shape[:2], len(points[0]) // POINT_SIZE
+        moved, extremes = self._array("moved", count * rows), self._array("extremes", count + 7)
+        springs = key.layout.mounts.springs if "springs" in self.needs else _NONE
+        lengths = self._array("spring lengths", len(springs))
+        measure_samples_lanes(
+            samples.ravel(),
+            rows,
+            size,
+            (LARGEST_ANGLE, LARGEST_DISPLACEMENT),
+            packed,
+            key.layout.gasket,
+            key.layout.mounts.branches,
+            self._lanes("points", points),
+            count,
+            springs,
+            moved,
+            extremes,
+            lengths,
+        )
+        by_point = moved.reshape(count, rows, WIDTH)
+        filtered = self._filtered(by_point, extremes[-WIDTH:], key)
+        return (
+            samples,
+            by_point.transpose(1, 0, 2),
+            extremes.reshape(-1, WIDTH),
+            *self._forces_of_mounts(key, samples.ravel(), rows, size, packed),
+            lengths.reshape(-1, WIDTH),
+            filtered.transpose(1, 0, 2),
+            *_peaks(filtered),
+        )
 
     def _filtered(self, moved: FloatArray, good: FloatArray, key: BatchKey) -> FloatArray:
         """Return the filtered displacements at the sensors of runs side by side, if needed.

@@ -43,7 +43,8 @@ class Stop(Element):
     """A rubber buffer on the housing that a point of the tub may touch.
 
     Attributes:
-        gap: Distance of the point of the tub from the face of the buffer, as drawn.
+        gap: Distance of the point of the tub from the face of the buffer, as drawn; None for that
+            of the two ends: the bare parts touch.
         stiffness: Force over compression. A table makes a progressive buffer; it has its first
             point at 0.
         loss: Loss over the velocity of compression. A body that comes with a small velocity v
@@ -52,7 +53,7 @@ class Stop(Element):
         full_friction_velocity: Velocity along the face at which friction is 71 % of its full value.
     """
 
-    gap: Annotated[u.Length, Field(ge=0.0)]
+    gap: Annotated[u.Length, Field(ge=0.0)] | None = None
     stiffness: Stiffness
     loss: Annotated[float, Unit("s/m", "s/m"), Field(ge=0.0)] = 0.0
     friction: Annotated[u.Ratio, Field(ge=0.0)] = 0.0
@@ -107,14 +108,15 @@ def numbers_of(parameters: Stop, ends: Ends) -> Mapping[str, Any]:
     """
     line = ends.tub_point - ends.housing_point
     length = float(np.linalg.norm(line))
-    if length <= parameters.gap:
+    gap = length if parameters.gap is None else parameters.gap
+    if gap >= length and parameters.gap is not None:
         text = "must be smaller than the distance of the two frames as drawn"
         raise input_error(f"{text}, {1e3 * length:.4g} mm", key="gap")
     axis = line / length
     return {
         "point": ends.tub_point,
         "axis": axis,
-        "reach": float(axis @ ends.tub_point) - parameters.gap,
+        "reach": float(axis @ ends.tub_point) - gap,
         "loss": parameters.loss,
         "friction": parameters.friction,
         "full_friction": parameters.full_friction_velocity,

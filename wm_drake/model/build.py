@@ -1,12 +1,12 @@
 """Add a machine to a diagram, or build a diagram of it alone."""
 
 from pathlib import Path
-from typing import Any, NoReturn, TypeAlias, TypeVar
+from typing import Any, NamedTuple, NoReturn, TypeAlias, TypeVar
 
 import numpy as np
 from pydrake.geometry import Meshcat
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import DiagramBuilder, OutputPort
+from pydrake.systems.framework import DiagramBuilder, InputPort, OutputPort
 
 from wm_drake.elements.cabinet import FEET, FEET_SIZE, SLIP_SIZE
 from wm_drake.elements.motor import DRUM_FRICTION, packed_controller, packed_friction, packed_limit
@@ -89,25 +89,15 @@ def add_washing_machine(
     profile = wiring.add("spin_profile", SpinProfileSource(parameters.profile))
     source, motor = None, None
     if drive and friction:
-        motor, torque = _add_motor(wiring, drive, profile, sensors, friction)
-        inputs = {
-            "drum_speed_reference": motor.controller.GetInputPort("speed_reference"),
-            "drum_torque": motor.belt.GetInputPort("given_torque"),
-        }
+        motor, driven = _add_motor(wiring, drive, profile, sensors, friction)
     else:
-        source, torque = _add_speed_source(wiring, profile)
-        inputs = {"drum_acceleration": source.GetInputPort("drum_acceleration")}
-    inputs["tub_force"] = tub_force.GetInputPort("tub_force")
+        source, driven = _add_speed_source(wiring, profile)
     outputs = {"state": plant.get_state_output_port()}
     for port in ("displacement", "detergent_displacement", *DRUM_OUTPUTS):
         outputs[port] = sensors.GetOutputPort(port)
-    outputs["motor_torque"] = torque
-    if friction:
-        outputs["drum_friction_torque"] = friction.GetOutputPort("torque")
-    water = None
-    if parameters.most_wet:
-        water = wiring.add("water", Water(parameters.most_wet))
-        builder.Connect(sensors.GetOutputPort("drum_speed"), water.GetInputPort("drum_speed"))
+    outputs |= driven.outputs
+    water = _add_water(wiring, parameters, sensors)
+    if water:
         outputs["water_left"] = water.GetOutputPort("left")
     if feet:
         outputs["tub_in_cabinet"] = seen
@@ -126,7 +116,7 @@ def add_washing_machine(
         cabinet=cabinet,
         feet=feet,
         water=water,
-        inputs=Inputs(inputs),
+        inputs=Inputs(driven.inputs, tub_force=tub_force.GetInputPort("tub_force")),
         outputs=Outputs(outputs),
     )
 
@@ -183,18 +173,21 @@ def _by_kind(placed: PlacedElements, by_label: dict[str, ElementSystem]) -> dict
     return by_field | {"bearing": next(systems, None)}
 
 
+class DrivePorts(NamedTuple):
+    """Input and output ports of a drive, by name."""
+
+    inputs: dict[str, InputPort]
+    outputs: dict[str, OutputPort]
+
+
 def _add_motor(
     wiring: Wiring,
     drive: MotorDrive,
     profile: SpinProfileSource,
     sensors: Sensors,
     friction: ElementSystem,
-) -> tuple[MotorSystems, OutputPort]:
-    """Add controller, motor and belt, and connect them to each other, the profile and the plant.
-
-    Returns:
-        All systems of the drive, and the port of the motor's torque on the drum.
-    """
+) -> tuple[MotorSystems, DrivePorts]:
+    """Add controller, motor and belt, and connect them to each other, the profile and the plant."""
     connect = wiring.builder.Connect
     sample_time = drive.controller.sample_time or 0.0
     controller = wiring.add(
@@ -211,15 +204,19 @@ def _add_motor(
     connect(torque, wiring.plant.get_actuation_input_port())
     for system in (controller, belt):
         connect(sensors.GetOutputPort("drum_speed"), system.GetInputPort("drum_speed"))
-    return MotorSystems(controller, motor, belt, friction), torque
+    inputs = {
+        "drum_speed_reference": controller.GetInputPort("speed_reference"),
+        "drum_torque": belt.GetInputPort("given_torque"),
+    }
+    outputs = {
+        "motor_torque": torque,
+        "drum_friction_torque": friction.GetOutputPort("torque"),
+    }
+    return MotorSystems(controller, motor, belt, friction), DrivePorts(inputs, outputs)
 
 
-def _add_speed_source(wiring: Wiring, profile: SpinProfileSource) -> tuple[SpeedSource, OutputPort]:
-    """Add speed source and motor torque, and connect them to the profile and the plant.
-
-    Returns:
-        The source, and the port of the motor's torque on the drum.
-    """
+def _add_speed_source(wiring: Wiring, profile: SpinProfileSource) -> tuple[SpeedSource, DrivePorts]:
+    """Add speed source and motor torque, and connect them to the profile and the plant."""
     builder, plant = wiring.builder, wiring.plant
     source = wiring.add("speed_source", SpeedSource())
     size, drum = plant.num_velocities(), wiring.layout.drum
@@ -234,7 +231,18 @@ def _add_speed_source(wiring: Wiring, profile: SpinProfileSource) -> tuple[Speed
         plant.get_generalized_acceleration_output_port(),
         torque.GetInputPort("generalized_acceleration"),
     )
-    return source, torque.GetOutputPort("torque")
+    inputs = {"drum_acceleration": source.GetInputPort("drum_acceleration")}
+    return source, DrivePorts(inputs, {"motor_torque": torque.GetOutputPort("torque")})
+
+
+def _add_water(wiring: Wiring, parameters: MachineParameters, sensors: Sensors) -> Water | None:
+    """Add the water in the laundry, which leaves with the drum speed; None if no load is wet."""
+    if not parameters.most_wet:
+        return None
+    water = wiring.add("water", Water(parameters.most_wet))
+    speed = sensors.GetOutputPort("drum_speed")
+    wiring.builder.Connect(speed, water.GetInputPort("drum_speed"))
+    return water
 
 
 def _element_outputs(label: str, system: Any) -> dict[str, OutputPort]:

@@ -13,15 +13,6 @@ from wm_drake.model.state_layout import StateLayout
 from wm_drake.parameters import MachineParameters
 
 
-def with_fixed_cabinet(parameters: MachineParameters) -> MachineParameters:
-    """Return the machine on a fixed cabinet, for shapes and pictures seen from the cabinet."""
-    if not parameters.cabinet_moves:
-        return parameters
-    assert parameters.cabinet is not None
-    fixed = parameters.cabinet.model_copy(update={"moves": False})
-    return parameters.model_copy(update={"cabinet": fixed})
-
-
 def cabinet_at_rest(
     plant: MultibodyPlant,
     context: Context,

@@ -11,9 +11,13 @@ from pydrake.multibody.plant import MultibodyPlant
 
 from wm_drake.compiler.vectors import rotation_from_rpy
 from wm_drake.elements.bushing import AXES
+from wm_drake.elements.kind import Ends
 from wm_drake.elements.sensor import MEASURED_POINT
+from wm_drake.errors import check_known, input_error
 from wm_drake.model.bodies import DRUM, axis_pose, drawn_frame, set_bodies
+from wm_drake.model.scene import Scene
 from wm_drake.parameters import MachineParameters
+from wm_drake.parameters.element_kinds import SHAPE
 from wm_drake.parameters.types import FloatArray
 
 Placed = TypeVar("Placed")
@@ -32,7 +36,7 @@ class FramePoses:
         Raises:
             InputError: names unknown to the SDF.
         """
-        self.frames, self._plant = parameters.frames, plant
+        self.frames, self._plant, self._parameters = parameters.frames, plant, parameters
         self._context = plant.CreateDefaultContext()
         set_bodies(plant, self._context, parameters)
         self._known: dict[tuple[str, str], tuple[FloatArray, FloatArray]] = {}
@@ -51,6 +55,31 @@ class FramePoses:
                 np.array(pose.rotation().matrix()),
             )
         return self._known[body, frame]
+
+    def ends(self, tub_frame: str, housing_frame: str) -> Ends:
+        """Return the ends of an element between two frames, or between two shapes.
+
+        Those of shapes are their nearest points, without a rotation.
+
+        Raises:
+            InputError: only one is a shape, there is no such pair of shapes, or they overlap.
+        """
+        names = [frame.removeprefix(SHAPE) for frame in (tub_frame, housing_frame)]
+        are_shapes = [frame.startswith(SHAPE) for frame in (tub_frame, housing_frame)]
+        if not any(are_shapes):
+            return Ends(*self("tub", tub_frame), *self("world", housing_frame))
+        if not all(are_shapes):
+            raise input_error(
+                f"'{tub_frame}' and '{housing_frame}' are a shape and a frame; allowed are two "
+                "shapes or two frames"
+            )
+        scene = Scene(self._parameters)
+        pair = "|".join(names)
+        check_known(pair, scene.pair_names(), f"no pair of shapes '{pair}'")
+        distance, (tub_point, housing_point) = scene.nearest_points(np.zeros(6), *names)
+        if not distance > 0.0:
+            raise input_error(f"shapes '{pair}' overlap; as drawn they must be apart")
+        return Ends(tub_point, np.eye(3), housing_point, np.eye(3))
 
     @property
     def gravity(self) -> FloatArray:

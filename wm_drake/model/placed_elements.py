@@ -13,7 +13,7 @@ from wm_drake.elements.bearing import DRUM_BEARING, DrumBearingParameters
 from wm_drake.elements.bushing import SixComponentBushingParameters, packed_bushing_law
 from wm_drake.elements.damper_law import packed_damper_law
 from wm_drake.elements.friction_damper import FRICTION_DAMPER_STRUT, FrictionDamperParameters
-from wm_drake.elements.kind import DrumPlace, ElementKind, Ends, PlacedElement, element_kind
+from wm_drake.elements.kind import DrumPlace, ElementKind, PlacedElement, element_kind
 from wm_drake.elements.mount import Mounts, mounts_at
 from wm_drake.elements.rubber import (
     MOST_STATES,
@@ -323,7 +323,8 @@ def _placed(poses: FramePoses, key: str, kind: ElementKind | None, parts: Sequen
     assert kind.place is not None  # the declaration has been checked
     if kind.on_drum:
         return kind.place(DrumPlace(*poses.on_drum(element.y), poses.gravity), *parts)
-    ends = Ends(*poses("tub", element.tub_frame), *poses("world", element.housing_frame))
+    with problems_inside(key):
+        ends = poses.ends(element.tub_frame, element.housing_frame)
     is_strut = kind.picture == "strut"
     if is_strut and not math.dist(ends.tub_point, ends.housing_point) > SHORTEST_STRUT:
         raise input_error(

@@ -15,10 +15,9 @@ from pydrake.geometry import Box, Cylinder, Meshcat, MeshcatParams, Rgba, Sphere
 from pydrake.math import RigidTransform, RotationMatrix
 
 from wm_drake.elements.kind import Ends
-from wm_drake.model.cabinet import with_fixed_cabinet
 from wm_drake.model.frame_poses import FramePoses
 from wm_drake.model.placed_elements import placed_elements
-from wm_drake.model.scene import Scene
+from wm_drake.model.scene import Scene, with_fixed_cabinet
 from wm_drake.model.visualization import SHAPES, add_floor, cabinet_pose
 from wm_drake.parameters import Load, MachineParameters
 from wm_drake.parameters.types import FloatArray

@@ -18,7 +18,6 @@ from pydrake.systems.framework import DiagramBuilder
 from wm_drake.compiler.lane_memory import aligned, fill_lanes
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.model.bodies import add_bodies, drawn_frame, sdf_path, set_bodies, unusable
-from wm_drake.model.cabinet import with_fixed_cabinet
 from wm_drake.model.outline import (
     BLOCK,
     find_lowest_bounds,
@@ -40,6 +39,15 @@ _LEAST = float(np.nextafter(0.0, 1.0))
 
 REPLAY_RATE = 32.0
 """Frames of a replay per simulated second. [Hz]"""
+
+
+def with_fixed_cabinet(parameters: MachineParameters) -> MachineParameters:
+    """Return the machine on a fixed cabinet, for shapes and pictures seen from the cabinet."""
+    if not parameters.cabinet_moves:
+        return parameters
+    assert parameters.cabinet is not None
+    fixed = parameters.cabinet.model_copy(update={"moves": False})
+    return parameters.model_copy(update={"cabinet": fixed})
 
 
 @dataclass(frozen=True)
@@ -285,19 +293,20 @@ class Scene:
         )
         return nearest.distance, query.GetPoseInWorld(pair[0]) @ witness, away
 
-    def nearest_points(self, pose: FloatArray, moving: str, fixed: str) -> FloatArray:
-        """Return the points in W of two shapes that are nearest to each other.
+    def nearest_points(self, pose: FloatArray, moving: str, fixed: str) -> tuple[float, FloatArray]:
+        """Return the distance of two shapes, and their points that are nearest to each other.
 
         Args:
             pose: Pose of the tub: roll, pitch, yaw, x, y, z. (6,) [rad, m]
             moving, fixed: Names of a shape of the tub group and of a shape of the housing.
 
         Returns:
-            (2, 3) The point of the first shape, then that of the second. [m]
+            Signed distance [m]; (2, 3) the point of the first shape in W, then that of the second.
+            [m]
         """
         pair = self._pairs[self.pair_names().index(f"{moving}|{fixed}")]
         distance, point, away = self._nearest(pose, pair)
-        return np.stack([point, point - distance * away])
+        return distance, np.stack([point, point - distance * away])
 
     def _set_positions(self, positions: FloatArray) -> None:
         """Set the first positions of the plant; the others, of damper tubes, are 0 as drawn."""

@@ -9,6 +9,7 @@ from pydrake.multibody.tree import FixedOffsetFrame, RigidBody
 
 from wm_drake.errors import Problem, nearest_names
 from wm_drake.parameters import MachineParameters
+from wm_drake.parameters.element_kinds import SHAPE, Element
 from wm_drake.parameters.sections import SECTIONS
 
 
@@ -120,8 +121,10 @@ def _attachments(
                 tubes = (body.name() for body in tubes_of(plant, joint))
                 bodies |= dict(zip(("outer", "inner"), tubes, strict=True))
             for end, body in bodies.items():
-                if hasattr(element, f"{end}_frame"):  # an element on the drum has none
-                    yield f"{section.key(name)}.{end}_frame", body, getattr(element, f"{end}_frame")
+                frame = getattr(element, f"{end}_frame", None)  # an element on the drum has none
+                if frame is None or (isinstance(element, Element) and frame.startswith(SHAPE)):
+                    continue
+                yield f"{section.key(name)}.{end}_frame", body, frame
     for table in ("sensors", "accelerometers"):
         for name, sensor in getattr(parameters, table).items():
             yield f"{table}.{name}.frame", "tub", sensor.frame

@@ -10,7 +10,7 @@ from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
 from wm_drake.elements.motion import POSE
 from wm_drake.model.bodies import add_bodies
-from wm_drake.model.cabinet import with_fixed_cabinet
+from wm_drake.model.scene import with_fixed_cabinet
 from wm_drake.model.state_layout import StateLayout, state_layout_of
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray

@@ -36,7 +36,8 @@ class Element(OfKind):
     """An element in its place; the parameters of an element kind extend this type.
 
     Attributes:
-        tub_frame, housing_frame: Frames of the two ends, on the tub and on the housing.
+        tub_frame, housing_frame: Frames of the two ends, on the tub and on the housing; or
+            "shape NAME" in both: the ends are the nearest points of two shapes, as drawn.
 
     Example:
         >>> from typing import Annotated
@@ -51,6 +52,10 @@ class Element(OfKind):
 
     tub_frame: str
     housing_frame: str
+
+
+SHAPE = "shape "
+"""Beginning of a `tub_frame` or `housing_frame` that names a shape in place of a frame."""
 
 
 class HasParameters(Protocol):

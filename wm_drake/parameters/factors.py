@@ -13,6 +13,7 @@ from wm_drake.parameters.files import read_yaml
 from wm_drake.parameters.keys import with_value, with_values
 from wm_drake.parameters.machine import MachineParameters
 from wm_drake.parameters.problems import problems_of
+from wm_drake.parameters.units import Unit
 from wm_drake.parameters.variation import Number, Value, number_at, owned_twice, range_of
 
 GASKET_FACTORS = Path(__file__).parents[1] / "data" / "gasket_factors.yaml"
@@ -51,12 +52,11 @@ class FactorLevels:
     Attributes:
         settings: For each of the levels -1, 0 and 1: values by key path, in SI units.
         nominal: By key path: the machine's number, or the nominal stiffness of its table, as text
-            in the display unit.
-        shown: For each of the levels -1, 0 and 1: the value of the first key, as text in the
-            display unit.
-        numbers: By key path: the value at each of the levels -1, 0 and 1, in the display unit. Of a
-            table, it is the nominal stiffness.
-        units: By key path: the display unit, for reading; "" if the number has none.
+            for reading.
+        shown: For each of the levels -1, 0 and 1: the value of the first key, as text for reading.
+        numbers: By key path: the value at each of the levels -1, 0 and 1. [SI] Of a table, it is
+            the nominal stiffness.
+        units: By key path: the unit.
     """
 
     name: str
@@ -64,8 +64,8 @@ class FactorLevels:
     settings: tuple[dict[str, Value], ...]
     nominal: dict[str, str]
     shown: tuple[str, ...]
-    numbers: dict[str, tuple[float, ...]]
-    units: dict[str, str]
+    numbers: Mapping[str, tuple[float, ...]]
+    units: dict[str, Unit]
 
 
 def load_factors(path: Path) -> dict[str, Factor]:
@@ -175,15 +175,15 @@ def place_of(parameters: MachineParameters, factor: FactorLevels, text: str) -> 
     """
     key, levels = next(iter(factor.numbers.items()))
     number = number_at(parameters, key)
-    shown = number.unit.from_si(number.resolved(text))
+    value = number.resolved(text)
     slack = 1e-9 * (levels[2] - levels[0])
-    if not levels[0] - slack <= shown <= levels[2] + slack:
+    if not levels[0] - slack <= value <= levels[2] + slack:
         raise input_error(
             f"'{text}' is outside the range of factor {factor.name}, "
             f"{factor.shown[0]} to {factor.shown[2]}",
             key=key,
         )
-    return float(np.interp(shown, levels, (-1.0, 0.0, 1.0)))
+    return float(np.interp(value, levels, (-1.0, 0.0, 1.0)))
 
 
 def _resolved(
@@ -202,8 +202,8 @@ def _resolved(
         settings,
         {n.key: "" if n.nominal is None else n.unit.reading(n.nominal) for n in numbers},
         tuple(map(numbers[0].unit.reading, levels[numbers[0].key])),
-        {number.key: tuple(map(number.unit.from_si, levels[number.key])) for number in numbers},
-        {number.key: number.unit.label for number in numbers},
+        levels,
+        {number.key: number.unit for number in numbers},
     )
 
 

@@ -4,7 +4,7 @@ import contextlib
 import functools
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
@@ -12,6 +12,7 @@ from pydantic_core import CoreSchema
 from pydantic_core.core_schema import with_info_before_validator_function
 
 from wm_drake.errors import shortened
+from wm_drake.parameters.reading import CUSTOMARY, READING, SI
 
 if TYPE_CHECKING:  # importing pint and making its registry take 0.7 s: units not in FACTORS
     import pint
@@ -194,6 +195,12 @@ class Unit:
         return f"(1, 2, 3) {self.shown}" if is_list else f"1 {self.shown}".strip()
 
     @property
+    def for_reader(self) -> "Unit":
+        """The unit with the display unit in which results are read, see `parameters.reading`."""
+        shown = self.shown if READING.get() == SI else CUSTOMARY.get(self.shown, self.shown)
+        return self if shown == self.shown else replace(self, shown=shown)
+
+    @property
     def label(self) -> str:
         """Display unit for reading, such as ``N mm/rad``."""
         return self.shown.replace("*", " ")
@@ -201,6 +208,10 @@ class Unit:
     def from_si(self, value: float) -> float:
         """Return an SI value in the display unit."""
         return _in_unit(value, self.si, self.shown)
+
+    def to_si(self, values: Any) -> Any:
+        """Return values in the display unit, as a file or an option has them, in SI."""
+        return values / self.from_si(1.0)
 
     def number(self, text: str) -> float:
         """Return a text such as ``'3.2 N/mm'`` as a number in SI units.
@@ -215,8 +226,9 @@ class Unit:
         return convert(float(match[1]), match[2], self)
 
     def reading(self, value: float, digits: int = 6) -> str:
-        """Return an SI value as text for reading, rounded, in the display unit."""
-        return f"{self.from_si(value):.{digits}g} {self.label}".rstrip()
+        """Return an SI value as text for reading, rounded, in the unit in which it is read."""
+        read = self.for_reader
+        return f"{read.from_si(value):.{digits}g} {read.label}".rstrip()
 
     def text(self, value: Any) -> str:
         """Return an SI value, or a tuple of them, as text such as ``3.2 N/mm``.
@@ -523,6 +535,10 @@ class PureNumber(Unit):
         """Return a number as text that reads back as the same number."""
         return repr(value)
 
+    def to_si(self, values: Any) -> Any:
+        """Return values in the display unit, as a file or an option has them, in SI."""
+        return values / self.from_si(1.0)
+
     def number(self, text: str) -> float:
         """Return a text such as ``'0.4'`` as a number."""
         if _matched(_BARE, text, LONGEST_NUMBER) is None:
@@ -536,6 +552,10 @@ class Share(PureNumber):
     """A share, such as 0.3 or 30 %."""
 
     shown: str = "%"
+
+    def to_si(self, values: Any) -> Any:
+        """Return values in the display unit, as a file or an option has them, in SI."""
+        return values / self.from_si(1.0)
 
     def number(self, text: str) -> float:
         """Return a text such as ``'30 %'`` or ``'0.3'`` as a number."""

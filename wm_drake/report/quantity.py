@@ -5,6 +5,7 @@ variable (page, terminal, file, axis, sentence) takes words, unit and digits fro
 nothing else converts a number or spells a unit.
 """
 
+import math
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -14,7 +15,6 @@ import numpy as np
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import PureNumber, Unit
 from wm_drake.report.formatting import MISSING, number, significant
-from wm_drake.report.reading import finer_decimals, reading_unit
 
 if TYPE_CHECKING:  # slow to import, and not needed for declarations
     import xarray as xr
@@ -22,6 +22,9 @@ if TYPE_CHECKING:  # slow to import, and not needed for declarations
     from wm_drake.report.table import Column
 
 NO_UNIT = PureNumber()
+ROUNDING = 0.3
+"""Part of a decimal that is not worth another one."""
+
 HIDDEN = "is_hidden"
 """Attribute of a variable that files and JSON have, and page and terminal leave out."""
 
@@ -50,7 +53,7 @@ class Quantity:
     @property
     def reading(self) -> Unit:
         """Unit in which it is read."""
-        return reading_unit(self.unit)
+        return self.unit.for_reader
 
     @property
     def unit_text(self) -> str:
@@ -100,7 +103,11 @@ class Quantity:
 
     @property
     def _decimals(self) -> int | None:
-        return None if self.decimals is None else finer_decimals(self.unit, self.decimals)
+        """Decimals in the unit for reading, for the digits of `decimals` in the display unit."""
+        if self.decimals is None:
+            return None
+        larger = self.unit.from_si(1.0) / self.reading.from_si(1.0)
+        return max(0, self.decimals + math.ceil(math.log10(larger) - ROUNDING))
 
     def variable(self, dims: str | Sequence[str], values: Any) -> "xr.Variable":
         """Return values in SI as a variable that carries this quantity."""

@@ -16,7 +16,6 @@ import pandas as pd
 from wm_drake.parameters import MachineParameters, quantities, source_of
 from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import MISSING, number, significant
-from wm_drake.report.reading import reading_unit
 
 if TYPE_CHECKING:  # not needed for pages
     import rich.table
@@ -221,7 +220,7 @@ def readable(value: Any, unit: Unit) -> str:
     """
     if isinstance(value, tuple) and len(value) > MOST_SHOWN:
         return f"{len(value)} values, {readable(value[0], unit)} to {readable(value[-1], unit)}"
-    values, unit = value if isinstance(value, tuple) else (value,), reading_unit(unit)
+    values, unit = value if isinstance(value, tuple) else (value,), unit.for_reader
     texts = [significant(unit.from_si(number), READABLE_DIGITS) for number in values]
     shown = f"({', '.join(texts)})" if isinstance(value, tuple) else texts[0]
     return f"{shown} {unit.shown.replace('*', ' ').replace('^2', '²')}"

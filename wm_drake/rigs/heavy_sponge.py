@@ -11,8 +11,11 @@ import numpy as np
 from wm_drake.compiler.compilation import long_running
 from wm_drake.elements.damper_law import sponge_with_mass
 from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import Unit
 from wm_drake.rigs.bench import DamperBench, Harmonic
 from wm_drake.rigs.integration import POINTS, STEADY, NotSteadyError, closed_loop
+
+MASS, LENGTH = Unit("kg", "g"), Unit("m", "mm")
 
 FEWEST_STEPS, MOST_STEPS = 8, 2048
 """Steps between two points of a loop at first, and at most."""
@@ -49,8 +52,8 @@ def steady_tensions(bench: DamperBench, motion: Harmonic) -> FloatArray:
                 return np.asarray(extrapolated)
         coarse, last = fine, extrapolated
     raise NotSteadyError(
-        f"a sponge of {1e3 * bench.sponge_mass:g} g at {motion.frequency:g} Hz, "
-        f"{1e3 * motion.amplitude:g} mm: loops of {steps // 2} and {steps} steps between two "
+        f"a sponge of {MASS.reading(bench.sponge_mass)} at {motion.frequency:g} Hz, "
+        f"{LENGTH.reading(motion.amplitude)}: loops of {steps // 2} and {steps} steps between two "
         f"points do not agree to {AGREEMENT:g} of the largest force; take another sponge mass, or "
         "none"
     )

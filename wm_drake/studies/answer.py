@@ -14,9 +14,9 @@ import pandas as pd
 import xarray as xr
 
 from wm_drake.parameters import MachineParameters
+from wm_drake.parameters.reading import READING, read_in
 from wm_drake.report.figure import Figure
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.reading import READING, read_in
 from wm_drake.studies.study import Facts, Result
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ class Answer(Result):
         others: Answers with pages of their own beside this one, by the names of their files.
         script: Script of the page, beside that of the pictures.
         live: Page that runs the machine (`wm_drake.live`), in a frame of this one; "" for none.
-        units: In which its numbers are read, of `report.reading`; those in which it was made.
+        units: In which its numbers are read, of `parameters.reading`; those in which it was made.
     """
 
     title: str

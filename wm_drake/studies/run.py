@@ -14,7 +14,6 @@ from pydantic import ValidationError
 
 from wm_drake.errors import InputError, InputNotice, Problem, input_error
 from wm_drake.report.provenance import command_line
-from wm_drake.report.reading import SI, read_in
 from wm_drake.report.terminal import QUIET, say
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import (
@@ -36,7 +35,6 @@ from wm_drake.studies.result_folder import (
 )
 from wm_drake.studies.study import (
     PAGE,
-    SI_ONLY,
     STUDIES,
     Facts,
     OptionModel,
@@ -165,8 +163,6 @@ def order_of(study: Study, given: Mapping[str, Any], command: str = "") -> Order
     model = options_of_driver(study)
     running = {name: value for name, value in given.items() if name in model.model_fields}
     others = {name: value for name, value in given.items() if name not in running}
-    if running.get("units", SI) != SI and study.command in SI_ONLY:
-        raise input_error(f"'{study.command}' has no other units than si", where="--units")
     if running.get("figures") and not running.get("out"):
         raise input_error("needs a folder of results too (out)", where="figures")
     if isinstance(others.get("machine"), Path):
@@ -202,6 +198,8 @@ def execute(order: Order) -> tuple[Result, Facts, tuple[str, ...]]:
         InputError: the input is wrong, or the folder must not or cannot be written to.
         StudyInterrupted: Ctrl-C was pressed.
     """
+    from wm_drake.parameters.reading import read_in
+
     with read_in(order.run.units):
         return _executed(order)
 

@@ -345,14 +345,6 @@ SHIPPED = (
 )
 """Studies of this package: module below `wm_drake.studies`, and name."""
 
-SI_ONLY = (
-    *("spin", "verdict"),
-    *("study gasket-damping", "study gasket-geometry"),
-    *("study design", "study gasket", "study spin-cycle", "study spin-identify", "study tolerance"),
-    *("identify bushing", "identify gasket"),
-)
-"""Commands whose numbers do not all carry a quantity: their units cannot be chosen."""
-
 STUDIES: Registry[Study] = Registry(
     "study", "wm_drake.studies", [f"wm_drake.studies.{place}" for place in SHIPPED]
 )

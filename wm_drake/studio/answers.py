@@ -345,7 +345,7 @@ def _gap_points(runner: Runner, run: RunResult) -> dict[str, Any] | None:
     if gap is None or motion is None:
         return None
     pose = motion.poses[int(np.argmin(np.abs(motion.time - gap.time)))]
-    points = runner.scene().nearest_points(pose, gap.moving, gap.fixed)
+    _, points = runner.scene().nearest_points(pose, gap.moving, gap.fixed)
     return {"points": points.tolist(), "pose": pose.tolist()}
 
 

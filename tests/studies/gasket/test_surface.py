@@ -121,8 +121,8 @@ def test_place_of_a_value_in_percent_and_with_unit(machine):
     factor = next(f for f in levels_of(machine, load_factors(GASKET_FACTORS)) if f.name == "C_L")
     assert place_of(machine, factor, "50 %") == pytest.approx(-1.0)
     assert place_of(machine, factor, "125 %") == pytest.approx(0.5)
-    shown = factor.numbers["gasket.damping_x"]
-    assert place_of(machine, factor, f"{shown[2]} N*s/mm") == pytest.approx(1.0)
+    levels = factor.numbers["gasket.damping_x"]
+    assert place_of(machine, factor, f"{levels[2]} N*s/m") == pytest.approx(1.0)
     with pytest.raises(InputError, match="outside the range of factor C_L"):
         place_of(machine, factor, "200 %")
 

@@ -128,6 +128,8 @@ def test_verdict_is_that_of_the_displacements_not_of_the_intervals(reference):
     other = measured * (1.0 + 0.6 * np.sin(7.0 * np.arange(measured.size)).reshape(measured.shape))
     poor = identify_from_spin(model, other)
     assert poor[1].average_error_after > 0.15
+    drawn = np.sqrt(np.mean(poor[1].residual.values ** 2))
+    assert drawn == pytest.approx(poor[0].rmse)  # what the search makes small
     assert not warnings_of(*good)
     assert any("Poor" in warning for warning in warnings_of(*poor))
 

@@ -237,7 +237,7 @@ class BalancerTrials:
         names = []
         for mass, y, ball_mass, damping in points:
             changed = with_factors(parameters, ball_mass, damping)
-            load, name = self.load(mass, y), f"{mass:g} kg at {PLACE.values(y):g} mm"
+            load, name = self.load(mass, y), f"{MASS.text(mass)} at {PLACE.text(y)}"
             free.append(
                 Case(f"{name}, balls {ball_mass:g}, {damping:g}", load, profile, True, changed)
             )
@@ -266,7 +266,7 @@ class BalancerTrials:
         profile = run_up(self.high, self.rate)
         pairs = zip(loads.mass.values.tolist(), loads.place.values.tolist(), strict=True)
         cases = [
-            Case(f"{mass:g} kg at {PLACE.values(y):g} mm, {what}", self.load(mass, y), profile)
+            Case(f"{MASS.text(mass)} at {PLACE.text(y)}, {what}", self.load(mass, y), profile)
             for mass, y in pairs
         ]
         return self.curves(machine, cases, what)

@@ -313,12 +313,13 @@ def turned_load(load: Load, angle: float) -> Load:
 
 
 def calibrated(
-    model: RecordModel, seed: int, progress: Progress = silent
+    model: RecordModel, seed: int, progress: Progress = silent, starts: int = 2
 ) -> tuple[Fit, xr.Dataset]:
     """Fit the unknowns of a model to its recordings.
 
     Args:
         progress: Called with the fraction done and the least misfit so far.
+        starts: Number of searches.
 
     Returns:
         The fit; and over place and sensor, in SI: `measured`, mean of the repeats, its `deviation`,
@@ -331,7 +332,7 @@ def calibrated(
         InputError: no sensor has an amplitude.
     """
     problem = model.problem()
-    fit = identify(problem, seed=seed, starts=2, screened=8, progress=progress)
+    fit = identify(problem, seed=seed, starts=starts, screened=8, progress=progress)
     start = problem.points_at(problem.start)
     before, after = model.computed(np.stack([start, fit.values]))
     parts = [

@@ -79,7 +79,7 @@ def _others(calibration: Calibration) -> dict[str, np.ndarray]:
         cases = [(load, GASKET[gasket]) for load, gasket in targets.loads]
         values = by_case.reindex(cases)[list(targets.sensors)].to_numpy(dtype=float)
         if np.isfinite(values).any():
-            others[str(source)] = MEASURED.to_si(values)
+            others[str(source)] = MEASURED.unit.to_si(values)
     return others
 
 

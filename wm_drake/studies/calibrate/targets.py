@@ -304,7 +304,7 @@ def targets_of(
     return Targets(
         tuple(loads),
         sensors,
-        MEASURED.to_si(amplitude),
+        MEASURED.unit.to_si(amplitude),
         np.ones(amplitude.shape),
         response_targets_of(parameters, responses),
     )

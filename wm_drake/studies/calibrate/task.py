@@ -72,7 +72,7 @@ class CalibrateTask(Task):
             self.targets = targets.limited(_fractions(options.limit, "--limit"))
         # the calibrated machine names the targets as its measurements
         self.machine = build_machine(measured) if options.targets else machine
-        resolution = float(MEASURED.to_si(options.resolution))
+        resolution = float(MEASURED.unit.to_si(options.resolution))
         self.plan = SearchPlan(
             options.starts, options.seed, options.iterations, amplitude, resolution
         )

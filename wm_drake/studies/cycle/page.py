@@ -90,11 +90,10 @@ def summary(case: Case, course: xr.Dataset) -> str:
         )
     if "foot_smallest" in course:
         light = course.isel(time=int(course.foot_smallest.argmin("time")))
-        does = "lifts off" if light.foot_smallest <= 0.0 else "stays on the floor"
         sentences.append(
             f"Every foot is loaded with at least {text_of(light.foot_smallest)}: none lifts off."
             if light.foot_smallest > 0.0
-            else f"A foot {does} at {text_of(light.drum_speed)} after {text_of(light.time)}."
+            else f"A foot lifts off at {text_of(light.drum_speed)} after {text_of(light.time)}."
         )
     return " ".join(sentences)
 

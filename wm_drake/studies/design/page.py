@@ -179,7 +179,7 @@ def _picked(designs: MachineDesigns, front: xr.Dataset, envelopes: xr.Dataset) -
         "picked": first_picked(front) - 1,
         "pairs": pairs_of(designs),
         "objectives": objectives,
-        "envelopes": np.round(shown(envelopes.envelope), 2),
+        "envelopes": np.round(shown(envelopes.envelope), 4),
         "labels": {"picked": PICKED, "designs": DESIGNS},
     }
 
@@ -190,10 +190,10 @@ def _rows(designs: MachineDesigns, one: xr.Dataset) -> list[tuple[str, str, str]
         ("objective", goal.given.quantity, text_of(one[goal.name])) for goal in designs.objectives
     ]
     for goal in designs.constraints:
-        limit = goal.quantity.to_si(goal.limit)
         side = "at most" if goal.is_small_better else "at least"
-        margin = goal.quantity.text(abs(one[goal.name] - limit))
-        text = f"{text_of(one[goal.name])}, {side} {goal.quantity.text(limit)}: margin {margin}"
+        margin = goal.quantity.text(abs(one[goal.name] - goal.limit))
+        limit = goal.quantity.text(goal.limit)
+        text = f"{text_of(one[goal.name])}, {side} {limit}: margin {margin}"
         rows.append(("constraint", goal.given.quantity, text))
     variables = [("variable", d.name, d.text(one[d.name])) for d in designs.dimensions]
     return [*rows, *variables]

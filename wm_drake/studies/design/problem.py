@@ -113,8 +113,8 @@ class DesignGoal:
     Attributes:
         given: As in the design file.
         response: Response of the runs; None if it is a number of the machine.
-        unit: Unit for reading.
-        limit: Limit of a constraint. [unit for reading] NaN for an objective.
+        unit: Unit.
+        limit: Limit of a constraint. [SI] NaN for an objective.
     """
 
     given: Objective | Constraint
@@ -229,7 +229,7 @@ class MachineDesigns:
     def evaluate(
         self, designs: FloatArray, experiment: Experiment
     ) -> tuple[FloatArray, FloatArray]:
-        """Return values of all objectives, then of all constraints, in units for reading.
+        """Return values of all objectives, then of all constraints. [SI]
 
         Args:
             designs: (n, dimensions) in [0, 1]
@@ -244,7 +244,7 @@ class MachineDesigns:
         return columns[:, : len(self.objectives)], columns[:, len(self.objectives) :]
 
     def scenario_values(self, designs: FloatArray, experiment: Experiment) -> list[FloatArray]:
-        """Return the values of each goal by design and scenario, in units for reading.
+        """Return the values of each goal by design and scenario. [SI]
 
         Args:
             designs: (n, dimensions) in [0, 1]
@@ -268,7 +268,7 @@ class MachineDesigns:
                 values = np.where(has_ended, np.array(numbers)[:, None], np.nan)
             else:
                 values = response_of(runs, goal.response).values
-            by_goal.append(goal.quantity.values(values))
+            by_goal.append(values)
         return by_goal
 
     def costs(self, designs: FloatArray, experiment: Experiment) -> tuple[FloatArray, FloatArray]:
@@ -365,7 +365,7 @@ def _goal(
         (response,) = chosen
         unit = response.unit
     try:
-        limit = float("nan") if limit_text is None else unit.from_si(unit.number(limit_text))
+        limit = float("nan") if limit_text is None else unit.number(limit_text)
     except ValueError as error:
         raise input_error(str(error)) from None
     return DesignGoal(given, response, unit, limit)

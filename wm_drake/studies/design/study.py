@@ -76,7 +76,7 @@ def run_designs(
             "evaluations": EVALUATIONS.variable("generation", evaluations),
             "hypervolume": HYPERVOLUME.variable("generation", volumes),
             **{
-                f"nominal_{goal.name}": goal.quantity.variable((), goal.quantity.to_si(value))
+                f"nominal_{goal.name}": goal.quantity.variable((), value)
                 for goal, value in zip(designs.objectives, nominal[0], strict=True)
             },
         },
@@ -93,7 +93,7 @@ def chosen_designs(
     Args:
         goals: Objectives.
         costs: What the search made small. (n, objectives)
-        machine: Objectives of the machine itself. [unit for reading] (objectives,)
+        machine: Objectives of the machine itself. [SI] (objectives,)
     """
     if not len(costs):
         return {}
@@ -134,9 +134,9 @@ def design_proposal(designs: MachineDesigns, front: xr.Dataset, command: str) ->
 
 
 def _values(goal: DesignGoal, cost: FloatArray) -> FloatArray:
-    """Return SI values of a goal from what the search made small."""
+    """Return the values of a goal from what the search made small. [SI]"""
     signed = cost if goal.is_small_better else -cost
-    return goal.quantity.to_si(signed if np.isnan(goal.limit) else signed + goal.limit)
+    return signed if np.isnan(goal.limit) else signed + goal.limit
 
 
 FRESH = 4
@@ -180,7 +180,7 @@ def _promise(goal: DesignGoal, pairs: Sequence[tuple[Percentile, Percentile]]) -
     """Return the variables of a goal in the dataset of promises.
 
     Args:
-        pairs: Promised and fresh value of each chosen design. [unit for reading]
+        pairs: Promised and fresh value of each chosen design. [SI]
     """
     quantity, words = goal.quantity, goal.quantity.words
     ends = {
@@ -194,7 +194,7 @@ def _promise(goal: DesignGoal, pairs: Sequence[tuple[Percentile, Percentile]]) -
         **{
             name: quantity.named(shown).variable(
                 ("chosen", "samples"),
-                quantity.to_si([[getattr(one, field) for one in pair] for pair in pairs]),
+                [[getattr(one, field) for one in pair] for pair in pairs],
             )
             for name, (field, shown) in ends.items()
         },
@@ -221,7 +221,7 @@ def summary_of(goal: DesignGoal, values: FloatArray) -> Percentile:
     A run that failed has NaN, and so has then the value.
 
     Args:
-        values: By sample. (n,) [unit for reading]
+        values: By sample. (n,) [SI]
     """
     how = goal.given.over
     value = float(goal.over(values[None])[0])

@@ -178,8 +178,8 @@ def explorer_data(
                 {
                     "name": factor.name,
                     "title": words.factor(factor.name),
-                    "unit": words.unit(factor.name),
-                    "numbers": [float(v) for v in next(iter(factor.numbers.values()))],
+                    "unit": words.quantity(factor.name).unit_text,
+                    "numbers": words.quantity(factor.name).values(words.numbers(factor.name)),
                 }
                 for factor in trials.factors
             ],

@@ -123,12 +123,11 @@ def text_at(machine: MachineParameters, factor: FactorLevels, place: float) -> t
     number, value = number_at(machine, key), float(np.interp(place, (-1.0, 0.0, 1.0), numbers))
     if isinstance(number.original, CurveTable):
         assert number.nominal
-        nominal = number.unit.from_si(number.nominal)
-        text = PERCENT.text(value / nominal)
-        value = nominal * Share().number(text)
+        text = PERCENT.text(value / number.nominal)
     else:
-        text = f"{significant(value, 3)} {number.unit.shown}".replace("−", "-")
-        value = float(f"{value:.3g}")
+        unit = number.unit.for_reader
+        text = f"{significant(unit.from_si(value), 3)} {unit.shown}".replace("−", "-")
+    value = number.resolved(text)
     return text, float(np.interp(value, numbers, (-1.0, 0.0, 1.0)))
 
 

@@ -3,7 +3,6 @@
 import numpy as np
 import xarray as xr
 
-from wm_drake.parameters.variation import number_at
 from wm_drake.report.formatting import MISSING
 from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.quantity import HIDDEN, Quantity, named, quantity_of
@@ -249,8 +248,8 @@ def physical_values(design: Design, trials: GasketTrials) -> dict[str, xr.Variab
         places = design.levels[:, design.factors.index(factor.name)] + 1
         is_same = len(set(factor.numbers.values())) == 1
         for key in list(factor.numbers)[: 1 if is_same else None]:
-            quantity = Quantity(factor.name, number_at(trials.parameters, key).unit)
-            numbers = quantity.to_si(factor.numbers[key])[places]
+            quantity = Quantity(factor.name, factor.units[key])
+            numbers = np.asarray(factor.numbers[key])[places]
             name = factor.name if is_same else f"{factor.name}_{key}"
             values[f"{name}{quantity.suffix or '_value'}"] = quantity.variable("trial", numbers)
     return values
@@ -324,8 +323,8 @@ def design_table(design: Design) -> LabelledTable:
 def factors_table(trials: GasketTrials, words: Words) -> LabelledTable:
     """Return the values of the machine file that belong to the levels of each factor."""
     keys = [(factor, key) for factor in trials.factors for key in factor.numbers]
-    each = {key: Quantity(key, number_at(trials.parameters, key).unit) for _, key in keys}
-    values = [each[key].to_si(factor.numbers[key]) for factor, key in keys]
+    each = {key: Quantity(key, factor.units[key]) for factor, key in keys}
+    values = [factor.numbers[key] for factor, key in keys]
     data = xr.Dataset(
         {
             "factor": ("key", [words.factor(factor.name) for factor, _ in keys]),

@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 import xarray as xr
 
 from wm_drake.parameters import FactorLevels
-from wm_drake.report.formatting import significant
 from wm_drake.report.quantity import Quantity
 from wm_drake.studies.doe.coding import LEVELS
 
@@ -33,23 +32,27 @@ class Words:
         """Return a term for reading: its factors, joined by a multiplication sign."""
         return " × ".join(map(self.factor, name.split(":")))
 
-    def unit(self, factor: str) -> str:
-        """Return the unit of a factor's levels; "" if it has none."""
-        return next(iter(self._factors[factor].units.values()), "")
+    def quantity(self, factor: str) -> Quantity:
+        """Return what a factor is, by its first key."""
+        unit = next(iter(self._factors[factor].units.values()))
+        return Quantity(self.factor(factor), unit)
+
+    def numbers(self, factor: str) -> tuple[float, ...]:
+        """Return the physical values of the levels, of its first key. [SI]"""
+        return next(iter(self._factors[factor].numbers.values()))
 
     def number(self, factor: str, level: int) -> str:
         """Return the physical value of a level, without unit."""
-        numbers = next(iter(self._factors[factor].numbers.values()))
-        return significant(numbers[level + 1])
+        return self.quantity(factor).number(self.numbers(factor)[level + 1])
 
     def value(self, factor: str, level: int) -> str:
         """Return the physical value of a level with its unit."""
-        return f"{self.number(factor, level)} {self.unit(factor)}".strip()
+        return self.quantity(factor).text(self.numbers(factor)[level + 1])
 
     def values(self, factor: str) -> str:
         """Return the physical values of all levels with the unit."""
-        numbers = ", ".join(self.number(factor, level) for level in LEVELS)
-        return f"{numbers} {self.unit(factor)}".strip()
+        *others, last = LEVELS
+        return ", ".join([*(self.number(factor, n) for n in others), self.value(factor, last)])
 
     def span(self, factor: str) -> str:
         """Return the lowest and the highest value of a factor with the unit."""
@@ -57,7 +60,7 @@ class Words:
 
     def axis(self, factor: str) -> str:
         """Return the label of an axis of a factor: name, symbol, unit."""
-        return ", ".join(filter(None, (self.factor(factor), self.unit(factor))))
+        return self.quantity(factor).label
 
     def response(self, name: str) -> str:
         """Return a response for reading, such as `displacement x (Dx)`."""

@@ -14,7 +14,6 @@ from wm_drake.report import figure as fig
 from wm_drake.report.formatting import significant
 from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.quantity import Quantity, text_of
-from wm_drake.report.reading import reading_unit
 from wm_drake.solid.curves import AXIAL, RADIAL, TILT, TWIST, Curve, CurvePoint
 from wm_drake.solid.mesh import Ring, axes_at
 from wm_drake.solid.touching import Faces
@@ -184,7 +183,7 @@ def summary(curves: dict[str, Checked], numbers: xr.Dataset) -> str:
     for motion in (RADIAL, AXIAL, TWIST, TILT):
         stiffness = loop_quantities(motion.rotates)["stiffness"].unit
         slope = curves[motion.name].curve.table.nominal_stiffness
-        slopes.append(f"{motion.name} {reading_unit(stiffness).reading(slope, 3)}")
+        slopes.append(f"{motion.name} {stiffness.reading(slope, 3)}")
     largest = max(max(c.begin.stretch, c.end.stretch) for c in curves.values())
     worst = max(checked.curve.work_error() for checked in curves.values())
     return (
@@ -200,7 +199,7 @@ def _rubber_text(rubber: Rubber, numbers: xr.Dataset) -> str:
     hardness = "" if rubber.shore_a is None else f"{rubber.shore_a:g} Shore A, "
     return (
         f"{hardness}constants of Yeoh {c1}, {c2}, {c3} {STRESS.unit_text}, bulk modulus "
-        f"{STRESS.reading.reading(rubber.bulk, 3)}. At the frequency of the damping its storage "
+        f"{STRESS.unit.reading(rubber.bulk, 3)}. At the frequency of the damping its storage "
         f"and loss modulus are {text_of(numbers.storage_modulus)} and "
         f"{text_of(numbers.loss_modulus)} "
         "of the modulus of the curves"

@@ -10,6 +10,7 @@ import xarray as xr
 
 from wm_drake.errors import input_error
 from wm_drake.parameters.gasket_drawing import GasketDrawing
+from wm_drake.parameters.reading import SI, read_in
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Share, Unit, plain_number
 from wm_drake.report.quantity import Quantity
@@ -132,8 +133,9 @@ def ranked(responses: Mapping[str, FloatArray], limits: Mapping[str, float]) -> 
     return np.lexsort((-responses[GAP], excess(responses, limits)))
 
 
+@read_in(SI)
 def limits_of(entries: Sequence[str]) -> dict[str, float]:
-    """Return limits by responses, in SI.
+    """Return limits by responses, in SI. The names of options do not change with the units.
 
     Raises:
         InputError: a response is unknown, or a limit is not a number above 0.

@@ -18,6 +18,7 @@ from wm_drake.parameters import (
     quantities,
     shipped_machines,
 )
+from wm_drake.parameters.units import Unit
 from wm_drake.studies.components import Target
 from wm_drake.studies.fitting.fit import Fit
 from wm_drake.studies.identify.comparison import FittedLaw
@@ -135,7 +136,7 @@ def _entries(fit: Fit, model: ComponentModel) -> tuple[dict[str, Any], list[str]
                     "the table's rises there are not to be trusted."
                 )
         elif name in model.fixed:
-            entries[name] = {"value": units[name].reading(value, 10), "source": FIXED}
+            entries[name] = {"value": _text(units[name], value, 10), "source": FIXED}
         elif name in estimates:
             estimate, unit = estimates[name], units[name]
             if not estimate.determined:
@@ -149,8 +150,13 @@ def _entries(fit: Fit, model: ComponentModel) -> tuple[dict[str, Any], list[str]
             elif np.isfinite(estimate.lower):
                 lower, upper = unit.from_si(estimate.lower), unit.from_si(estimate.upper)
                 text += f"; 95 % interval {lower:.4g} to {upper:.4g} {unit.label}"
-            entries[name] = {"value": unit.reading(value, 7), "source": text}
+            entries[name] = {"value": _text(unit, value, 7), "source": text}
     return entries, comments
+
+
+def _text(unit: Unit, value: float, digits: int) -> str:
+    """Return an SI value as text of a machine file, which is in SI units of the trade."""
+    return f"{unit.from_si(value):.{digits}g} {unit.label}".rstrip()
 
 
 def missing_numbers(fit: Fit, model: ComponentModel, target: Component) -> list[str]:

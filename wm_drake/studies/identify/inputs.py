@@ -12,10 +12,18 @@ from wm_drake.report.terminal import say
 from wm_drake.rigs.measured import MeasuredMotion, inertia_share, measured_motion, without_inertia
 from wm_drake.studies.components import Target, existing_files
 from wm_drake.studies.fitting.methods import METHODS
-from wm_drake.studies.identify.models import Given, fields_of_law, unit_of_field, units_of_fields
+from wm_drake.studies.identify.models import (
+    FORCE,
+    Given,
+    fields_of_law,
+    unit_of_field,
+    units_of_fields,
+)
 from wm_drake.studies.identify.options import IdentifyOptions
 from wm_drake.studies.inputs import LOOP_WORDS, channel_names, pairs_of, quantities_of
 from wm_drake.studies.rig.study import FREQUENCY
+
+MASS = Unit("kg", "kg")
 
 PART = Quantity("part", Share(), form="{:.3g}".format)
 
@@ -63,8 +71,9 @@ def motions_of(
         for motion in motions:
             inertia, share = inertia_share(motion, driven_mass)
             say(
-                f"{motion.loop.name}: {driven_mass:g} kg at the driven end take up to "
-                f"{inertia:.3g} N, {PART.text(share)} of the measured force; taken out.",
+                f"{motion.loop.name}: {MASS.reading(driven_mass)} at the driven end take up to "
+                f"{FORCE.reading(inertia, 3)}, {PART.text(share)} of the measured force; "
+                "taken out.",
                 err=True,
             )
         motions = [without_inertia(motion, driven_mass) for motion in motions]

@@ -63,10 +63,8 @@ def printed_errors(kind: str, bench: Bench, motions: Sequence[Harmonic]) -> list
     table = printed_table()
     rows = table[(table.component == kind) & (table.axis == printed_axis(bench))]
     rmse = rows.set_index(["frequency_hz", "amplitude_mm"])["rmse"]
-    return [
-        float(rmse[m.frequency, LINEAR["displacement"].values(m.amplitude).round(6).item()])
-        for m in motions
-    ]
+    unit = LINEAR["displacement"].unit  # that of the table, whatever the reader's is
+    return [float(rmse[m.frequency, round(unit.from_si(m.amplitude), 6)]) for m in motions]
 
 
 def printed_verdict(kind: str, bench: Bench) -> str:

@@ -55,7 +55,7 @@ def amplitudes_of(runs: SpinRuns) -> xr.Dataset:
             labels.append((name, gasket, row["source"]))
             bands.append("")
             of_row = np.array([row[sensor] for sensor in sensors], dtype=float)
-            sizes.append(of_row / quantity.unit.from_si(1.0))  # a file is in mm
+            sizes.append(quantity.unit.to_si(of_row))  # a file is in mm
         labels.append((name, gasket, OURS))
         bands.append(band_text(case).replace("–", " to "))
         sizes.append(case.measures.amplitude.sel(sensor=sensors).values)

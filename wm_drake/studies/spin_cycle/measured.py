@@ -61,7 +61,7 @@ def read_rms(path: Path, labels: Mapping[str, Sequence[str]]) -> xr.DataArray:
         [labels[dim].index(name) for name in names[column]]
         for column, dim in zip(RMS_COLUMNS, DIMS, strict=False)
     ]
-    measured[tuple(places)] = values / RMS.unit.from_si(1.0)
+    measured[tuple(places)] = RMS.unit.to_si(values)
     return xr.DataArray(measured, labels, DIMS)
 
 

@@ -88,6 +88,7 @@ def spin_cycle_answer(
                         is_in_json=False,
                     ),
                     rms_table("rms", data.rms),
+                    *([rms_table("measured", data.measured)] if "measured" in data else []),
                     rms_table("rms_from_acceleration", data.rms_from_acceleration),
                     *_files(data),
                 ),

@@ -23,6 +23,7 @@ from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import measure
 from wm_drake.simulation.vibration import relative_error
 from wm_drake.studies.executor import RunCases
+from wm_drake.studies.experiment import placed
 from wm_drake.studies.inputs import channel_names, existing_file
 from wm_drake.studies.spin.study import run_spin
 from wm_drake.studies.spin_cycle.measured import DIMS, RMS, read_accelerations, read_rms
@@ -78,10 +79,8 @@ def run_spin_cycle(
             unbalance masses.
     """
     table = evaluate(runs_of(parameters, cases, profile))
-    data = (
-        table.swap_dims(run="case")
-        .drop_vars("run")
-        .rename(region_displacement="rms", region_displacement_integrated="rms_from_acceleration")
+    data = placed(table, {"case": [case.name for case in cases]}).rename(
+        region_displacement="rms", region_displacement_integrated="rms_from_acceleration"
     )
     for name in ("rms", "rms_from_acceleration"):
         data[name].attrs |= RMS.attributes()

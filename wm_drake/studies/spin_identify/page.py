@@ -9,8 +9,9 @@ import xarray as xr
 from wm_drake.parameters import machine_yaml
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Share
+from wm_drake.report import figure as fig
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import HIDDEN, Quantity, text_of, units_of
+from wm_drake.report.quantity import HIDDEN, Quantity, shown, text_of, units_of
 from wm_drake.studies.answer import Answer, Part, Plot
 from wm_drake.studies.fitting.fit import Fit, verdict_of
 from wm_drake.studies.fitting.page import estimates_of, fit_parts, of_unknowns, search_facts
@@ -25,6 +26,7 @@ from wm_drake.studies.spin_cycle.page import (
 from wm_drake.studies.spin_identify.study import (
     KNOWN,
     RELATIVE_ERROR,
+    RESIDUAL,
     SpinModel,
     identified_machine,
 )
@@ -78,6 +80,7 @@ def spin_identify_answer(
                     rms_table("rms", identified.after),
                 ),
             ),
+            Part("Residuals", residuals_shown(identified)),
             Part("Spin profile", (profile_plot(model.profile),)),
             search,
             Part(
@@ -194,6 +197,28 @@ def of_keys(estimates: xr.Dataset, sought: Sequence[Sought]) -> xr.Dataset:
             rows[name] = of_unknowns(words, units, variable.values)
             rows[name].attrs |= {HIDDEN: True} if HIDDEN in variable.attrs else {}
     return rows
+
+
+def residuals_shown(identified: xr.Dataset) -> tuple[Plot, LabelledTable]:
+    """Return the residual of each sensor and axis in each region, with a panel for each case."""
+    regions, directions = identified.region.values.tolist(), identified.axis.values.tolist()
+    x = fig.Axis(ticks=fig.named(regions), range=(-0.6, len(regions) - 0.4), has_grid=False)
+    panels = []
+    for case in identified.case.values.tolist():
+        marks: list[fig.Mark] = [fig.Rule(0.0, color=fig.MARK)]
+        for direction, color in zip(directions, fig.COLOURS, strict=False):
+            sizes = shown(identified.residual.sel(case=case, axis=direction))  # region, sensor
+            at = np.broadcast_to(np.arange(len(regions))[:, None], sizes.shape)
+            marks.append(fig.Points(at.ravel(), sizes.ravel(), color=color, key=direction))
+        title, y = f"case {case}", fig.Axis(label=RESIDUAL.label)
+        panels.append(fig.Panel(title=title, marks=tuple(marks), x=x, y=y))
+    caption = (
+        "Computed less measured RMS displacement with the values found, by the norm of what was "
+        "measured in the case and region: what the search makes small. A point for each sensor."
+    )
+    figure = fig.Figure(panels=fig.in_grid(panels, 1), height=190.0)
+    residuals = identified.residual.rename(accelerometer="sensor").to_dataset(name="residual")
+    return Plot(figure, "Residuals of each region.", caption), LabelledTable("residuals", residuals)
 
 
 def _bars(model: SpinModel, identified: xr.Dataset, index: int) -> Plot:

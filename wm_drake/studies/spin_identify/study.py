@@ -30,6 +30,7 @@ PLANTED = (0.8, 1.25)
 
 AVERAGE_ERROR = Quantity("average error of an RMS displacement", Share(), 1)
 RELATIVE_ERROR = Quantity("relative error", Share(), 2)
+RESIDUAL = Quantity("residual", Share(), 2)
 HALF_WIDTH = Quantity("95 % interval, ±", Share(), 2)
 
 KNOWN = 0.02
@@ -149,7 +150,8 @@ def identify_from_spin(
 
     Returns:
         The fit; and over case, region, accelerometer and axis, RMS displacements [m]: `measured`,
-        `before` the identification, and `after` it, with the identified numbers. Over `case` alone:
+        `before` the identification, and `after` it, with the identified numbers; `residual`, after
+        less measured, by the norm of what was measured in the case and region. Over `case` alone:
         relative errors, [A] Eq. (9), `error_before` and `error_after`, means over the regions. Over
         no dimension: `average_error_before` and `average_error_after`. Over `unknown`:
         `half_width` of the 95 % interval by the value, infinite if the data do not determine it;
@@ -172,6 +174,9 @@ def identify_from_spin(
         data[f"error_{name}"] = RELATIVE_ERROR.named(name).variable("case", error)
         words = f"{AVERAGE_ERROR.words} {name}"
         data[f"average_error_{name}"] = AVERAGE_ERROR.named(words).variable((), average)
+    norms = (measured**2).sum(DIMS[2:]) ** 0.5
+    residual = (computed[1] - measured) / norms.where(norms > 0.0)
+    data["residual"] = RESIDUAL.variable(DIMS, residual.transpose(*DIMS))
     halves = half_widths(fit)
     data["half_width"] = HALF_WIDTH.variable("unknown", halves)
     data["is_identified"] = ("unknown", halves <= KNOWN)

@@ -407,7 +407,7 @@ def judged(measures: xr.Dataset, limits: Sequence[tuple[Limit, Response, float]]
         word = (
             "pass" if broken.upper <= allowed else "fail" if broken.lower > allowed else "undecided"
         )
-        words = (limit.quantity, f"{side} {limit.text}", word)
+        words = (limit.quantity, f"{side} {response.unit.reading(number)}", word)
         rows.append((*words, allowed, broken.estimate, broken.lower, broken.upper))
         numbers.setdefault(name_of(response), []).append(number)
     if not rows:

@@ -369,7 +369,7 @@ def _with_spread(
             raise input_error(message, key=f"{key}.deviation")
         values = values | {"deviation": deviation}
     marginal = _marginal(spread, values, key, can_be_negative=change is Change.DISTANCE)
-    return UncertainVariable(variation, marginal, _text(spread), spread.source)
+    return UncertainVariable(variation, marginal, _text(variation, spread, values), spread.source)
 
 
 def _marginal(spread: Spread, n: dict[str, float], key: str, *, can_be_negative: bool) -> Marginal:
@@ -392,15 +392,27 @@ def _marginal(spread: Spread, n: dict[str, float], key: str, *, can_be_negative:
     return lognormal(n["mean"], n["deviation"], **ends)
 
 
-def _text(spread: Spread) -> str:
-    """Return a distribution in words."""
-    kind = spread.distribution
+def _text(variation: Variation, spread: Spread, values: dict[str, float]) -> str:
+    """Return a distribution in words.
+
+    Args:
+        values: As of `_with_spread`, with the deviation.
+    """
+    kind, unit = spread.distribution, variation.unit
+
+    def place(name: str) -> str:
+        value = values[name]
+        if variation.change is not Change.DISTANCE:
+            return unit.reading(value)
+        sign = "-" if value < 0.0 else "+"
+        return f"nominal {sign} {unit.reading(abs(value))}" if value else "nominal"
+
     if kind not in TRUNCATED:
-        mode = f", mode {spread.mode}" if spread.mode else ""
-        return f"{kind}, {spread.low} to {spread.high}{mode}"
-    ends = [f"{end} {getattr(spread, end)}" for end in ("low", "high") if getattr(spread, end)]
+        mode = f", mode {place('mode')}" if "mode" in values else ""
+        return f"{kind}, {place('low')} to {place('high')}{mode}"
+    ends = [f"{end} {place(end)}" for end in ("low", "high") if end in values]
     truncated = f", truncated ({', '.join(ends)})" if ends else ""
-    return f"{kind}, {spread.mean} ± {spread.deviation}{truncated}"
+    return f"{kind}, {place('mean')} ± {unit.reading(values['deviation'])}{truncated}"
 
 
 def _correlation_factor(tolerances: Tolerances, names: list[str]) -> FloatArray | None:

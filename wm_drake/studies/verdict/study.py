@@ -268,7 +268,7 @@ def _text(parameters: MachineParameters, key: str, factor: float) -> str:
     """Return a multiple of a number as the text that `--set` takes, so that it is what is run."""
     if isinstance(value_at(parameters, key), CurveTable):
         return f"{FACTOR.values(factor):.4g} %"
-    unit = next(unit for name, _, unit in quantities(parameters) if name == key)
+    unit = next(u for name, _, u in quantities(parameters) if name == key).for_reader
     return f"{unit.from_si(factor * value_at(parameters, key)):.4g} {unit.shown}"
 
 

@@ -3,22 +3,16 @@
 Files that a user writes may have any unit; this is about what commands print and write.
 """
 
-import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import replace
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:  # slow to import, and not needed for declarations of options
-    from wm_drake.parameters.units import Unit
 
 SI, US = "si", "us"
 
 READING: ContextVar[str] = ContextVar("reading", default=SI)
 """Whether results are read in SI or in US units."""
 
-_CUSTOMARY = {
+CUSTOMARY = {
     "mm": "in",
     "m": "ft",
     "mm/s": "in/s",
@@ -42,6 +36,10 @@ _CUSTOMARY = {
     "g*m": "oz*in",
     "g*mm": "oz*in",
     "kg*m^2": "lb*ft^2",
+    "kg/m^3": "lb/ft^3",
+    "N/rad": "lbf/rad",
+    "N*s^2/m^2": "lbf*s^2/ft^2",
+    "s/m": "s/ft",
     "g*mm^2": "oz*in^2",
     "N*m/m": "lbf",
     "MPa": "psi",
@@ -49,27 +47,6 @@ _CUSTOMARY = {
     "mJ": "lbf*in",
 }
 """US units of units for reading; all others are the same in both: s, Hz, rpm, deg, W, %."""
-
-
-def reading_unit(unit: "Unit") -> "Unit":
-    """Return a unit with the display unit in which results are read."""
-    if READING.get() == SI:
-        return unit
-    return replace(unit, shown=_CUSTOMARY.get(unit.shown, unit.shown))
-
-
-def finer_decimals(unit: "Unit", decimals: int) -> int:
-    """Return the decimals of a number in the unit in which it is read, for the same digits.
-
-    Args:
-        decimals: Decimals in the display unit of `unit`.
-    """
-    larger = unit.from_si(1.0) / reading_unit(unit).from_si(1.0)
-    return max(0, decimals + math.ceil(math.log10(larger) - ROUNDING))
-
-
-ROUNDING = 0.3
-"""Part of a decimal that is not worth another one."""
 
 
 @contextmanager

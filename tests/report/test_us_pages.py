@@ -1,0 +1,69 @@
+"""`--units us`: no page, picture or table of a command has a number in a unit that the US replaces."""
+
+import html
+import re
+
+import pandas as pd
+import pytest
+from every_page import KINDS, write_page
+from pages import data_of, without_scripts
+
+from wm_drake.parameters import load_machine, quantities, shipped_machines
+from wm_drake.parameters.reading import CUSTOMARY
+from wm_drake.parameters.units import Unit
+from wm_drake.report.quantity import Quantity
+from wm_drake.simulation.measures import MEASURES
+
+REPLACED = [Quantity("", Unit(unit, unit)) for unit in CUSTOMARY]
+ANY = "|".join(sorted((re.escape(q.unit_text) for q in REPLACED), key=len, reverse=True))
+NUMBER = re.compile(rf"[\d.][ \u00a0](?:{ANY})(?![\w/²³·])")
+LABEL = re.compile(rf".*, (?:{ANY})")
+SUFFIXES = tuple(q.suffix for q in REPLACED)
+
+SAME = {"", "%", "percent", "ppm", "dimensionless", "s", "ms", "Hz", "rpm", "rpm/s", "deg", "rad"}
+SAME |= {"deg/s", "rad/s", "rad/s^2", "W", "1/s"}
+"""Display units that are the same in the US."""
+
+WORDS_OF_FILES = ("Laundry of 200 to 600 g", "--clearance '10 mm'")
+"""Words of shipped files, and an example of an option."""
+
+SOON = ("identify_static", "rig_gasket")
+"""Kinds of pages that take a few seconds."""
+
+KINDS_ = [
+    pytest.param(name, marks=[] if name in SOON else [pytest.mark.slow])
+    for name in KINDS
+    if name != "machine"  # it shows a file
+]
+
+
+def test_each_display_unit_is_replaced_or_the_same():
+    machines = map(load_machine, shipped_machines())
+    units = {unit.shown for machine in machines for _, _, unit in quantities(machine)}
+    units |= {v.unit.shown for measure in MEASURES.values() for v in measure.variables}
+    assert units - CUSTOMARY.keys() <= SAME
+
+
+@pytest.mark.parametrize("name", KINDS_)
+def test_a_page_has_numbers_in_us_units_only(name, tmp_path):
+    page = write_page(name, tmp_path, "--units", "us").read_text(encoding="utf-8")
+    before_sources, _, _ = page.partition('<div class="keys">')
+    for words in WORDS_OF_FILES:
+        before_sources = before_sources.replace(html.escape(words), "").replace(words, "")
+    without_code = re.sub(r"<code\b.*?</code>", "", before_sources, flags=re.DOTALL)
+    text = html.unescape(re.sub(r"<[^>]+>", " ", without_scripts(without_code)))
+    assert [text[max(0, m.start() - 40) : m.end()] for m in NUMBER.finditer(text)] == []
+    labels = [label for data in data_of(page) for label in _texts(data)]
+    assert [label for label in labels if LABEL.fullmatch(label)] == []
+    for path in (tmp_path / "out").glob("*.csv"):
+        columns = pd.read_csv(path, nrows=1).columns
+        assert [name for name in columns if name.endswith(SUFFIXES)] == [], path.name
+
+
+def _texts(data):
+    """Yield all texts in JSON data."""
+    if isinstance(data, str):
+        yield data
+    elif isinstance(data, (list, dict)):
+        for one in data.values() if isinstance(data, dict) else data:
+            yield from _texts(one)
