@@ -128,18 +128,21 @@ _ON_STACK = types.ModuleType("arrays_on_stack")
 vars(_ON_STACK).update(empty=stack_array, zeros=_zeros, inf=np.inf, nan=np.nan)
 
 
-def for_one_run(loop: Any) -> Any:
+def for_one_run(loop: Any, **parts: Any) -> Any:
     """Return a long-running loop for a single run: its arrays of lanes are arrays of floats.
 
     The source is the same, so that a program without this package measures what a batch measures.
     The loop must not call others that fill lanes, and may take of numpy only `_ON_STACK`.
+
+    Args:
+        parts: Functions in place of others that the loop calls, by name: laws that are not inlined.
     """
     source = loop.py_func
     single = {
         "lane_array": number_array, "align_stack": _keep_alignment, "WIDTH": 1, "np": _ON_STACK
     }  # fmt: skip
     function = types.FunctionType(
-        source.__code__, source.__globals__ | single, source.__name__, source.__defaults__
+        source.__code__, source.__globals__ | single | parts, source.__name__, source.__defaults__
     )
     options: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract", "nsz"}}
     return numba.njit(pipeline_class=TextCompiler, **options)(function)

@@ -4,6 +4,7 @@ The loops are those of a batch, compiled for a single run (`for_one_run`), so th
 what `wm-drake spin` measures.
 """
 
+import functools
 from typing import Any
 
 import numpy as np
@@ -22,8 +23,9 @@ from wm_drake.elements.sensor import POINT_SIZE
 from wm_drake.elements.telescopic_damper import TUBES_STATE_SIZE
 from wm_drake.engines.compiled.bearing import carrier_motion
 from wm_drake.engines.compiled.cabinet import FEET_BEGIN, SLIPS_BEGIN
-from wm_drake.engines.compiled.integration import Work, integrate_lanes
+from wm_drake.engines.compiled.integration import Work, integrate_lanes, runge_kutta_step
 from wm_drake.engines.compiled.linear import jacobian_lanes
+from wm_drake.engines.compiled.mechanics import state_derivative
 from wm_drake.engines.compiled.midpoint import (
     TUBES,
     VELOCITIES,
@@ -44,6 +46,21 @@ from wm_drake.simulation.signals import filter_both_ways, largest_peaks
 INT32S, INT64S = types.CPointer(types.int32), types.CPointer(types.int64)
 BOUNDS = LARGEST_ANGLE, LARGEST_DISPLACEMENT
 """Largest roll, pitch and yaw [rad] and displacement [m] of a good sample."""
+
+
+@functools.cache
+def _derivative() -> Any:
+    """Return the time derivative as a function of its own.
+
+    Inlined at each of its calls it would take half of the time to compile and of the page.
+    """
+    return for_one_run(state_derivative)
+
+
+@functools.cache
+def _runge_kutta() -> Any:
+    """Return the Runge-Kutta step as a function of its own."""
+    return for_one_run(runge_kutta_step, state_derivative=_derivative())
 
 
 @njit(**OPTIONS)
@@ -80,7 +97,10 @@ def integrator(plan: Any) -> Any:
 def _advance(plan: Any) -> Any:
     """Return the function (steps, n, v, c, history) of steps with one derivative or four."""
     at, elements, count = plan.at, plan.elements, plan.count.numbers
-    size, inputs, run = elements.begins.size, at.stage - at.inputs, for_one_run(integrate_lanes)
+    size, inputs = elements.begins.size, at.stage - at.inputs
+    run = for_one_run(
+        integrate_lanes, state_derivative=_derivative(), runge_kutta_step=_runge_kutta()
+    )
 
     @njit(**OPTIONS)
     def advance(steps, n, v, c, history):
@@ -102,7 +122,8 @@ def _midpoint(plan: Any) -> Any:
     """Return the function (steps, n, v, c, history) of steps of the midpoint rule."""
     at, elements, count = plan.at, plan.elements, plan.count.numbers
     size, inputs, dampers = elements.begins.size, at.stage - at.inputs, len(elements.tubes)
-    run, relax_tubes = for_one_run(integrate_midpoint_lanes), _relaxer(plan)
+    run = for_one_run(integrate_midpoint_lanes, state_derivative=_derivative())
+    relax_tubes = _relaxer(plan)
 
     @njit(**OPTIONS)
     def advance(steps, n, v, c, history):
@@ -131,7 +152,8 @@ def _relaxer(plan: Any) -> Any:
     size, inputs, n = elements.begins.size, at.stage - at.inputs, 2 * TUBES
     begins = elements.begins.tubes + TUBES_STATE_SIZE * np.arange(len(elements.tubes))
     moving = np.array([*range(TUBES), *range(VELOCITIES, VELOCITIES + TUBES)])
-    free, write_jacobian = begins[:, None] + moving, for_one_run(jacobian_lanes)
+    free = begins[:, None] + moving
+    write_jacobian = for_one_run(jacobian_lanes, state_derivative=_derivative())
 
     @njit(**OPTIONS)
     def relax_tubes(v, c, i):
