@@ -78,18 +78,25 @@ def test_a_planted_friction_is_found(calibrate, by):
     assert found["value"] == pytest.approx(truth, rel=0.03)
     assert found["lower_95"] < found["upper_95"]
     assert result["answer"].startswith("Good fit to 3 records")
+    assert result["numbers"][0]["structure"] == "not refuted"
     text = Path("out/calibrated.yaml").read_text()
     assert "calibrated to run_0.mf4" in text
 
 
 @pytest.mark.slow
-def test_a_wrong_structure_is_called_wrong(calibrate):
-    """Plant springs that are half as stiff again; free the friction of the dampers only."""
-    springs = load_machine("reference").spring_types
-    changes = {f"spring_types.{n}.stiffness": 1.5 * s.stiffness for n, s in springs.items()}
-    result = calibrate(plant(changes), "--unknown", FRICTION)
-    assert result["answer"].startswith("Poor fit")
-    assert "do not use the values" in result["answer"]
+@pytest.mark.parametrize("by", ["envelope", "order", "rms", "history"])
+@pytest.mark.parametrize("what", ["springs", "gasket"])
+def test_a_wrong_structure_is_called_wrong(calibrate, what, by):
+    """Plant springs that are half as stiff again, or no gasket; free the friction only."""
+    machine = load_machine("reference")
+    changes = {
+        f"spring_types.{n}.stiffness": 1.5 * s.stiffness for n, s in machine.spring_types.items()
+    }
+    if what == "gasket":
+        changes = {"gasket": None}
+    result = calibrate(plant(changes), "--unknown", FRICTION, "--by", by)
+    assert result["numbers"][0]["structure"] == "wrong"
+    assert result["numbers"][0]["misfit"] > 2.0
 
 
 @pytest.mark.parametrize(

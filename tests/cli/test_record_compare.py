@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lab_machine import recorded_channels
-from lab_writers import WRITERS
+from lab_writers import WRITERS, write_mdf_clocks
 
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import load_machine, load_profile, with_values
@@ -284,15 +284,19 @@ def test_wrong_records_and_options_are_refused(compare, laboratory, channels, wo
     assert len(error.strip().splitlines()) == 1
 
 
-def test_a_channel_without_a_sample_is_refused(compare, laboratory):
-    from lab_writers import write_mdf_clocks
-
+@pytest.mark.parametrize("file", ["run.mf4", "run.csv"])
+def test_a_channel_without_a_sample_is_refused(compare, laboratory, file):
     time, channels, _ = laboratory
-    empty = {name: (time, np.full(len(time), np.nan), "g") for name in channels}
-    write_mdf_clocks("run.mf4", empty)
+    empty = {name: (np.full(len(time), np.nan), "g") for name in channels}
+    if file == "run.csv":
+        write_csv(file, time, empty)
+    else:
+        write_mdf_clocks(file, {name: (time, *of) for name, of in empty.items()})
     write_test(speed="")
-    error = compare("run.mf4", "--test", "test.yaml", code=2)
-    assert "run.mf4: Acc 1: has no valid sample" in error
+    error = compare(file, "--test", "test.yaml", code=2)
+    *_, last = error.strip().splitlines()  # notices of the missing samples stand before
+    assert last.startswith(f"{file}: Acc 1")
+    assert "has no valid sample" in last
 
 
 def test_a_machine_with_several_loads_needs_the_name_of_one(compare, laboratory):

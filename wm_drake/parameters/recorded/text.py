@@ -157,12 +157,15 @@ def _is_number(cell: str) -> bool:
 
 
 def _column(title: str, cells: list[str], lines: np.ndarray) -> Signal | None:
-    """Return a column as a signal; None if it has no number and no time."""
+    """Return a column as a signal; None if it is empty, or has words.
+
+    A column that says that each of its values is missing is a signal without any.
+    """
     name, unit = split_title(title)
     signal = Signal(name, np.empty(0), unit, title=title, lines=lines)
     values = _numbers(cells)
     if values is not None:
-        return replace(signal, values=values) if np.isfinite(values).any() else None
+        return replace(signal, values=values) if any(cells) else None
     first = next((cell for cell in cells if cell.lower() not in MISSING), "")
     if _stamp(first) is not None or _MINUTES.fullmatch(first):
         return _stamped(signal, cells)

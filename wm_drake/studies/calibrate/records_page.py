@@ -19,8 +19,16 @@ from wm_drake.studies.fitting.page import fit_parts, search_facts
 
 ERROR = Quantity("error", Share(), 1)
 
+MOST_MISFIT = 2.0
+"""Largest misfit in standard deviations, those of noise and repeats, that a right structure has."""
+
 MOST_DRAWN = 1500
 """Number of places of a picture from which on some are left out."""
+
+WRONG = (
+    "This is more than noise and repeats explain: the structure of the model, the load or a sensor "
+    "is not that of the test"
+)
 
 FITTED = {"history": "signals"}
 """Word for what is fitted, if it is not amplitudes."""
@@ -56,12 +64,28 @@ def records_answer(model: RecordModel, fit: Fit, data: xr.Dataset, title: str, f
         title,
         summary(model, fit, data),
         model.experiment.machine.parameters,
-        pictures_first([*parts, _residuals(data), _errors(data), search, values, *others]),
+        pictures_first([*parts, _residuals(data), _errors(fit, data), search, values, *others]),
         (("Records", files), ("Load", loads), ("Fitted", model.by), *search_facts(fit)),
         METHOD,
         files={f"{file}.yaml": machine_yaml(machine)},
         warned=tuple(warnings_of(model, fit, data)),
     )
+
+
+def verdict_table(fit: Fit, data: xr.Dataset) -> LabelledTable:
+    """Return the verdict, the misfit, and whether the structure of the model is wrong."""
+    numbers = xr.Dataset(
+        {
+            "verdict": ((), verdict_of(_missed(data))),
+            "structure": ((), "wrong" if _is_wrong(fit, data) else "not refuted"),
+            "misfit": MISFIT.variable((), fit.rmse),
+        }
+    )
+    return LabelledTable("numbers", numbers)
+
+
+def _is_wrong(fit: Fit, data: xr.Dataset) -> bool:
+    return verdict_of(_missed(data)) == "poor" or fit.rmse > MOST_MISFIT
 
 
 def _missed(data: xr.Dataset) -> float:
@@ -84,19 +108,18 @@ def summary(model: RecordModel, fit: Fit, data: xr.Dataset) -> str:
     )
     if verdict_of(_missed(data)) == "poor":
         text += " The machine does not describe the records: do not use the values."
+    elif fit.rmse > MOST_MISFIT:
+        text += f" {WRONG}; the values make up for it."
     if known:
         text += f" Determined: {listed(known)}."
     return f"{text} Not determined: {listed(others)}." if others else text
 
 
 def warnings_of(model: RecordModel, fit: Fit, data: xr.Dataset) -> list[str]:
-    """Return a warning of a poor fit, and of each unknown that is at a bound."""
-    warnings = []
-    if verdict_of(_missed(data)) == "poor":
-        warnings.append(
-            "Poor fit: the structure of the model, the load or a sensor is not that of the test; "
-            "the values are not those of the machine."
-        )
+    """Return a warning of a wrong structure, and of each unknown that is at a bound."""
+    warnings = (
+        [f"{WRONG}; the values are not those of the machine."] if _is_wrong(fit, data) else []
+    )
     machine = {unknown.name for unknown in model.free.unknowns}
     for e in fit.estimates:
         if e.at_bound and e.name in machine:
@@ -177,7 +200,7 @@ def _residuals(data: xr.Dataset) -> Part:
     return Part("Residuals", (plot, LabelledTable("residuals", data[["misfit"]], is_in_json=False)))
 
 
-def _errors(data: xr.Dataset) -> Part:
+def _errors(fit: Fit, data: xr.Dataset) -> Part:
     errors = xr.Dataset(
         {
             name: ERROR.named(name).variable("sensor", data[f"error_{name}"])
@@ -192,4 +215,4 @@ def _errors(data: xr.Dataset) -> Part:
         "RMS of the difference, by that of what was recorded.",
         is_in_terminal=True,
     )
-    return Part("Errors of the sensors", (table,))
+    return Part("Errors of the sensors", (table, verdict_table(fit, data)))
