@@ -93,23 +93,7 @@ def static_curve(axis: str, loops: Sequence[MeasuredLoop]) -> xr.Dataset:
     signals = [_signal(loop) for loop in loops]
     low, high, size = _range(signals, loops[0].path)
     places = _places(low, high, NODES)
-    sides: dict[bool, list[FloatArray]] = {True: [], False: []}
-    energy, way = 0.0, 0.0
-    for position, force, _ in signals:
-        ends = _turning_points(position, TURN * size)
-        for begin, end in itertools.pairwise(ends):
-            branch = slice(begin, end + 1)
-            sides[bool(position[end] > position[begin])].append(
-                _branch(places, position[branch], force[branch])
-            )
-        energy += float(np.trapezoid(force, position))
-        way += float(np.sum(np.abs(np.diff(position[ends]))))
-    if not (sides[True] and sides[False]):
-        raise input_error(
-            "displacement goes one way only; a quasi-static test goes to its end and back",
-            where=loops[0].path,
-        )
-    loading, unloading = (_mean(sides[rises]) for rises in (True, False))
+    loading, unloading, loss = _both_ways(signals, places, size, loops[0].path)
     half = 0.5 * (loading - unloading)
     if not np.any(np.isfinite(half)):
         raise input_error(
@@ -133,7 +117,7 @@ def static_curve(axis: str, loops: Sequence[MeasuredLoop]) -> xr.Dataset:
         "half_width": (load.named("half width of hysteresis"), half),
         "stiffness": (replace(quantities["stiffness"], decimals=None), slope),
         "hysteresis": (load.named("half width of hysteresis"), np.nanmedian(half)),
-        "energy_per_cycle": (ENERGY, energy * 2.0 * (high - low) / way),
+        "energy_per_cycle": (ENERGY, loss * 2.0 * (high - low)),
         "offset": (load.named("offset"), offset),
         "median_rate": (quantities["velocity"].named("median rate"), np.median(rates)),
         "largest_fall": (load.named("largest fall"), fallen),
@@ -143,6 +127,42 @@ def static_curve(axis: str, loops: Sequence[MeasuredLoop]) -> xr.Dataset:
         {name: q.variable(("place",)[: np.ndim(v)], v) for name, (q, v) in numbers.items()},
         attrs={"axis": axis},
     )
+
+
+def _both_ways(
+    signals: Sequence[StaticSignal], places: FloatArray, size: float, path: str
+) -> tuple[FloatArray, FloatArray, float]:
+    """Return mean forces of loading and of unloading at places, and the mean loss of a way.
+
+    Args:
+        signals: Position, force and rate of each test.
+        places: Positions in the range. [m; rad]
+        size: Size of the range. [m; rad]
+        path: File of the first test.
+
+    Returns:
+        Forces, NaN where friction has not developed [N; N m]; work over the way [N; N m].
+
+    Raises:
+        InputError: The motion does not come back.
+    """
+    sides: dict[bool, list[FloatArray]] = {True: [], False: []}
+    energy, way = 0.0, 0.0
+    for position, force, _ in signals:
+        ends = _turning_points(position, TURN * size)
+        for begin, end in itertools.pairwise(ends):
+            branch = slice(begin, end + 1)
+            sides[bool(position[end] > position[begin])].append(
+                _branch(places, position[branch], force[branch])
+            )
+        energy += float(np.trapezoid(force, position))
+        way += float(np.sum(np.abs(np.diff(position[ends]))))
+    if not (sides[True] and sides[False]):
+        raise input_error(
+            "displacement goes one way only; a quasi-static test goes to its end and back",
+            where=path,
+        )
+    return _mean(sides[True]), _mean(sides[False]), energy / way
 
 
 def _range(signals: Sequence[StaticSignal], path: str) -> tuple[float, float, float]:
