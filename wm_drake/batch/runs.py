@@ -58,6 +58,7 @@ class ShownMotion:
         drum_angle, drum_speed: Of the drum against the tub. (n,) [rad, rad/s]
         filtered: Filtered displacements at the sensors. (n, sensors) [m]
         largest: Sample of the largest amplitude of all sensors.
+        left: Share of the water of each wet mass of the load at that sample. (wet,)
     """
 
     time: FloatArray
@@ -67,6 +68,7 @@ class ShownMotion:
     drum_speed: FloatArray
     filtered: FloatArray
     largest: int
+    left: FloatArray
 
 
 @dataclass(frozen=True)
@@ -433,6 +435,7 @@ class LaneRun(Run):
             self.drum_speed.copy(),
             self.filtered.copy(),
             int(largest),
+            self._water_left[largest].copy(),
         )
 
     @property
@@ -494,9 +497,13 @@ class LaneRun(Run):
 
     @property
     def mass_left(self) -> FloatArray:
+        return np.asarray(self.item.case.load.masses(self._water_left).sum(axis=1))
+
+    @property
+    def _water_left(self) -> FloatArray:
+        """Return the share of the water of each wet mass. (n, wet)"""
         states = self.lane.samples[: self.good, : len(self.item.begin)]
-        left = self.item.layout.states.take(states, WATER)
-        return np.asarray(self.item.case.load.masses(left).sum(axis=1))
+        return self.item.layout.states.take(states, WATER)
 
     @property
     def diverged(self) -> str:

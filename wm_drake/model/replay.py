@@ -286,6 +286,11 @@ def _parts(scene: Scene, parameters: MachineParameters, gasket: bool) -> Iterato
         yield _Gasket("/elements/gasket", tub, housing)
 
 
+def ball_radius(mass: float) -> float:
+    """Return the radius of the ball that stands for a mass of laundry. [m]"""
+    return float((3.0 * mass / (4.0 * np.pi * DENSITY)) ** (1.0 / 3.0))
+
+
 def _unbalances(load: Load | None, left: FloatArray | None) -> Iterator[_Part]:
     """Yield the masses of a load: the more water is in one, the larger and bluer it is."""
     if load is None:
@@ -293,7 +298,7 @@ def _unbalances(load: Load | None, left: FloatArray | None) -> Iterator[_Part]:
     left = np.ones(len(load.wet)) if left is None else left
     water = dict(zip(load.wet, left.tolist(), strict=True))
     for index, (unbalance, mass) in enumerate(zip(load.unbalances, load.masses(left), strict=True)):
-        radius = (3.0 * mass / (4.0 * np.pi * DENSITY)) ** (1.0 / 3.0)
+        radius = ball_radius(mass)
         wet = water.get(index, 0.0)
         ends = zip(UNBALANCE_COLOUR.rgba, WATER_COLOUR.rgba, strict=True)
         colour = Rgba(*(dry + wet * (blue - dry) for dry, blue in ends))
@@ -353,6 +358,8 @@ def _with_caption(page: str, motion: Motion, title: str, kinds: list[str]) -> st
         "time": [round(float(t), 4) for t in motion.time],
         "rpm": [round(float(rpm * speed), 1) for speed in motion.speed],
     }
+    is_wet = motion.left is not None and motion.left.size > 0
+    kinds = [*kinds, "water"] if is_wet else kinds
     shown = [
         f'<span style="color:{colour}">&#9632;</span> {kind}'
         for kind, colour in LEGEND.items()
@@ -365,7 +372,13 @@ def _with_caption(page: str, motion: Motion, title: str, kinds: list[str]) -> st
     return f"{body}{caption}{end}{rest}"
 
 
-LEGEND = {"spring": "#0072b2", "damper": "#e69f00", "gasket": "#009e73", "unbalance": "#d55e00"}
+LEGEND = {
+    "spring": "#0072b2",
+    "damper": "#e69f00",
+    "gasket": "#009e73",
+    "unbalance": "#d55e00",
+    "water": "#0052cc",
+}
 """Colours of the legend, the same as those of the shapes."""
 
 CAPTION = """

@@ -14,6 +14,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from wm_drake.batch.runs import Runner, RunResult, ShownMotion
 from wm_drake.batch.work_items import BatchKey, Preparation, WorkItem
@@ -24,6 +25,7 @@ from wm_drake.live.measures import foot_title, heads_of, mount_title, shown_meas
 from wm_drake.live.state import PageState
 from wm_drake.model.expectations import unusual_springs
 from wm_drake.model.machine import Setup
+from wm_drake.model.replay import ball_radius
 from wm_drake.model.scene import Gap
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.plausibility import unusual_numbers
@@ -98,7 +100,7 @@ def picture(machine: OpenMachine, runner: Runner, state: PageState) -> dict[str,
         },
         "values": machine.shown_values(case, state),
         **_gap_of(main),
-        "gap_points": _gap_points(runner, main),
+        "gap_points": _gap_points(runner, main, setup),
         "loads": [{"load": run.case.name, **_gap_of(run)} for run in runs],
         "measured": machine.measured(state),
         "warnings": [{"key": p.key, "message": p.message} for p in warnings],
@@ -266,12 +268,40 @@ def _motion(run: RunResult, setup: Setup) -> dict[str, Any]:
             "time": np.round(motion.time[replay], 4).tolist(),
             "poses": np.round(motion.poses[replay], 6).tolist(),
             "rest": np.round(motion.rest_pose, 6).tolist(),
+            "masses": _masses(run, motion),
+            "places": _places_of_masses(run, setup, replay),
         },
         "largest": {
             "time": float(motion.time[largest]),
             "rpm": float(SPEED.values(motion.drum_speed[largest])),
         },
     }
+
+
+def _masses(run: RunResult, motion: ShownMotion) -> list[dict[str, float]]:
+    """Return the radius of the ball of each mass of the load [m], and its share of water left."""
+    load = run.case.load
+    water = dict(zip(load.wet, motion.left.tolist(), strict=True))
+    return [
+        {"radius": ball_radius(mass), "wet": water.get(number, 0.0)}
+        for number, mass in enumerate(load.masses(motion.left))
+    ]
+
+
+def _places_of_masses(run: RunResult, setup: Setup, samples: Any) -> list[Any]:
+    """Return the places of the masses of the load in W at some samples. (n, masses, 3) [m]"""
+    motion, machine = run.motion, setup.machine
+    assert motion is not None  # the page shows it
+    poses = machine.cache.frame_poses(machine.plant, setup.parameters)
+    origin, axes = poses.on_drum(0.0)
+    turned = Rotation.from_euler("y", motion.drum_angle[samples, None])
+    of_tub = Rotation.from_euler("xyz", motion.poses[samples, :3])
+    at = motion.poses[samples, 3:]
+    places = [
+        at + of_tub.apply(origin + turned.apply(unbalance.position()) @ axes.T)
+        for unbalance in run.case.load.unbalances
+    ]
+    return np.round(np.stack(places, axis=1), 5).tolist() if places else [[]] * len(at)
 
 
 def _envelopes(motion: ShownMotion) -> list[dict[str, Any]]:
@@ -339,14 +369,16 @@ def _forces(record: Record) -> dict[str, Any]:
     }
 
 
-def _gap_points(runner: Runner, run: RunResult) -> dict[str, Any] | None:
+def _gap_points(runner: Runner, run: RunResult, setup: Setup) -> dict[str, Any] | None:
     """Return the two nearest points in W [m] and the pose of the tub at the smallest gap."""
     gap, motion = run.gap, run.motion
     if gap is None or motion is None:
         return None
-    pose = motion.poses[int(np.argmin(np.abs(motion.time - gap.time)))]
+    at = int(np.argmin(np.abs(motion.time - gap.time)))
+    pose = motion.poses[at]
     _, points = runner.scene().nearest_points(pose, gap.moving, gap.fixed)
-    return {"points": points.tolist(), "pose": pose.tolist()}
+    (places,) = _places_of_masses(run, setup, [at])
+    return {"points": points.tolist(), "pose": pose.tolist(), "places": places}
 
 
 def _whole(values: FloatArray) -> list[int]:

@@ -407,16 +407,21 @@ function showMotion() {
   byId('at-gap').disabled = !answer.gap_points;
   const gap = answer.gap_points && {...answer.gap_points, distance: answer.gap.distance};
   if (frame < 0 && gap) {
-    showPose(gap.pose, gap, `${fixed(answer.gap.time, 2)} s, ${fixed(answer.gap.rpm, 0)} rpm: ${answer.gap.moving} to ${answer.gap.fixed}`);
+    showPose(gap.pose, gap, ballsAt(gap.places), `${fixed(answer.gap.time, 2)} s, ${fixed(answer.gap.rpm, 0)} rpm: ${answer.gap.moving} to ${answer.gap.fixed}`);
     return;
   }
   const at = Math.min(Math.max(frame, 0), motion.time.length - 1);
   byId('frame').value = String(at);
-  showPose(motion.poses[at], null, `${fixed(motion.time[at], 2)} s`);
+  showPose(motion.poses[at], null, ballsAt(motion.places?.[at]), `${fixed(motion.time[at], 2)} s`);
 }
 
-function showPose(pose, gap, words) {
-  scene.show(pose, gap, words);
+/** Return the masses of the load at places; a page without a server has none. */
+function ballsAt(places) {
+  return (places ?? []).map((place, k) => ({place, ...answer.motion.masses[k]}));
+}
+
+function showPose(pose, gap, balls, words) {
+  scene.show(pose, gap, balls, words);
   byId('frame-time').textContent = words;
 }
 

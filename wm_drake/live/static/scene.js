@@ -74,11 +74,12 @@ export class SceneView {
   }
 
   /**
-   * Show a pose of the tub (roll, pitch, yaw, x, y, z), and the nearest points [m] if given; `words`
-   * say when it is.
+   * Show a pose of the tub (roll, pitch, yaw, x, y, z), the nearest points [m] if given, and masses
+   * of the load: place, radius [m], and share of water left; `words` say when it is.
    */
-  show(pose, gap, words) {
+  show(pose, gap, balls, words) {
     this.pose = pose;
+    this.balls = balls;
     this.gap = gap;
     const which = gap ? `, smallest gap ${fixed(gap.distance)} mm` : '';
     this.svg.setAttribute('aria-label', `tub in the housing${which}, at ${words}`);
@@ -106,6 +107,12 @@ export class SceneView {
       draw('path', {class: 'housing', d: this.housing.flat().map(closed).join('')}),
       ...this.tub.map((shape) => draw('path', {class: 'tub', d: shape.map((face) => closed(face.map(moved))).join('')})),
     ];
+    for (const {place, radius, wet} of this.balls) {
+      const [cx, cy] = seen(place).map((value) => value.toFixed(1));
+      const ball = {cx, cy, r: (scale * radius).toFixed(1)};
+      parts.push(draw('circle', {class: 'mass', ...ball}));
+      parts.push(draw('circle', {class: 'water', 'fill-opacity': String(wet), ...ball}));
+    }
     if (this.gap) {
       const [x, y] = seen(this.gap.points[0]);
       const left = x > 0.6 * SIZE;
