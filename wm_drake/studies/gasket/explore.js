@@ -173,7 +173,7 @@ const Explore = (() => {
 
   /* Option that runs this setting. */
   function checkText() {
-    const text = (factor, value) => `${factor.name}=${Number(value.toPrecision(5))}${factor.unit ? ` ${factor.unit.replace(/ /g, "*")}` : ""}`;
+    const text = (factor, value) => `${factor.name}=${Number(value.toPrecision(5))}${factor.written ? ` ${factor.written}` : ""}`;
     const moved = factors.map((factor, k) => [factor, state.places[k]]).filter(([, place]) => place !== 0);
     const parts = moved.length ? moved : [[factors[0], 0]];
     return `--check '${parts.map(([factor, place]) => text(factor, valueAt(factor, place))).join(", ")}'`;

@@ -179,6 +179,7 @@ def explorer_data(
                     "name": factor.name,
                     "title": words.factor(factor.name),
                     "unit": words.quantity(factor.name).unit_text,
+                    "written": words.quantity(factor.name).reading.shown,
                     "numbers": words.quantity(factor.name).values(words.numbers(factor.name)),
                 }
                 for factor in trials.factors
