@@ -35,8 +35,19 @@ WORDS_OF_FILES = (
 SOON = ("identify_static", "rig_gasket")
 """Kinds of pages that take a few seconds."""
 
+MOST_VARIED = ("spin", "gasket", "calibration", "compare")
+"""Kinds of pages that have most of the quantities; the others differ in few."""
+
+
+def _marks(kind):
+    """Return the marks of a kind of pages. CI tries the pages with most quantities."""
+    if kind in SOON:
+        return []
+    return [pytest.mark.slow if kind in MOST_VARIED else pytest.mark.hours]
+
+
 KINDS_ = [
-    pytest.param(name, marks=[] if name in SOON else [pytest.mark.slow])
+    pytest.param(name, marks=_marks(name))
     for name in KINDS
     if name != "machine"  # it shows a file
 ]
