@@ -129,7 +129,7 @@ def _facts(model: Model) -> list[tuple[str, str]]:
         "so the intervals are those of the linear model, with the worst of all loads"
         if model.is_linear
         else f"which is less than {SHARE.text(NEAR_LINEAR)}: the intervals follow from how well "
-        "the linear model guesses the answers of the drawn machines from their data; a fit can "
+        "the linear model estimates the answers of the drawn machines from their data; a fit can "
         "reach narrower ones, and more machines (--samples) show smaller gains"
     )
     return [
@@ -195,7 +195,8 @@ def _plot(one: xr.Dataset) -> Plot:
     names = ["now", *(f"{k}. {w}" for k, w in enumerate(one.words.values[1:].tolist(), start=1))]
     reach = float(high.max() - low.min())
     x = fig.Axis(label=quantity.label, range=(None, float(high.max()) + 0.35 * reach))
-    y = fig.Axis(ticks=fig.named(names, places), has_grid=False, has_line=False)
+    rows = (-0.5, len(names) - 0.5)
+    y = fig.Axis(ticks=fig.named(names, places), range=rows, has_grid=False, has_line=False)
     figure = fig.Figure(panels=(fig.Panel(marks=tuple(marks), x=x, y=y),), height=44.0 * len(names))
     return Plot(
         figure,

@@ -131,10 +131,10 @@ class Model:
         if not chosen:
             return missed
         data = np.hstack([self.drawn_data[k] for k in chosen])
-        guessed = self.question.worst(self.middle + data @ self._gain(chosen)[0].T)
-        guessed -= guessed.mean(axis=0)
-        size = np.maximum(np.sum(guessed**2, axis=0), np.finfo(float).tiny)
-        return np.asarray(missed - np.sum(guessed * missed, axis=0) / size * guessed)
+        estimated = self.question.worst(self.middle + data @ self._gain(chosen)[0].T)
+        estimated -= estimated.mean(axis=0)
+        size = np.maximum(np.sum(estimated**2, axis=0), np.finfo(float).tiny)
+        return np.asarray(missed - np.sum(estimated * missed, axis=0) / size * estimated)
 
     def sampled(self, chosen: Sequence[int]) -> FloatArray:
         """Return the answers of the drawn machines, drawn together as measurements do. (N, a)"""
