@@ -46,7 +46,7 @@ def next_answer(model: Model, budget: int, about: str) -> Answer:
     machine = model.question.knowledge.machine.parameters
     return Answer(
         f"What to measure next of machine {machine.name}",
-        f"{answer_text(steps)} {worthless_text(singles)}".strip(),
+        f"{answer_text(steps)} {worthless_text(singles, steps)}".strip(),
         machine,
         (
             Part("Interval after each step", (*_plots(steps), _steps(steps)), GREEDY),
@@ -103,13 +103,14 @@ def _interval(one: xr.Dataset, step: int) -> str:
     return f"{quantity.number(one.low[step])} to {quantity.text(one.high[step])}"
 
 
-def worthless_text(singles: xr.Dataset) -> str:
+def worthless_text(singles: xr.Dataset, steps: xr.Dataset) -> str:
     """Return which measurements are not worth making; "" if all are.
 
-    Of gains that come from drawn machines, those below twice their error are named.
+    Of gains that come from drawn machines, those below twice their error are named. One that helps
+    only after others, as a step, is not.
     """
     is_sampled = bool(singles.error.any())
-    useless = singles.gain < least_gain(singles.error)
+    useless = (singles.gain < least_gain(singles.error)) & ~singles.candidate.isin(steps.words)
     words = singles.candidate.values[useless.values].tolist()
     words = list(dict.fromkeys(text.partition(" (±")[0] for text in words))
     if not words:

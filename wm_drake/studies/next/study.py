@@ -137,11 +137,14 @@ class Model:
         return np.asarray(missed - np.sum(estimated * missed, axis=0) / size * estimated)
 
     def sampled(self, chosen: Sequence[int]) -> FloatArray:
-        """Return the answers of the drawn machines, drawn together as measurements do. (N, a)"""
-        real = self.question.worst(self.drawn)
-        mean = real.mean(axis=0)
+        """Return the answers of the drawn machines, drawn together as measurements do. (N, a)
+
+        They are drawn to the answers of the machine in the middle, to which measurements point that
+        come out as expected.
+        """
+        real, middle = self.question.worst(self.drawn), self.question.worst(self.middle[None])
         share = np.mean(self.missed(chosen) ** 2, axis=0) / np.var(real, axis=0)
-        return np.asarray(mean + np.sqrt(share) * (real - mean))
+        return np.asarray(middle + np.sqrt(share) * (real - middle))
 
     def gain_error(self, chosen: Sequence[int], known: Sequence[int] = ()) -> float:
         """Return the standard error, by the drawn machines, of a gain of the first answer.
