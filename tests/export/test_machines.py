@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import wm_drake as wm
+from wm_drake.elements.stop import Stop
 from wm_drake.engines.compiled.run import run_compiled
 from wm_drake.parameters import SpinProfile, shipped_machines
 from wm_drake.simulation.outputs import variables_of
@@ -38,7 +39,7 @@ imperfections:
     y: 170 mm
 """
 """Parts that no shipped machine has: docs/how-to/rubber.md, compliant-bearing.md."""
-TOGETHER = "a motor, balls, liquid and tubes"
+TOGETHER = "a motor, balls, liquid, a stop and tubes"
 ALIKE = {
     "reference": "test_fmu.py runs it",
     "light_cabinet": "the machine of rubber has its feet",
@@ -66,7 +67,12 @@ def machine_named(name, folder):
     """Return a shipped machine, that of `RUBBER`, or one with the parts of four shipped ones."""
     if name == TOGETHER:
         rings = (wm.load_machine(name).elements for name in ("ball_rings", "liquid_rings"))
+        buffer = Stop(
+            kind="stop", tub_frame="damper_left_tub", housing_frame="damper_left_housing",
+            gap="0 mm", stiffness="5 N/mm", loss="1 s/m", friction=0.3
+        )  # fmt: skip
         parts = {"elements": {ring: e for elements in rings for ring, e in elements.items()}}
+        parts["elements"]["buffer"] = buffer
         parts |= {"drive": wm.load_machine("motor").drive}
         return wm.load_machine("free_stroke").model_copy(update=parts)
     if name != "rubber":
@@ -130,6 +136,8 @@ def test_fmu_equals_engine(name, tmp_path):
     )
     at = np.searchsorted(result["time"], trajectory.time + 1e-9) - 1
     assert {"displacement", "drum_speed"} <= set(columns)
+    if name == TOGETHER:
+        assert np.abs(expected["stop_force"][1]).max() > 1.0  # it is touched
     for variable, outputs in columns.items():
         values = expected[variable][1].reshape(len(at), -1)
         size = np.abs(values).max()
