@@ -109,7 +109,7 @@ def numbers_of(parameters: Stop, ends: Ends) -> Mapping[str, Any]:
     line = ends.tub_point - ends.housing_point
     length = float(np.linalg.norm(line))
     gap = length if parameters.gap is None else parameters.gap
-    if gap >= length and parameters.gap is not None:
+    if parameters.gap is not None and gap >= length:
         text = "must be smaller than the distance of the two frames as drawn"
         raise input_error(f"{text}, {1e3 * length:.4g} mm", key="gap")
     axis = line / length

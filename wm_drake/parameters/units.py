@@ -196,7 +196,7 @@ class Unit:
 
     @property
     def for_reader(self) -> "Unit":
-        """The unit with the display unit in which results are read, see `parameters.reading`."""
+        """Return the unit with the display unit of the reader, see `parameters.reading`."""
         shown = self.shown if READING.get() == SI else CUSTOMARY.get(self.shown, self.shown)
         return self if shown == self.shown else replace(self, shown=shown)
 
@@ -535,10 +535,6 @@ class PureNumber(Unit):
         """Return a number as text that reads back as the same number."""
         return repr(value)
 
-    def to_si(self, values: Any) -> Any:
-        """Return values in the display unit, as a file or an option has them, in SI."""
-        return values / self.from_si(1.0)
-
     def number(self, text: str) -> float:
         """Return a text such as ``'0.4'`` as a number."""
         if _matched(_BARE, text, LONGEST_NUMBER) is None:
@@ -552,10 +548,6 @@ class Share(PureNumber):
     """A share, such as 0.3 or 30 %."""
 
     shown: str = "%"
-
-    def to_si(self, values: Any) -> Any:
-        """Return values in the display unit, as a file or an option has them, in SI."""
-        return values / self.from_si(1.0)
 
     def number(self, text: str) -> float:
         """Return a text such as ``'30 %'`` or ``'0.3'`` as a number."""
