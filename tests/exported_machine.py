@@ -59,7 +59,6 @@ class PageRun:
     status: float
     diverged: float | None
     bands: Any
-    step: float
 
 
 def page_run(data, found):
@@ -68,8 +67,7 @@ def page_run(data, found):
     moved = np.frombuffer(base64.b64decode(found["moved"])).reshape(points, -1)[:sensors].T
     gap = found.get("gap") and found["gap"]["distance"]
     sizes = np.array(found["sizes"], dtype=float)
-    step, bands = data["model"]["stepping"]["step"], found.get("bands")
-    return PageRun(moved, sizes, gap, found["status"], found.get("diverged"), bands, step)
+    return PageRun(moved, sizes, gap, found["status"], found.get("diverged"), found.get("bands"))
 
 
 @dataclass

@@ -79,7 +79,7 @@ def integrator(plan: Any) -> Any:
     """
     elements = plan.elements
     sample = elements.begins.size + elements.begins.rates
-    advance = _midpoint(plan) if plan.integrator == "midpoint" else _advance(plan)
+    advance = _midpoint(plan) if plan.midpoint else _advance(plan)
     signature = types.void(POINTER, POINTER, POINTER, INT32S, types.int32, POINTER, types.int32)
 
     @cfunc(signature, **OPTIONS)
