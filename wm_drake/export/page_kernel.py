@@ -91,10 +91,12 @@ FUNCTIONS = {
 }
 """What makes each compiled function of a plan, by its name. `wm_bin_forces` comes early: it has
 laws of `wm_set_up`, which another process then finds on disk."""
-FIRST = ("wm_set_up", "wm_find_gap")
-"""Functions that the process of an export compiles: it runs `wm_set_up`."""
-MEANWHILE = tuple(name for name in FUNCTIONS if name not in FIRST)
-"""All others, half of the work, for a second process. They are the same whatever may change."""
+FIRST = ("wm_set_up",)
+"""What an export runs; unlike the others, it depends on how many numbers may change in the page."""
+AFTERWARDS = ("wm_find_gap",)
+"""What the same process compiles after it."""
+MEANWHILE = tuple(name for name in FUNCTIONS if name not in FIRST + AFTERWARDS)
+"""What a second process compiles meanwhile: half of the work."""
 
 
 def page_code(plan: Any, names: Sequence[str]) -> dict[str, str]:

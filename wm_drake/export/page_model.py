@@ -5,6 +5,7 @@ packs. That is tried at export, for each number alone and for all at once; what 
 with the reason.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -53,6 +54,8 @@ RESIDUAL = "imperfections.residual_imbalance."
 """Keys of the residual imbalance, which is the last point mass of every load."""
 OTHERWISE = "enters the machine in a way that is not computed in a page"
 """Why most refused numbers cannot change."""
+MULTIPLE = 128
+"""What numbers of the machine file, and of entries, are rounded up to."""
 SMALL = 1e-9
 """Deviation of a packed number that is zero."""
 GASKET = "gasket"
@@ -185,10 +188,22 @@ def _constants(contents: Contents, chosen: _Chosen) -> dict[str, Any]:
         "sections": sections,
         "settled": settled,
         "pairs": [*pairs.ravel(), *distances],
-        "start": [chosen.value_of(key) for key in chosen.slopes],
-        "entries": entries_of(zip(rows, slopes, strict=True)),
+        "start": _padded([chosen.value_of(key) for key in chosen.slopes], 1),
+        "entries": _padded(entries_of(zip(rows, slopes, strict=True)), 3),
         "bodies": [*chosen.bodies.values()],
     }
+
+
+def _rounded(count: int) -> int:
+    """Return a number rounded up, so that machines that differ in numbers have the same plan."""
+    return max(1, math.ceil(count / MULTIPLE)) * MULTIPLE
+
+
+def _padded(rows: Any, width: int) -> FloatArray:
+    """Return rows with rows of zeros behind them, which change nothing, to a `_rounded` number."""
+    padded = np.zeros((_rounded(len(rows)), width))
+    padded[: len(rows)] = np.reshape(rows, (-1, width))
+    return padded
 
 
 def _counts(contents: Contents, chosen: _Chosen) -> Any:
@@ -197,8 +212,8 @@ def _counts(contents: Contents, chosen: _Chosen) -> Any:
     return Counts(
         packed=len(contents.start),
         numbers=len(contents.packed),
-        parameters=len(chosen.slopes),
-        entries=sum(int(np.count_nonzero(slopes)) for slopes in chosen.slopes.values()),
+        parameters=_rounded(len(chosen.slopes)),
+        entries=_rounded(sum(map(np.count_nonzero, chosen.slopes.values()))),
         bodies=len(chosen.bodies),
         unbalances=1 + max([MOST_UNBALANCES, *(len(load.unbalances) for load in loads)]),
         springs=len(setup.springs),

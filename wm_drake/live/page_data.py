@@ -13,7 +13,7 @@ from wm_drake.engines.compiled.stepping import LARGEST_TURN, LARGEST_TURN_OF_MID
 from wm_drake.errors import input_error
 from wm_drake.export.object_code import function_here
 from wm_drake.export.page_contents import Contents
-from wm_drake.export.page_kernel import FIRST, MEANWHILE, page_code
+from wm_drake.export.page_kernel import AFTERWARDS, FIRST, MEANWHILE, page_code
 from wm_drake.export.page_model import (
     UNBALANCE_FIELDS,
     Candidates,
@@ -109,6 +109,7 @@ def _with_code(parameters: MachineParameters, second: SecondProcess) -> dict[str
     model = without_wrong(model, set_up, contents, candidates)
     elements, count = model.plan.elements, model.plan.count
     moved, limits = other_steps(contents, candidates, model.places)
+    code |= page_code(of_run, AFTERWARDS)
     second.wait()
     code |= page_code(of_run, MEANWHILE)
     return {
