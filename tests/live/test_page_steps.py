@@ -7,8 +7,10 @@ import subprocess
 import pytest
 
 from wm_drake.engines.compiled.stepping import Stepping
-from wm_drake.export.page_steps import PRECISION, _pieces
+from wm_drake.export.page_steps import FARTHEST, PRECISION, _pieces
 from wm_drake.live.exported import bundled
+from wm_drake.live.page_data import _put_limits
+from wm_drake.parameters.units import Unit
 
 FULL, HALF, FOUR = (
     Stepping("multistep", 2e-3),
@@ -28,6 +30,14 @@ def test_each_value_is_found_from_which_on_a_run_is_stepped_otherwise():
     assert [how for _, how in _pieces(lambda value: stepping_at(-value), FULL, -1.0, -1.5)] == [
         HALF
     ]
+
+
+def test_a_number_ends_where_the_page_does_not_follow_spin():
+    number = {"least": 0.0, "most": 1e300, "low": 500.0, "high": 2000.0, "allowed": "≥ 0"}
+    _put_limits(number, (-FARTHEST, 1.5), Unit("m", "mm"))
+    assert (number["least"], number["most"], number["low"]) == (0.0, 1.5, 500.0)
+    assert number["high"] == pytest.approx(1495.0)  # within the limit, also when it is rounded
+    assert number["allowed"] == "≥ 0 (on this page ≤ 1500)"
 
 
 CALL = """
