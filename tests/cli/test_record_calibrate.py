@@ -77,8 +77,8 @@ def test_a_planted_friction_is_found(calibrate, by):
     found = result["estimates"][0]
     assert found["value"] == pytest.approx(truth, rel=0.03)
     assert found["lower_95"] < found["upper_95"]
-    assert result["answer"].startswith("Good fit to 3 records")
-    assert result["numbers"][0]["structure"] == "not refuted"
+    verdict = result["numbers"][0]
+    assert (verdict["verdict"], verdict["structure"]) == ("good", "not refuted")
     text = Path("out/calibrated.yaml").read_text()
     assert "calibrated to run_0.mf4" in text
 
@@ -130,7 +130,7 @@ def test_signals_over_time_tell_the_angle_of_the_drum_and_the_clock(calibrate):
     found = {row["unknown"]: row for row in result["estimates"]}
     assert found[FRICTION]["value"] == pytest.approx(truth, rel=0.03)
     assert found["drum angle of run_0.mf4"]["value"] == pytest.approx(40.0, abs=3.0)
-    assert result["answer"].startswith("Good fit to 1 record: the signals ")
+    assert result["numbers"][0]["verdict"] == "good"
 
 
 @pytest.mark.slow
@@ -149,7 +149,7 @@ def test_records_of_two_loads_are_fitted_together(calibrate):
     for key, value in truth.items():
         assert found[key]["value"] == pytest.approx(value, rel=0.03), key
         assert found[key]["lower_95"] < value < found[key]["upper_95"], key
-    assert result["answer"].startswith("Good fit to 5 records")
+    assert result["numbers"][0]["verdict"] == "good"
     table = pd.read_csv("out/fitted_acceleration.csv")
     assert set(table["block"]) == {"middle", "counter"}
 

@@ -17,7 +17,7 @@ from wm_drake.studies.calibrate.recorded import RecordedLoad, without_edges
 from wm_drake.studies.calibrate.records import FreeNumbers, RecordModel, calibrated
 from wm_drake.studies.calibrate.records_page import records_answer
 from wm_drake.studies.calibrate.solutions import FreeQuantities
-from wm_drake.studies.compare.pairs import check_signs
+from wm_drake.studies.compare.checks import check_pair
 from wm_drake.studies.compare.task import CompareTask
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.experiment import Experiment, record_here
@@ -103,7 +103,7 @@ def recorded_load(test: CompareTask, executor: Executor, load_at: Any) -> Record
     """
     pairs = test.pairs(executor)
     for pair in pairs:
-        check_signs(pair, test.sensors)
+        check_pair(pair, test.sensors)
     return RecordedLoad(test.case.name, load_at, tuple(map(without_edges, pairs)))
 
 

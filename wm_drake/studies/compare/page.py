@@ -1,6 +1,7 @@
 """Show recordings beside the model: the agreement in a sentence, pictures, and tables."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 import xarray as xr
@@ -14,20 +15,20 @@ from wm_drake.report.quantity import SPEED, TIME, Quantity, quantity_of, shown, 
 from wm_drake.simulation.displacements import band_of
 from wm_drake.simulation.netcdf import netcdf_bytes
 from wm_drake.studies.answer import Answer, Part, Plot, pictures_first
-from wm_drake.studies.compare.pairs import QUANTITIES, Pair, gravity_warnings
+from wm_drake.studies.compare.agreement import agreement_of
+from wm_drake.studies.compare.checks import gravity_warnings
+from wm_drake.studies.compare.pairs import QUANTITIES, Pair
+from wm_drake.studies.compare.signals import places_of, repeats_of
 from wm_drake.studies.compare.study import (
     CONFIDENCE,
     LEAST_TOLERANCE,
     SINGLE_TOLERANCE,
-    agreement_of,
     amplitudes_of,
     clocks_of,
     integrated_of,
     order_one_of,
     orders_of,
-    places_of,
     regions_of,
-    repeats_of,
     sensors_of,
 )
 
@@ -80,8 +81,8 @@ METHOD = (
     "The model predicts what each recorder would have written: displacement, velocity or specific "
     "force (with gravity) at the point of the sensor, along its axis, behind its AC coupling and "
     "low-pass. Nothing measured is corrected. Measured and predicted signals pass the same filters "
-    "with the same gaps. An amplitude is half the distance between the envelopes, lines from peak "
-    "to peak of the filtered signal."
+    "with the same gaps. An amplitude is the smooth envelope of the filtered signal, the magnitude "
+    "of its analytic signal, as in fits to records; noise hardly changes it."
 )
 
 
@@ -170,11 +171,10 @@ def _parts_of(repeats: xr.Dataset, amplitudes: xr.Dataset, quantity: str, count:
         Part(
             f"{title}: measured and computed",
             (
-                _envelopes(amplitudes, count),
+                _amplitudes(amplitudes, count),
                 _residuals(amplitudes, tolerance),
                 sensors,
-                LabelledTable(f"amplitudes_{quantity}", amplitudes[AMPLITUDES]),
-                LabelledTable(f"envelopes_{quantity}", amplitudes[ENVELOPES], is_in_json=False),
+                LabelledTable(f"amplitudes_{quantity}", amplitudes),
             ),
         ),
         Part(
@@ -208,8 +208,6 @@ def _parts_of(repeats: xr.Dataset, amplitudes: xr.Dataset, quantity: str, count:
     ]
 
 
-AMPLITUDES = ["measured", "computed", "tolerance", "difference", "agrees"]
-ENVELOPES = ["envelope_least", "envelope_most", "envelope_computed"]
 RECORDED, COMPUTED = "recorded", "computed"
 
 
@@ -233,32 +231,25 @@ def _panels(data: xr.Dataset, marks: Callable[[xr.Dataset], list[fig.Mark]], y: 
     return fig.Figure(panels=fig.in_grid(panels, columns, share="x"), height=210.0)
 
 
-def _envelopes(amplitudes: xr.Dataset, count: int) -> Plot:
+def _amplitudes(amplitudes: xr.Dataset, count: int) -> Plot:
     def marks(of: xr.Dataset) -> list[fig.Mark]:
-        drawn: list[fig.Mark] = []
-        x = shown(of.place)
-        for side in ("upper", "lower"):
-            one = of.sel(side=side)
-            low, high = shown(one.envelope_least), shown(one.envelope_most)
-            color = fig.MEASURED
-            if count > 1:
-                known = np.isfinite(low)
-                band = fig.band(
-                    x[known], low[known], high[known], color=color, opacity=0.35, key=RECORDED
-                )
-                drawn.append(band)
-                middle = 0.5 * (low + high)
-                drawn.append(fig.Line(x, middle, color=color, width=1.2, key=RECORDED))
-            else:
-                drawn.append(fig.Line(x, high, color=color, width=2.4, key=RECORDED))
-            drawn.append(fig.Line(x, shown(one.envelope_computed), color=fig.OURS, key=COMPUTED))
-        return drawn
+        x, measured = shown(of.place), shown(of.measured)
+        computed = fig.Line(x, shown(of.computed), color=fig.OURS, key=COMPUTED)
+        line = fig.Line(x, measured, color=fig.MEASURED, width=2.4, key=RECORDED)
+        if count == 1:
+            return [line, computed]
+        low, high = shown(of.measured_least), shown(of.measured_most)
+        known = np.isfinite(low)
+        band = fig.band(
+            x[known], low[known], high[known], color=fig.MEASURED, opacity=0.35, key=RECORDED
+        )
+        return [band, replace(line, width=1.2), computed]
 
-    of_repeats = f"the range of {count} repeats" if count > 1 else "lines of one record"
+    of_repeats = f"mean and range of {count} repeats" if count > 1 else "one record"
     return Plot(
-        _panels(amplitudes, marks, quantity_of(amplitudes.envelope_computed).unit_text),
-        "Measured and computed envelopes of each sensor.",
-        f"Upper and lower envelope within the pass band. Recorded: {of_repeats}.",
+        _panels(amplitudes, marks, quantity_of(amplitudes.measured).unit_text),
+        "Measured and computed amplitudes of each sensor.",
+        f"Amplitude within the pass band: its smooth envelope. Recorded: {of_repeats}.",
     )
 
 

@@ -22,12 +22,12 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.records import Record
 from wm_drake.studies.answer import Answer
+from wm_drake.studies.compare.checks import check_pair
 from wm_drake.studies.compare.gaps import gaps_of
 from wm_drake.studies.compare.options import CompareOptions
 from wm_drake.studies.compare.page import compare_answer
 from wm_drake.studies.compare.pairs import (
     Pair,
-    check_signs,
     measured_profile,
     pair_at,
     paired,
@@ -89,7 +89,7 @@ class CompareTask(Task):
         """Run the machine, align the recordings, and compare."""
         pairs = self.pairs(executor)
         for pair in pairs:
-            check_signs(pair, self.sensors)
+            check_pair(pair, self.sensors)
         gaps = gaps_of(pairs, self.sensors, self.points, Scene(self.machine.parameters))
         driven = "that of the profile" if self.options.speed == "profile" else "recorded"
         details = (("Load", self.case.name), ("Drum speed of the model", driven))
