@@ -121,6 +121,21 @@ def test_wrong_unknowns_are_refused(calibrate, unknown, message):
     assert len(error.strip().splitlines()) == 1
 
 
+def test_noise_is_refused(calibrate):
+    """Give a record of accelerometers that lie on a table: gravity and noise."""
+    parameters, time = load_machine("reference"), 0.005 * np.arange(4000)
+    generator = np.random.default_rng(2)
+    noise = {n: (9.81 + generator.normal(0.0, NOISE, len(time)), "m/s^2") for n in SENSORS}
+    write_mdf(Path("run.mf4"), time, noise)
+    frames = parameters.accelerometer_frames()
+    places = [f"  {n}: {{frame: {frames[n[:2]]}, axis: {n[-1]}}}\n" for n in SENSORS]
+    Path("test.yaml").write_text(f"load: middle\nsensors:\n{''.join(places)}")
+    Path("p.yaml").write_text(PROFILE)
+    error = calibrate(["run.mf4"], "--unknown", FRICTION, code=2)
+    assert error.startswith("run.mf4: no sensor shows the turning drum")
+    assert len(error.strip().splitlines()) == 1
+
+
 @pytest.mark.slow
 def test_signals_over_time_tell_the_angle_of_the_drum_and_the_clock(calibrate):
     """Plant a drum that stood 40 degrees further at the start."""

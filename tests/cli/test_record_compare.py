@@ -224,6 +224,18 @@ def test_an_ac_coupled_sensor_that_is_not_declared_so_is_warned_of(wm_drake, lab
     assert "ac_coupling" in ended.err
 
 
+@pytest.mark.parametrize("has_speed", [True, False])
+def test_noise_is_refused(compare, laboratory, has_speed):
+    time, channels, rpm = laboratory
+    generator = np.random.default_rng(1)
+    noise = {name: (generator.standard_normal(len(time)), "g") for name in channels}
+    write_csv("run.csv", time, {**noise, **({"Drum": (rpm, "rpm")} if has_speed else {})})
+    write_test(**({} if has_speed else {"speed": ""}))
+    error = compare("run.csv", "--test", "test.yaml", code=2)
+    assert error.startswith("run.csv: no sensor shows the turning drum")
+    assert len(error.strip().splitlines()) == 1
+
+
 def test_gaps_and_rounded_stamps(compare, laboratory):
     time, channels, rpm = laboratory
     holed = {name: (values.copy(), unit) for name, (values, unit) in channels.items()}

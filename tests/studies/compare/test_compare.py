@@ -1,15 +1,28 @@
 """Numbers of a comparison against closed forms, and its findings for planted differences."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.stats import binom
 from scipy.stats import t as student
 
+from wm_drake.errors import InputError
 from wm_drake.parameters import SpinProfile
+from wm_drake.parameters.recorded import Synchronous
 from wm_drake.parameters.recorded_sensors import RecordedSensor
 from wm_drake.report.quantity import SPEED
+from wm_drake.simulation.alignment import Alignment
 from wm_drake.simulation.displacements import peak_line
 from wm_drake.studies.compare.agreement import agreement_of
+from wm_drake.studies.compare.checks import (
+    check_pair,
+    largest_share_of_noise,
+    shares_of_order_one,
+)
+from wm_drake.studies.compare.pairs import Pair
+from wm_drake.studies.compare.recordings import TestRecording as Recorded
 from wm_drake.studies.compare.signals import band_passed, envelopes_of, in_pieces, means_at
 from wm_drake.studies.compare.study import LEAST_TOLERANCE, amplitudes_of
 
@@ -124,3 +137,52 @@ def test_noise_raises_an_amplitude_as_rice_says():
     assert raised == pytest.approx(inside**2 / (2.0 * size), abs=0.01 * size)
     assert 0.0 < raised < 0.04 * size
     assert peak_line(run.time.values, passed[:, 0]).mean() < 0.9 * size
+
+
+def pair_of(run, measured, predicted):
+    """Return a pair whose recording has the clock of the run."""
+    channels = {f"a{k}": signal for k, signal in enumerate(measured.T)}
+    recording = Recorded(Synchronous(Path("x.csv"), run.time.values, channels))
+    return Pair(recording, run, Alignment(), measured, predicted)
+
+
+@pytest.mark.parametrize(("seconds", "windows"), [(2.4, 1), (60.0, 23)])
+def test_noise_exceeds_its_share_of_order_one_as_rarely_as_is_said(seconds, windows):
+    run, wave = steady(3.0, seconds=seconds + 0.55)
+    noise = np.random.default_rng(3).standard_normal((len(wave), 2000))
+    shares, counts = shares_of_order_one(pair_of(run, noise, noise))
+    assert set(counts) == {windows}
+    assert shares.mean() == pytest.approx(1.0 / 3.0, abs=0.02)
+    for probability in (0.2, 0.01):
+        alarms = shares > largest_share_of_noise(counts, probability)
+        low, high = binom.ppf((1e-4, 1.0 - 1e-4), len(shares), probability) / len(shares)
+        assert low <= alarms.mean() <= high
+
+
+@pytest.mark.parametrize("color", [0.0, 1.0, 2.0])
+def test_noise_is_refused(color):
+    """Draw noise whose power falls with a power of the frequency."""
+    run, wave = steady(3.0)
+    generator = np.random.default_rng(4)
+    for _ in range(20):
+        spectrum = np.fft.rfft(generator.standard_normal((len(wave), 6)), axis=0)
+        spectrum[1:] *= np.arange(1.0, len(spectrum))[:, None] ** (-0.5 * color)
+        noise = np.fft.irfft(spectrum, len(wave), axis=0)
+        with pytest.raises(InputError, match=r"x\.csv: no sensor shows the turning drum"):
+            check_pair(pair_of(run, noise, np.tile(wave, 6)), {})
+
+
+@pytest.mark.parametrize("frequency", [3.0, 20.0])
+def test_a_weak_vibration_is_no_noise(frequency):
+    """Hide a vibration in noise, in one of three sensors; the noise has three times its size."""
+    for seed in range(10):
+        run, wave = steady(frequency, 2e-3, 6e-3, seed)
+        noise = 6e-3 * np.random.default_rng([seed, 1]).standard_normal((len(wave), 2))
+        predicted = steady(frequency)[1]
+        check_pair(pair_of(run, np.hstack([noise, wave]), np.tile(predicted, 3)), {})
+
+
+def test_a_record_of_few_revolutions_tells_nothing():
+    run, wave = steady(3.0, seconds=2.5)
+    with pytest.raises(InputError, match="8 revolutions"):
+        check_pair(pair_of(run, wave, wave), {})
