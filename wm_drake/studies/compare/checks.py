@@ -17,7 +17,7 @@ from wm_drake.studies.compare.pairs import QUANTITIES, Pair, order_one
 FALSE_ALARM = 1e-3
 """Probability that a record of noise alone passes."""
 
-BESIDE = (1.0 - 3.0 / REVOLUTIONS, 1.0 + 3.0 / REVOLUTIONS)
+NEIGHBOURS = (1.0 - 3.0 / REVOLUTIONS, 1.0 + 3.0 / REVOLUTIONS)
 """Orders on both sides of 1 that a Blackman window of `REVOLUTIONS` just separates from it."""
 
 SHARE = Quantity("", Share(), 0)
@@ -70,7 +70,7 @@ def shares_of_order_one(pair: Pair) -> tuple[FloatArray, np.ndarray]:
     """Return how far order 1 of each sensor stands out of the noise beside it.
 
     In a window of `REVOLUTIONS`, E is the power of order 1 and E- and E+ that of the nearest orders
-    that do not leak into it, `BESIDE`. The share of order 1 is E / (E- + E + E+): near 1 for an
+    that do not leak into it, `NEIGHBOURS`. The share of order 1 is E / (E- + E + E+): near 1 for an
     unbalance, 1/3 in the mean for noise of any size whose spectrum is straight over these orders.
 
     Returns:
@@ -80,9 +80,9 @@ def shares_of_order_one(pair: Pair) -> tuple[FloatArray, np.ndarray]:
     """
     run = pair.run
     angle, time = np.abs(run.drum_angle.values), run.time.values
-    vectors = order_vectors(pair.measured, angle, time, np.array([1.0, *BESIDE]))
+    vectors = order_vectors(pair.measured, angle, time, np.array([1.0, *NEIGHBOURS]))
     step = float(np.median(np.diff(pair.recording.channels.time)))
-    is_fine = vectors.speed.values * BESIDE[-1] * step <= 2.0 * np.pi * HIGHEST_PART
+    is_fine = vectors.speed.values * NEIGHBOURS[-1] * step <= 2.0 * np.pi * HIGHEST_PART
     turned = np.interp(vectors.time, time, angle)
     _, first = np.unique(turned // (2.0 * np.pi * REVOLUTIONS), return_index=True)
     power = np.abs(vectors.values[first[is_fine[first]]]) ** 2  # window, order, sensor
