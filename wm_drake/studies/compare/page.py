@@ -144,21 +144,46 @@ def _worst_text(agreement: xr.Dataset) -> str:
 
 def _parts_of(repeats: xr.Dataset, amplitudes: xr.Dataset, quantity: str, count: int) -> list[Part]:
     """Return the sections about the sensors of a quantity."""
-    names = amplitudes.sensor.values.tolist()
-    about = sensors_of(repeats, amplitudes, quantity)
-    regions = regions_of(repeats, names, quantity)
-    one = order_one_of(repeats, names, quantity)
+    return [
+        _amplitudes_part(repeats, amplitudes, quantity, count),
+        _orders_part(repeats, amplitudes.sensor.values.tolist(), quantity),
+        _regions_part(repeats, amplitudes.sensor.values.tolist(), quantity),
+    ]
+
+
+def _amplitudes_part(
+    repeats: xr.Dataset, amplitudes: xr.Dataset, quantity: str, count: int
+) -> Part:
     tolerance = tolerance_text(count)
-    title = quantity.capitalize()
     sensors = LabelledTable(
         f"sensors_{quantity}",
-        about,
+        sensors_of(repeats, amplitudes, quantity),
         f"Sensors of {quantity}",
         "Largest amplitudes and their difference, [B] Eq. (1); distance of the envelopes over the "
         "whole run, [B] Eq. (2), by the size of the measured ones; correlation of order 1; share "
         f"of the places that agree. {tolerance}",
         is_in_terminal=True,
     )
+    each = LabelledTable(f"amplitudes_{quantity}", amplitudes)
+    shown = (_amplitudes(amplitudes, count), _residuals(amplitudes, tolerance), sensors, each)
+    return Part(f"{quantity.capitalize()}: measured and computed", shown)
+
+
+def _orders_part(repeats: xr.Dataset, names: Sequence[str], quantity: str) -> Part:
+    one = order_one_of(repeats, names, quantity)
+    orders = LabelledTable(
+        f"orders_{quantity}",
+        orders_of(repeats, names, quantity),
+        "Orders",
+        "Largest amplitude of some orders over the whole run; a dash where the samples do not "
+        "resolve the order.",
+    )
+    each = LabelledTable(f"order_one_{quantity}", one, is_in_json=False)
+    return Part(f"Order 1 of {quantity}", (_order_one(one), _phases(one), each, orders))
+
+
+def _regions_part(repeats: xr.Dataset, names: Sequence[str], quantity: str) -> Part:
+    regions = regions_of(repeats, names, quantity)
     errors = LabelledTable(
         f"errors_{quantity}",
         regions[["error"]],
@@ -167,45 +192,14 @@ def _parts_of(repeats: xr.Dataset, amplitudes: xr.Dataset, quantity: str, count:
         "|measured|, [A] Eq. (9).",
         is_in_terminal=True,
     )
-    return [
-        Part(
-            f"{title}: measured and computed",
-            (
-                _amplitudes(amplitudes, count),
-                _residuals(amplitudes, tolerance),
-                sensors,
-                LabelledTable(f"amplitudes_{quantity}", amplitudes),
-            ),
-        ),
-        Part(
-            f"Order 1 of {quantity}",
-            (
-                _order_one(one, ("measured", "computed")),
-                _phases(one),
-                LabelledTable(f"order_one_{quantity}", one, is_in_json=False),
-                LabelledTable(
-                    f"orders_{quantity}",
-                    orders_of(repeats, names, quantity),
-                    "Orders",
-                    "Largest amplitude of some orders over the whole run; a dash where the samples "
-                    "do not resolve the order.",
-                ),
-            ),
-        ),
-        Part(
-            f"RMS of {quantity} in the regions",
-            (
-                errors,
-                LabelledTable(
-                    f"rms_{quantity}",
-                    regions[["measured", "computed"]],
-                    "RMS of each sensor",
-                    "RMS within the pass band in each region of the profile; without regions in "
-                    "the profile, in ranges of drum speed.",
-                ),
-            ),
-        ),
-    ]
+    rms = LabelledTable(
+        f"rms_{quantity}",
+        regions[["measured", "computed"]],
+        "RMS of each sensor",
+        "RMS within the pass band in each region of the profile; without regions in the profile, "
+        "in ranges of drum speed.",
+    )
+    return Part(f"RMS of {quantity} in the regions", (errors, rms))
 
 
 RECORDED, COMPUTED = "recorded", "computed"
@@ -271,16 +265,16 @@ def _residuals(amplitudes: xr.Dataset, tolerance: str) -> Plot:
     )
 
 
-def _order_one(one: xr.Dataset, names: Sequence[str]) -> Plot:
+def _order_one(one: xr.Dataset) -> Plot:
     def marks(of: xr.Dataset) -> list[fig.Mark]:
         x = shown(of.place)
         return [
-            fig.Line(x, shown(of[names[0]]), color=fig.MEASURED, width=2.4, key=RECORDED),
-            fig.Line(x, shown(of[names[1]]), color=fig.OURS, key=COMPUTED),
+            fig.Line(x, shown(of.measured), color=fig.MEASURED, width=2.4, key=RECORDED),
+            fig.Line(x, shown(of.computed), color=fig.OURS, key=COMPUTED),
         ]
 
     return Plot(
-        _panels(one, marks, quantity_of(one[names[0]]).unit_text),
+        _panels(one, marks, quantity_of(one.measured).unit_text),
         "Amplitude of order 1 of each sensor.",
         "Amplitude of order 1, which turns with the unbalance.",
     )
