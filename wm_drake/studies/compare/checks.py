@@ -57,11 +57,12 @@ def _check_order_one(pair: Pair) -> None:
     if (shares > limits).any():
         return
     best = int(np.argmax(shares - limits))
+    orders = ", ".join(f"{order:.3g}" for order in NEIGHBOURS)
     raise input_error(
-        f"no sensor shows the turning drum, its signals are noise: the drum's frequency has "
-        f"{SHARE.text(shares[best])} of the power there and beside it in "
-        f"{list(pair.recording.channels.values)[best]}, and noise up to {SHARE.text(limits[best])};"
-        " a record needs a sensor with more. Are channels, units, profile and machine right?",
+        f"no sensor shows the turning drum above noise: order 1 has {SHARE.text(shares[best])} of "
+        f"the power of orders 1, {orders} in {list(pair.recording.channels.values)[best]}, and "
+        f"noise up to {SHARE.text(limits[best])}; a sensor needs more. Are channels, profile and "
+        "load those of the test?",
         where=str(pair.recording.path),
     )
 
