@@ -51,7 +51,10 @@ def movable(data):
 
 @dataclass
 class PageRun:
-    """Answer of a page: displacements before the filter (n, sensors), amplitudes, gap. [m]"""
+    """Answer of a page: displacements before the filter (n, sensors), amplitudes, gap [m]; frame.
+
+    The frame is that of the smallest gap.
+    """
 
     moved: Any
     sizes: Any
@@ -60,6 +63,7 @@ class PageRun:
     diverged: float | None
     bands: Any
     step: float
+    frame: dict | None = None
 
 
 def page_run(data, found):
@@ -69,7 +73,8 @@ def page_run(data, found):
     gap = found.get("gap") and found["gap"]["distance"]
     sizes = np.array(found["sizes"], dtype=float)
     step, bands = data["model"]["stepping"]["step"], found.get("bands")
-    return PageRun(moved, sizes, gap, found["status"], found.get("diverged"), bands, step)
+    frame = found.get("gap") and found["gap"].get("frame")
+    return PageRun(moved, sizes, gap, found["status"], found.get("diverged"), bands, step, frame)
 
 
 @dataclass
