@@ -28,7 +28,7 @@ SPRING_COLOUR = Rgba(0.0, 0.447, 0.698, 1.0)
 DAMPER_COLOUR, ROD_COLOUR = Rgba(0.90, 0.62, 0.0, 1.0), Rgba(0.25, 0.25, 0.25, 1.0)
 GASKET_COLOUR, RING_COLOUR = Rgba(0.0, 0.62, 0.45, 0.35), Rgba(0.0, 0.45, 0.33, 1.0)
 UNBALANCE_COLOUR, WATER_COLOUR = Rgba(0.835, 0.369, 0.0, 1.0), Rgba(0.0, 0.32, 0.80, 1.0)
-BALL_COLOUR, RACE_COLOUR = Rgba(0.45, 0.45, 0.48, 1.0), Rgba(0.2, 0.2, 0.2, 1.0)
+BALL_COLOUR, RACE_COLOUR = Rgba(0.25, 0.25, 0.28, 1.0), Rgba(0.2, 0.2, 0.2, 1.0)
 
 COILS, COIL_RADIUS, WIRE_RADIUS = 9, 0.017, 0.0028
 """Coils of a drawn spring, radius of the coil and of the wire. [m] For drawing only."""
@@ -423,7 +423,7 @@ LEGEND = {
     "gasket": "#009e73",
     "unbalance": "#d55e00",
     "balancer": "#333333",
-    "ball": "#73737a",
+    "ball": "#404047",
     "liquid": "#0052cc",
     "water": "#0052cc",
 }
