@@ -104,7 +104,7 @@ class State:
 
 
 @dataclass(frozen=True)
-class Ring:
+class RingPicture:
     """How pictures draw a ring on the drum: circles about its axis, and what moves in it as balls.
 
     Attributes:
@@ -172,7 +172,7 @@ class ElementKind:
     frictionless: Mapping[str, Any] = field(default_factory=dict)
     words: str = ""
     picture: Literal["strut", "points"] = "strut"
-    ring: Ring | None = None
+    ring: RingPicture | None = None
     on_plant: Any = None
     trees: int = 1
     place: Callable[..., Any] | None = None

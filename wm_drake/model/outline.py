@@ -139,17 +139,16 @@ def pose_of(x):
 
 
 @long_running
-def nearest_points(pose, moving, fixed, are_round, direction, answer):
+def nearest_points(pose, moving, fixed, are_round, answer):
     """Find the nearest points of two shapes at a pose of the body that carries the first.
 
     Args:
         pose: Roll, pitch, yaw, x, y, z. (6,) [rad, m]
         moving, fixed, are_round: As for `raise_bounds`.
-        direction: Direction in which the search for shapes that overlap begins. (3,)
         answer: Written: distance; direction that separates them; points of both shapes. (10,) [m]
     """
-    d = (direction[0], direction[1], direction[2])
-    answer[0], away, first, second = distance_of(pose_of(pose), moving, fixed, are_round, d)
+    up = (0.0, 0.0, 1.0)
+    answer[0], away, first, second = distance_of(pose_of(pose), moving, fixed, are_round, up)
     for k in range(3):
         answer[1 + k], answer[4 + k], answer[7 + k] = away[k], first[k], second[k]
 

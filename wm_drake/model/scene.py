@@ -296,7 +296,7 @@ class Scene:
         if all(outline.is_exact for outline in outlines):
             rounds, answer = tuple(outline.is_round for outline in outlines), np.empty(10)
             shapes = (outline.numbers for outline in outlines)
-            nearest_points(pose, *shapes, rounds, np.array([0.0, 0.0, 1.0]), answer)
+            nearest_points(pose, *shapes, rounds, answer)
             if answer[0] > APART:
                 return float(answer[0]), answer[4:7], answer[1:4]
         self._set_positions(pose)

@@ -188,7 +188,7 @@ async function run({state}) {
     loads: names.map((load, k) => ({load, ...gapOf(found[k], profile)})),
     measured: own ? [] : data.measured[state.load][state.gasket ? 'yes' : 'no'] ?? [],
     warnings: [], band: data.band,
-    stepping: {integrator: model.stepping.integrator, step: `${Number((1e3 * model.stepping.step).toPrecision(4))} ms`},
+    stepping: {integrator: model.stepping.integrator, step: `${Number((1e3 * model.stepping.step).toPrecision(6))} ms`},
   };
 }
 

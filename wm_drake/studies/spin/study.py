@@ -341,7 +341,7 @@ def _water_in(case: CaseResult, shown: Record) -> FloatArray | None:
 
 def _balls_in(parameters: MachineParameters, shown: Record) -> dict[str, FloatArray]:
     """Return the places in D of the balls of each ring on the drum over a motion, by its name."""
-    found = {}
+    balls = {}
     for name, element in parameters.elements.items():
         kind = element_kind(element.kind)
         if kind.ring is not None:
@@ -349,8 +349,8 @@ def _balls_in(parameters: MachineParameters, shown: Record) -> dict[str, FloatAr
                 output.name: shown[f"{kind.name}_{output.name}"].sel({kind.name: name}).values
                 for output in kind.outputs
             }
-            found[name] = kind.ring.places(element, outputs)
-    return found
+            balls[name] = kind.ring.places(element, outputs)
+    return balls
 
 
 def write_replay(parameters: MachineParameters, case: CaseResult, path: Path) -> None:
