@@ -62,7 +62,6 @@ class PageRun:
     status: float
     diverged: float | None
     bands: Any
-    step: float
     frame: dict | None = None
 
 
@@ -72,9 +71,9 @@ def page_run(data, found):
     moved = np.frombuffer(base64.b64decode(found["moved"])).reshape(points, -1)[:sensors].T
     gap = found.get("gap") and found["gap"]["distance"]
     sizes = np.array(found["sizes"], dtype=float)
-    step, bands = data["model"]["stepping"]["step"], found.get("bands")
     frame = found.get("gap") and found["gap"].get("frame")
-    return PageRun(moved, sizes, gap, found["status"], found.get("diverged"), bands, step, frame)
+    diverged, bands = found.get("diverged"), found.get("bands")
+    return PageRun(moved, sizes, gap, found["status"], diverged, bands, frame)
 
 
 @dataclass

@@ -17,8 +17,8 @@ from wm_drake.rigs import Harmonic, bushing_bench, damper_bench, force_loops
 from wm_drake.simulation.recorded_signal import recorded_signal
 from wm_drake.simulation.runs import simulate
 from wm_drake.studies.compare.task import sensor_points
-from wm_drake.studies.spin_cycle.page import rms_table
 from wm_drake.studies.spin_cycle.study import compiled_runs, run_spin_cycle
+from wm_drake.studies.spin_cycle.tables import rms_table
 
 PAGES = [README, *(path for path in MANUAL if path.parent.name != "decisions")]
 SHELL = ("text", "bash", "sh")

@@ -49,15 +49,18 @@ NOT_RUN = {  # beginning of a command, and why this test does not run it
     "wm-drake study next --free free.yaml": "the tutorial measure-next runs it with a short machine",
     "wm-drake calibrate --free free.yaml --resume": "continues what was interrupted: test_cli_calibrate",
 }
-HOURS = (  # commands of more than ten seconds of processor time; the marker `hours` runs them
+HOURS = (  # commands of more than some five seconds of processor time; the marker `hours` runs them
     "wm-drake verdict", "wm-drake gasket curves folded",
     "wm-drake study cycle", "wm-drake study tolerance", "wm-drake study spin-cycle", "wm-drake study spin-identify",
     "wm-drake study gasket", "wm-drake study drive", "wm-drake study balancer", "wm-drake study design",
     "wm-drake study next",
     "wm-drake study modes", "wm-drake study response", "wm-drake calibrate",
-    "wm-drake spin --engine drake", "wm-drake identify gasket rubber/*.csv --axis radial --method",
+    "wm-drake spin --engine drake",
     "wm-drake identify damper bench/*.csv --law coulomb", "wm-drake identify damper fit/*.csv",
     "wm-drake spin --compare-gasket --out", "wm-drake spin --machine ball_rings",
+    "wm-drake spin --machine liquid_rings", "wm-drake spin --machine heavy_cabinet",
+    "wm-drake spin --load middle --figures", "wm-drake identify gasket rubber/*.csv",
+    "wm-drake gasket curves one_fold.yaml", "wm-drake spin --machine wm-drake-gasket-curves",
 )  # fmt: skip
 OVERVIEWS = ("README.md", "docs/how-to/commands.md")
 """Pages whose commands another page may run."""

@@ -12,16 +12,25 @@ ANALYSES = Path(__file__).parents[2] / "analyses"
 VERDICTS = {HOLDS, FAILS, NOT_COMPARABLE, "met", "missed"}
 LONG = {  # more than five seconds
     "calibrate_reference.py", "check_coverage.py", "check_spin_of_tubes.py", "choose_step.py", "choose_damper_law.py",
-    "check_spin_coverage.py", "compare_error_causes.py", "fit_basins.py", "search_basins.py",
+    "check_spin_coverage.py",
     "check_next.py", "check_record_coverage.py",
     "compare_ball_balancer.py", "compare_dampers.py", "compare_measured_balls.py", "compare_rotor_rig.py", "spin_up_fmu.py",
     "compare_designs.py", "compare_mujoco.py", "compare_searches.py", "compare_speed.py",
-    "fit_coulomb_to_mstv.py", "show_growth.py", "write_paper_a.py", "write_paper_b.py",
+    "fit_coulomb_to_mstv.py", "write_paper_a.py", "write_paper_b.py",
     "show_timeline.py", "time_page.py", "write_paper_c.py", "write_validation.py",
 }  # fmt: skip
+LONGER = {"compare_error_causes.py", "fit_basins.py", "search_basins.py", "show_growth.py"}
+"""More than ten seconds: they compile what nothing else has, or start a cluster."""
+
+
+def marks_of(script):
+    if script in LONGER:
+        return [pytest.mark.hours]
+    return [pytest.mark.slow] if script in LONG else []
+
+
 SCRIPTS = [
-    pytest.param(path.name, marks=[pytest.mark.slow] if path.name in LONG else [])
-    for path in sorted(ANALYSES.glob("*.py"))
+    pytest.param(path.name, marks=marks_of(path.name)) for path in sorted(ANALYSES.glob("*.py"))
 ]
 
 

@@ -135,7 +135,9 @@ def test_both_engines_agree_if_a_cabinet_that_moves_carries_the_elements():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("integrator", ["multistep", "runge_kutta"])
+@pytest.mark.parametrize(
+    "integrator", ["multistep", pytest.param("runge_kutta", marks=pytest.mark.hours)]
+)
 def test_both_engines_move_alike(integrator, sponges):
     machine = build_machine(with_elements(sponges))
     case = Case("middle", machine.parameters.loads["middle"], PROFILE)

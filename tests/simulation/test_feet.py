@@ -10,7 +10,7 @@ from wm_drake.parameters import Load, SpinProfile, Unbalance, load_machine, with
 from wm_drake.parameters.cabinet import Cabinet
 from wm_drake.parameters.spin import Region
 from wm_drake.simulation.cases import Case
-from wm_drake.simulation.feet import foot_loads, foot_measures
+from wm_drake.simulation.feet import FeetLoaded, foot_loads, foot_measures
 from wm_drake.simulation.measures import measure
 from wm_drake.simulation.measures.record import wrenches_on_cabinet
 from wm_drake.simulation.runs import simulate
@@ -55,7 +55,7 @@ def test_feet_are_ordered_counterclockwise():
 def test_rotating_force_at_the_centre():
     """Check least N = W/4 - F/4 sqrt(1 + (h/s)^2) and slide margin mu W - F sqrt(1 + mu^2)."""
     size, weight = 150.0, 70.0 * G
-    found = foot_measures(SQUARE, G, rotating(size), PROFILE, 5e-3)
+    found = foot_measures(FeetLoaded(SQUARE, G, rotating(size)), PROFILE, 5e-3)
     least = 0.25 * (weight - size * np.hypot(1.0, H / S))
     assert least > 0.0
     np.testing.assert_allclose(found["foot_normal_smallest"], least, rtol=1e-5)
@@ -101,7 +101,8 @@ def test_smallest_values_are_those_of_the_history(machine, reference):
     record = simulate(machine, Case("one", LOAD, PROFILE))
     wrenches = wrenches_on_cabinet(record)
     loads = foot_loads(reference.cabinet, reference.gravity, wrenches)
-    found = foot_measures(reference.cabinet, reference.gravity, wrenches, PROFILE, 5e-3)
+    feet = FeetLoaded(reference.cabinet, reference.gravity, wrenches)
+    found = foot_measures(feet, PROFILE, 5e-3)
     smallest = loads.margins.min(axis=0)
     names = ("smallest_foot_load", "slide_margin", "turn_margin", "tilt_margin")
     for column, name in enumerate(names):

@@ -83,7 +83,7 @@ def test_changes_that_machine_or_step_refuse_are_left_out(machine):
     assert allowed["good"].gasket.damping_x == 20.0
 
 
-@pytest.mark.slow
+@pytest.mark.hours
 def test_what_is_kept_of_a_run_are_its_numbers(machine, reference, tmp_path):
     """Compare the memory of three times as many runs; a machine alone takes 4.6 kB."""
     count, grown = KEPT_NUMBERS + 200, []

@@ -33,10 +33,9 @@ from wm_drake.simulation.band import pass_band
 from wm_drake.simulation.cabinet import floor_forces
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.displacements import amplitudes, filtered_lanes
-from wm_drake.simulation.feet import cabinet_of
+from wm_drake.simulation.feet import FeetLoaded, cabinet_of
 from wm_drake.simulation.histories import measure_samples_lanes
 from wm_drake.simulation.measures import MEASURES, Run
-from wm_drake.simulation.measures.run import FeetLoaded
 from wm_drake.simulation.mount_histories import measure_mounts_lanes
 from wm_drake.simulation.mounts import mount_names, sums_size
 from wm_drake.simulation.records import Record, as_record

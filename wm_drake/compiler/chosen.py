@@ -25,17 +25,27 @@ class ChosenLaw:
     Attributes:
         law: The compiled law.
         key: Name and hash of the sources of the law and of all laws that it calls.
+        made_by: Function and arguments that return it in another process.
     """
 
-    def __init__(self, law: Any, name: str) -> None:
+    def __init__(self, law: Any, name: str, made_by: tuple[Any, ...] = ()) -> None:
         """Choose a law.
 
         Args:
             name: Name of what it computes, equal for laws of equal sources.
+            made_by: See the attribute; none for a law that no other process needs.
         """
-        self.law = law
+        self.law, self.made_by = law, made_by
         self.key = f"{name} {_digest_of(law)}"
         _KNOWN[self.key] = law
+
+    def __repr__(self) -> str:
+        """Return the key: what is made of equal laws is kept on disk under equal names."""
+        return self.key
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return how another process makes this law."""
+        return self.made_by
 
 
 _KNOWN: dict[str, Any] = {}

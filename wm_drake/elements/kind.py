@@ -18,6 +18,7 @@ import functools
 from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pickle import PicklingError
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -221,6 +222,12 @@ class ElementKind:
         """Return the name of the kind in diagrams, such as SpringStrut."""
         return "".join(word.capitalize() for word in self.name.split("_"))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return how another process finds this kind: by its name, if that is enough."""
+        if element_kind(self.name) is not self:
+            raise PicklingError(f"'{self.name}' is the name of several kinds")
+        return element_kind, (self.name,)
+
 
 def register_element(kind: ElementKind) -> ElementKind:
     """Make an element kind of another package known, and return it.
@@ -361,7 +368,8 @@ def _law_of_all(
         lines.append(f"    {'' if last else '    '}return law_{number}({arguments})")
     compiled = generated(f"element_{word}", "\n".join(lines) + "\n", names)
     title = "+".join(f"{kind.name}{len(kind.states)}({kind.layout.name})" for kind in kinds)
-    return ChosenLaw(compiled, f"{word} of {title}")
+    made_by = _law_of_all, (kinds, word, arguments, law_of)
+    return ChosenLaw(compiled, f"{word} of {title}", made_by)
 
 
 @functools.cache

@@ -92,10 +92,12 @@ Plan = namedtuple("Plan", ("at", "of", "count", "elements", "gasket", "follows_s
 index of the gasket in the packed numbers (-1 without one), whether the speed is prescribed."""
 
 POINTER = types.CPointer(types.float64)
-RUN_HERE: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract", "nsz"}}
-"""Options of numba for a function that this program runs too."""
-OPTIONS: dict[str, Any] = RUN_HERE | {"pipeline_class": TextCompiler}
-"""Options of one that is a part of others, or that only other programs run."""
+OPTIONS: dict[str, Any] = {
+    "error_model": "numpy",
+    "fastmath": {"contract", "nsz"},
+    "pipeline_class": TextCompiler,
+}
+"""Options of numba for a function that is a part of others, or that other programs run."""
 
 
 def _emit_address(context: Any, builder: Any, sig: Any, args: Any) -> Any:

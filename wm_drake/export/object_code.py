@@ -1,15 +1,18 @@
 """Object files from compiled functions: machine code for a platform, without Python in it."""
 
+import ctypes
 import functools
 import json
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Container, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import dataclass
 
 import llvmlite.binding as llvm
+import numpy as np
 
 from wm_drake.export.description import IDENTIFIER
+from wm_drake.parameters.types import FloatArray
 
 
 @dataclass(frozen=True)
@@ -152,6 +155,31 @@ def _emitted(name: str, symbol: str, text: str, target: _Target) -> bytes:
     if target.form == "object":
         return bytes(machine.emit_object(module))
     return str(machine.emit_assembly(module)).encode()
+
+
+def function_here(name: str, text: str) -> Callable[..., float]:
+    """Return a function from its text, for this process: of arrays of floats, with a number.
+
+    Args:
+        name: Name of the function in the source.
+        text: LLVM's text of the function as numba gives it.
+    """
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    triple = llvm.get_process_triple()
+    machine = llvm.Target.from_triple(triple).create_target_machine(opt=1, codemodel="jitdefault")
+    engine = llvm.create_mcjit_compiler(exposed_module(name, name, text, triple, machine), machine)
+    engine.finalize_object()
+
+    def run(*arrays: FloatArray) -> float:
+        result = np.zeros(2)  # numba's functions write it, and errors, to their first arguments
+        kinds = [ctypes.c_void_p] * (2 + len(arrays))
+        entry = ctypes.CFUNCTYPE(ctypes.c_int, *kinds)(engine.get_function_address(name))
+        places = (array.ctypes.data for array in (result, result[1:], *arrays))
+        entry(*places)
+        return float(result[0])
+
+    return run
 
 
 def exposed_module(

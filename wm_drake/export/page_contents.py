@@ -1,5 +1,6 @@
 """A machine that is set up without load, and again with other numbers, for a page."""
 
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -13,7 +14,7 @@ from wm_drake.elements.spring import SPRING
 from wm_drake.engines.compiled.cabinet import FEET_BEGIN
 from wm_drake.engines.compiled.mechanics import BODIES
 from wm_drake.engines.compiled.packing import DrawnBodies, drum_joint, pack
-from wm_drake.engines.compiled.stepping import choose_stepping
+from wm_drake.engines.compiled.stepping import Stepping, choose_stepping
 from wm_drake.export.kernel import HARMONICS_BEGIN, HARMONICS_SIZE
 from wm_drake.export.page_plan import (
     FREE_LENGTH,
@@ -56,10 +57,6 @@ class Contents:
         self.bodies = DrawnBodies(machine.plant, self.drawn, self.setup.parameters.drive.joint)
         self.packed, self.layout = pack(self.setup)
         parameters = self.setup.parameters
-        self.stepping = choose_stepping(
-            self.setup, self.packed, self.layout, profile, checked_step(parameters, None),
-            checked_integrator(parameters, None)
-        )  # fmt: skip
         self.period = profile.sample_period(parameters.output_period)
         self.band = pass_band(profile, self.period)
         self.scene = Scene(parameters)
@@ -77,6 +74,17 @@ class Contents:
         """
         parameters = self.move(values) if values else self.machine.parameters
         return self.machine.set_up(load, context=self.context, parameters=parameters, gasket=gasket)
+
+    @functools.cached_property
+    def stepping(self) -> Stepping:
+        """Return how runs of the machine as exported are integrated."""
+        return self.stepping_of(self.setup)
+
+    def stepping_of(self, setup: Setup) -> Stepping:
+        """Return how runs of the machine, as it is set up without load, are integrated."""
+        step = checked_step(setup.parameters, None)
+        integrator = checked_integrator(setup.parameters, None)
+        return choose_stepping(setup, *pack(setup), self.profile, step, integrator)
 
     def rows(self, setup: Setup) -> FloatArray:
         """Return `full_rows` without what the functions compute from the others."""

@@ -5,18 +5,21 @@ change in a second array c. Only the equilibrium (`page_statics`) and the search
 gap (`page_gap`) have functions of their own; the run is that of a batch (`page_run`).
 """
 
+import json
+from collections.abc import Sequence
 from typing import Any
 
 from numba import cfunc, types
 
+from wm_drake.compiler.kept import all_sources, kept
 from wm_drake.elements.motion import tub_motion
 from wm_drake.elements.sensor import POINT_SIZE, displacement_at
 from wm_drake.engines.compiled.mechanics import DRUM_RATE
 from wm_drake.export.kernel import (
     HARMONICS_BEGIN,
     HARMONICS_SIZE,
+    OPTIONS,
     POINTER,
-    RUN_HERE,
     load_adder,
     numbers_at,
     row_writer,
@@ -32,19 +35,6 @@ from wm_drake.export.page_statics import (
 )
 
 
-def page_kernel(plan: Any) -> dict[str, Any]:
-    """Return the compiled functions of a machine by name."""
-    return {
-        "wm_set_up": _set_up(plan),
-        "wm_integrate": integrator(plan),
-        "wm_measure": measurer(plan),
-        "wm_measure_mounts": mount_measurer(plan),
-        "wm_smooth": smoother(plan),
-        "wm_find_gap": gap_finder(plan),
-        "wm_bin_forces": force_binner(plan),
-    }
-
-
 def _set_up(plan: Any) -> Any:
     """Return the function (v, c) that packs all numbers and puts the machine to rest.
 
@@ -57,7 +47,7 @@ def _set_up(plan: Any) -> Any:
     place_struts, settle = strut_placer(plan, set_taut), settler(plan, set_taut)
     load_feet, stands = foot_loader(plan), settles and plan.elements.cabinet is not None
 
-    @cfunc(types.float64(POINTER, POINTER), **RUN_HERE)
+    @cfunc(types.float64(POINTER, POINTER), **OPTIONS)
     def wm_set_up(v, c):
         numbers, constants, p = numbers_at(v, 0), numbers_at(c, 0), numbers_at(v, at.packed)
         state, rest = numbers_at(v, at.state), numbers_at(v, at.rest)
@@ -88,3 +78,31 @@ def _set_up(plan: Any) -> Any:
         return status
 
     return wm_set_up
+
+
+FUNCTIONS = {
+    "wm_set_up": _set_up,
+    "wm_bin_forces": force_binner,
+    "wm_integrate": integrator,
+    "wm_measure": measurer,
+    "wm_measure_mounts": mount_measurer,
+    "wm_smooth": smoother,
+    "wm_find_gap": gap_finder,
+}
+"""What makes each compiled function of a plan, by its name. `wm_bin_forces` comes early: it has
+laws of `wm_set_up`, which another process then finds on disk."""
+FIRST = ("wm_set_up", "wm_find_gap")
+"""Functions that the process of an export compiles: it runs `wm_set_up`."""
+MEANWHILE = tuple(name for name in FUNCTIONS if name not in FIRST)
+"""All others, half of the work, for a second process. They are the same whatever may change."""
+
+
+def page_code(plan: Any, names: Sequence[str]) -> dict[str, str]:
+    """Return LLVM's text of functions of a page, from the files of compiled code if kept."""
+
+    def compiled() -> bytes:
+        code = {name: FUNCTIONS[name](plan).inspect_llvm() for name in names}
+        return json.dumps(code).encode()
+
+    key = f"{names} by {all_sources()} of {plan!r}"
+    return dict(json.loads(kept(key, compiled)))

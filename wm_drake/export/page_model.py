@@ -5,8 +5,7 @@ packs. That is tried at export, for each number alone and for all at once; what 
 with the reason.
 """
 
-import ctypes
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,7 +18,6 @@ from wm_drake.engines.compiled.midpoint import TUBES
 from wm_drake.engines.compiled.multistep import PAST_INPUTS, PAST_RATES
 from wm_drake.engines.compiled.packing import initial_state
 from wm_drake.engines.compiled.step_check import slowest_state
-from wm_drake.engines.compiled.stepping import Stepping
 from wm_drake.errors import InputError
 from wm_drake.export.arrangement import drum_parts, entries_of, joined, pair_parts, places_of
 from wm_drake.export.kernel import HARMONICS_SIZE, UNBALANCE_SIZE
@@ -57,7 +55,6 @@ OTHERWISE = "enters the machine in a way that is not computed in a page"
 """Why most refused numbers cannot change."""
 SMALL = 1e-9
 """Deviation of a packed number that is zero."""
-NUMBERS = ctypes.POINTER(ctypes.c_double)
 GASKET = "gasket"
 """Key under which the page takes the gasket out: 1 or 0."""
 
@@ -81,7 +78,6 @@ class PageModel:
     places: dict[str, int]
     of_load: dict[str, FloatArray]
     refused: dict[str, str]
-    stepping: Stepping
     pair_names: list[str]
 
 
@@ -171,7 +167,6 @@ def page_model(contents: Contents, candidates: Candidates) -> PageModel:
         places,
         {name: contents.of_load(load) for name, load in loads.items()},
         chosen.refused,
-        contents.stepping,
         contents.scene.pair_names(),
     )
 
@@ -184,15 +179,15 @@ def _constants(contents: Contents, chosen: _Chosen) -> dict[str, Any]:
     pairs, distances = pair_parts(contents.scene, contents.setup.rest_pose)
     return {
         "packed": contents.packed_rows,
-        "start": [chosen.value_of(key) for key in chosen.slopes],
-        "entries": entries_of(zip(rows, slopes, strict=True)),
         **drum_parts(contents.bodies),
-        "bodies": [*chosen.bodies.values()],
         "initial": initial_state(contents.setup, contents.profile),
         "slowest": slowest_state(contents.setup, contents.layout),
         "sections": sections,
         "settled": settled,
         "pairs": [*pairs.ravel(), *distances],
+        "start": [chosen.value_of(key) for key in chosen.slopes],
+        "entries": entries_of(zip(rows, slopes, strict=True)),
+        "bodies": [*chosen.bodies.values()],
     }
 
 
@@ -220,8 +215,6 @@ def _places(contents: Contents, count: Any) -> Any:
     solved, dampers = max(TUBES, count.springs), len(contents.layout.tubes)
     sizes = {
         "time": 1,
-        "parameters": count.parameters,
-        "bodies": BODY_SIZE * count.bodies,
         "unbalances": UNBALANCE_SIZE * count.unbalances,
         "of_load": HARMONICS_SIZE,
         "speed": 1,
@@ -245,6 +238,8 @@ def _places(contents: Contents, count: Any) -> Any:
         "extremes": count.points + 7,
         "sums": sums_size(count.mounts),
         "answer": GAP_SIZE + count.mounts,
+        "parameters": count.parameters,
+        "bodies": BODY_SIZE * count.bodies,
     }
     return places_of(Places, sizes)
 
@@ -264,7 +259,7 @@ def _plan(contents: Contents, at: Any, of: Any, count: Any) -> Any:
         resting,
         tuple(contents.spring_kinds()),
         layout.gasket,
-        contents.stepping.integrator,
+        bool(layout.tubes) and contents.stepping.integrator == "midpoint",
         largest_rest(sags=sags),
         contents.scene.reach,
         settles and (not others or all(others) == any(others)),
@@ -292,12 +287,12 @@ def _numbers(contents: Contents, chosen: _Chosen, plan: Any) -> tuple[FloatArray
 
 
 def without_wrong(
-    model: PageModel, set_up: Any, contents: Contents, candidates: Candidates
+    model: PageModel, set_up: Callable[..., float], contents: Contents, candidates: Candidates
 ) -> PageModel:
     """Return the model without the numbers for which its functions pack something else.
 
     Args:
-        set_up: Compiled function of this name, for this computer.
+        set_up: The function `wm_set_up`, for this process.
         contents, candidates: Those that the model was made of.
     """
     places, refused = dict(model.places), dict(model.refused)
@@ -318,7 +313,7 @@ def without_wrong(
 
 
 def is_packed_alike(
-    model: PageModel, set_up: Any, contents: Contents, values: Mapping[str, float]
+    model: PageModel, set_up: Callable[..., float], contents: Contents, values: Mapping[str, float]
 ) -> bool:
     """Return whether the functions of a page pack what the engine packs.
 
@@ -329,7 +324,7 @@ def is_packed_alike(
     v = model.numbers.copy()
     for key, value in values.items():
         v[model.places[key]] = value
-    if set_up(*(array.ctypes.data_as(NUMBERS) for array in (v, model.constants))) != 0.0:
+    if set_up(v, model.constants) != 0.0:
         return False
     setup = contents.set_up(values, load=Load(unbalances=()))
     expected = contents.full_rows(setup)

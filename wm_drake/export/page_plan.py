@@ -16,30 +16,31 @@ PUSHES = 4
 """Added to it for a spring that can push."""
 Places = namedtuple(
     "Places",
-    "time parameters bodies unbalances of_load speed packed total state rest trial wrenches slopes "
-    "step rate inputs stage sum past_rates past_inputs length jacobian relaxation extremes sums "
-    "answer size",
+    "time unbalances of_load speed packed total state rest trial wrenches slopes step rate inputs "
+    "stage sum past_rates past_inputs length jacobian relaxation extremes sums answer parameters "
+    "bodies size",
 )
 """Indices in the array of an instance.
 
-parameters: numbers of the machine file by straight lines; bodies: `BODY_SIZE` each; unbalances:
-those of the load, the residual imbalance of the drum last; of_load: what else the load adds to the
-harmonics of the drum; speed: of the drum at the start [rad/s]; packed: packed numbers, then the
-free length of each spring, the measured points and the numbers of the feet; rest: pose of the tub
-at rest; length: largest step of the run [s]; relaxation: matrices of the midpoint rule; extremes,
-sums: what `measure_samples_lanes` and `measure_mounts_lanes` write; answer: the gap (`GAP_SIZE`),
-then the peak force of each mount; the others are arrays to work in.
+unbalances: those of the load, the residual imbalance of the drum last; of_load: what else the load
+adds to the harmonics of the drum; speed: of the drum at the start [rad/s]; packed: packed numbers,
+then the free length of each spring, the measured points and the numbers of the feet; rest: pose of
+the tub at rest; length: largest step of the run [s]; relaxation: matrices of the midpoint rule;
+extremes, sums: what `measure_samples_lanes` and `measure_mounts_lanes` write; answer: the gap
+(`GAP_SIZE`), then the peak force of each mount; parameters: numbers of the machine file by straight
+lines; bodies: `BODY_SIZE` each; the others are arrays to work in. What depends on the numbers that
+may change is last: the functions of a run are the same for any.
 """
 Constants = namedtuple(
     "Constants",
-    "packed start entries harmonics drum bodies initial slowest sections settled pairs size",
+    "packed harmonics drum initial slowest sections settled pairs start entries bodies size",
 )
 """Indices in the array of constants.
 
-packed, start, entries, harmonics, drum: as in `wm_drake.export.kernel`; bodies: `BODY_CONSTANTS`
-each; initial: state before a run; slowest: state at which the machine is linearised for the
-midpoint rule; sections, settled: of the filter; pairs: shapes, `PAIR_SIZE` each, then the distance
-of each pair at the initial pose.
+packed, harmonics, drum, start, entries: as in `wm_drake.export.kernel`; initial: state before a
+run; slowest: state at which the machine is linearised for the midpoint rule; sections, settled: of
+the filter; pairs: shapes, `PAIR_SIZE` each, then the distance of each pair at the initial pose;
+bodies: `BODY_CONSTANTS` each.
 """
 Counts = namedtuple(
     "Counts",
@@ -48,13 +49,14 @@ Counts = namedtuple(
 """How many of each there are; packed: packed numbers, free lengths, points and feet; numbers:
 packed numbers alone."""
 Plan = namedtuple(
-    "Plan", "at of count elements resting springs gasket integrator limits reach settles"
+    "Plan", "at of count elements resting springs gasket midpoint limits reach settles"
 )
 """What the functions are compiled for.
 
 resting: `Mounts` that act at rest; springs: what gives the preload of each, and whether it pushes;
-limits: largest angle and displacement of the rest pose [rad, m]; reach: largest distance of a point
-of the tub group from To [m]; settles: whether the equilibrium is found in the page.
+midpoint: whether runs take the midpoint rule; limits: largest angle and displacement of the rest
+pose [rad, m]; reach: largest distance of a point of the tub group from To [m]; settles: whether the
+equilibrium is found in the page.
 """
 GAP_SIZE = 10
 """Smallest gap, its sample, number of the pair, nearest points of both shapes, number of good

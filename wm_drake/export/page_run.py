@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numba import carray, cfunc, njit, types
 
-from wm_drake.compiler.compilation import for_one_run, law
+from wm_drake.compiler.compilation import for_one_run
 from wm_drake.compiler.elementary import sqrt
 from wm_drake.compiler.matrices import plus, six
 from wm_drake.compiler.vectors import dot
@@ -27,10 +27,11 @@ from wm_drake.engines.compiled.integration import Work, integrate_lanes, runge_k
 from wm_drake.engines.compiled.linear import jacobian_lanes
 from wm_drake.engines.compiled.mechanics import state_derivative
 from wm_drake.engines.compiled.midpoint import (
+    MOVING,
     TUBES,
-    VELOCITIES,
     MidpointWork,
     integrate_midpoint_lanes,
+    write_newton_matrix,
 )
 from wm_drake.engines.compiled.multistep import PAST_INPUTS, PAST_RATES
 from wm_drake.engines.compiled.stepping import ACROSS_JUMPS
@@ -78,7 +79,7 @@ def integrator(plan: Any) -> Any:
     """
     elements = plan.elements
     sample = elements.begins.size + elements.begins.rates
-    advance = _midpoint(plan) if plan.integrator == "midpoint" else _advance(plan)
+    advance = _midpoint(plan) if plan.midpoint else _advance(plan)
     signature = types.void(POINTER, POINTER, POINTER, INT32S, types.int32, POINTER, types.int32)
 
     @cfunc(signature, **OPTIONS)
@@ -151,8 +152,7 @@ def _relaxer(plan: Any) -> Any:
     at, of, elements, count = plan.at, plan.of, plan.elements, plan.count.numbers
     size, inputs, n = elements.begins.size, at.stage - at.inputs, 2 * TUBES
     begins = elements.begins.tubes + TUBES_STATE_SIZE * np.arange(len(elements.tubes))
-    moving = np.array([*range(TUBES), *range(VELOCITIES, VELOCITIES + TUBES)])
-    free = begins[:, None] + moving
+    free = begins[:, None] + np.array(MOVING)
     write_jacobian = for_one_run(jacobian_lanes, state_derivative=_derivative())
 
     @njit(**OPTIONS)
@@ -177,25 +177,6 @@ def _relaxer(plan: Any) -> Any:
                 relaxation[TUBES * row + column] = right[row]
 
     return relax_tubes
-
-
-@law
-def write_newton_matrix(jacobian, h, newton):
-    """Write 1 - h/2 da/dv - h^2/4 da/dq E of a damper, by rows.
-
-    Args:
-        jacobian: Of the positions and velocities of its tubes, by rows.
-        h: Length of a step. [s]
-        newton: Written. (49,)
-    """
-    for row in range(TUBES):
-        a = 2 * TUBES * (TUBES + row)
-        for column in range(TUBES):
-            total = (1.0 if row == column else 0.0) - 0.5 * h * jacobian[a + TUBES + column]
-            for k in range(TUBES):
-                e = jacobian[2 * TUBES * k + TUBES + column]
-                total = total - 0.25 * h * h * jacobian[a + k] * e
-            newton[TUBES * row + column] = total
 
 
 def measurer(plan: Any) -> Any:

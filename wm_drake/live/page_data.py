@@ -4,21 +4,24 @@ import base64
 import json
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from wm_drake.compiler.kept import all_sources, kept
 from wm_drake.engines.compiled.multistep import STEPS_BEFORE
 from wm_drake.engines.compiled.stepping import LARGEST_TURN, LARGEST_TURN_OF_MIDPOINT
 from wm_drake.errors import input_error
+from wm_drake.export.object_code import function_here
 from wm_drake.export.page_contents import Contents
-from wm_drake.export.page_kernel import page_kernel
+from wm_drake.export.page_kernel import FIRST, MEANWHILE, page_code
 from wm_drake.export.page_model import (
     UNBALANCE_FIELDS,
     Candidates,
     page_model,
     without_wrong,
 )
+from wm_drake.export.page_second import SecondProcess
+from wm_drake.export.page_steps import FARTHEST, other_steps
 from wm_drake.export.tunable import LEAST
 from wm_drake.export.wasm import wasm_module
 from wm_drake.live.machine import MOST_STEPS, OpenMachine, drum_of
@@ -54,12 +57,10 @@ SOURCES = {
 }
 """Measures that the compiled machine has: name of the variable, array of a worker's answer and
 index in it, from the sensors or the points on."""
-LARGEST = 1e300
-"""In place of an infinite number, which JSON does not have."""
 LARGEST_TURNS = {
     "multistep": LARGEST_TURN,
     "midpoint": LARGEST_TURN_OF_MIDPOINT,
-    "runge_kutta": LARGEST,
+    "runge_kutta": FARTHEST,
 }
 """Largest turn of the drum in a step, by integrator. [rad]"""
 NOT_HERE = ("loads.", "profile.", "step", "output_period")
@@ -78,6 +79,12 @@ def page_data(parameters: MachineParameters) -> dict[str, Any]:
 
 
 def _page_data(parameters: MachineParameters) -> dict[str, Any]:
+    with SecondProcess() as second:
+        return _with_code(parameters, second)
+
+
+def _with_code(parameters: MachineParameters, second: SecondProcess) -> dict[str, Any]:
+    """Return all that the page knows; two processes compile its code."""
     opened = OpenMachine(parameters, build_machine(parameters), Scene(parameters))
     candidates = _candidates(opened)
     setup, profile = opened.machine.set_up(None), parameters.profile
@@ -92,16 +99,22 @@ def _page_data(parameters: MachineParameters) -> dict[str, Any]:
         return changed
 
     contents = Contents(opened.machine, move, profile, depths)
-    _check_length(profile.duration / contents.stepping.step)
+    of_run = page_model(contents, {}).plan  # before it is known what may change
+    second.compile(of_run)
+    stepping = contents.stepping
+    _check_length(profile.duration / stepping.step)
     model = page_model(contents, candidates)
-    functions = page_kernel(model.plan)
-    model = without_wrong(model, functions["wm_set_up"].ctypes, contents, candidates)
-    code = {name: function.inspect_llvm() for name, function in functions.items()}
+    code = page_code(model.plan, FIRST)
+    set_up = function_here("wm_set_up", code["wm_set_up"])
+    model = without_wrong(model, set_up, contents, candidates)
     elements, count = model.plan.elements, model.plan.count
+    moved, limits = other_steps(contents, candidates, model.places)
+    second.wait()
+    code |= page_code(of_run, MEANWHILE)
     return {
         "program": program(),
         "tree": machine_tree(parameters),
-        "machine": _machine(opened, model.places, model.refused),
+        "machine": _machine(opened, model.places, model.refused, limits),
         "model": {
             "at": model.plan.at._asdict(),
             "count": count._asdict(),
@@ -115,15 +128,16 @@ def _page_data(parameters: MachineParameters) -> dict[str, Any]:
             "mostSteps": MOST_STEPS,
             "fastest": (1.0 + 1e-9) * 2.0 * math.pi / (SAMPLES_OF_TURN * contents.period),
             "stepping": {
-                "integrator": model.stepping.integrator,
-                "step": model.stepping.step,
+                "integrator": stepping.integrator,
+                "step": stepping.step,
                 "period": contents.period,
-                "largestTurn": LARGEST_TURNS[model.stepping.integrator],
+                "moved": moved,
+                "largestTurns": LARGEST_TURNS,
                 "control": contents.layout.control_period,
                 "stepsBefore": STEPS_BEFORE,
             },
         },
-        "wasm": base64.b64encode(wasm_module(code)).decode(),
+        "wasm": base64.b64encode(_wasm(model.plan, code)).decode(),
         "loads": _loads(parameters, model.of_load),
         "profile": {"time": profile.time, "speed": profile.speed},
         "band": contents.band,
@@ -139,6 +153,11 @@ def _page_data(parameters: MachineParameters) -> dict[str, Any]:
             "replay": {"span": REPLAY_SPAN, "rate": REPLAY_RATE},
         },
     }
+
+
+def _wasm(plan: Any, code: Mapping[str, str]) -> bytes:
+    """Return the module of the functions of a plan, from its file if kept."""
+    return kept(f"wasm by {all_sources()} of {plan!r}", lambda: wasm_module(code))
 
 
 def _check_length(steps: float) -> None:
@@ -163,7 +182,10 @@ def _candidates(opened: OpenMachine) -> Candidates:
 
 
 def _machine(
-    opened: OpenMachine, places: Mapping[str, int], refused: Mapping[str, str]
+    opened: OpenMachine,
+    places: Mapping[str, int],
+    refused: Mapping[str, str],
+    limits: Mapping[str, Sequence[float]],
 ) -> dict[str, Any]:
     """Return the machine as the studio has it; each number also with its units and limits."""
     machine = opened.for_page()
@@ -181,6 +203,7 @@ def _machine(
             "table" if slider.number.is_table else "entry" if slider.is_entry else "number"
         )
         number["least"], number["most"] = _limits(slider)
+        _put_limits(number, limits.get(key, (-FARTHEST, FARTHEST)), slider.unit)
         runs = key in places or re.fullmatch(
             r"loads\..*\.unbalances\.\d+\.\w+|profile\.(time|speed)\.\d+", key
         )
@@ -191,17 +214,28 @@ def _machine(
     return machine
 
 
+def _put_limits(number: dict[str, Any], limits: Sequence[float], unit: Unit) -> None:
+    """Put limits that only the page has [SI] on field and slider of a number."""
+    number["least"] = max(number["least"], limits[0])
+    number["most"] = min(number["most"], limits[1])
+    for sign, end, limit in zip("≥≤", ("low", "high"), limits, strict=True):
+        if abs(limit) < FARTHEST:
+            shown = unit.from_si(limit)
+            number[end] += 1.01 * (shown - number[end])
+            number["allowed"] = f"{number['allowed']} (on this page {sign} {shown:.4g})".strip()
+
+
 def _limits(slider: Slider) -> tuple[float, float]:
     """Return the ends of the allowed range of a number; one that is excluded is near. [SI]"""
     allowed = slider.allowed
     low = allowed.low if allowed.low_is_in else allowed.low + LEAST
     high = allowed.high if allowed.high_is_in else allowed.high - LEAST
-    return max(low, -LARGEST), min(high, LARGEST)
+    return max(low, -FARTHEST), min(high, FARTHEST)
 
 
 def _finite(values: list[float]) -> list[float]:
     """Return numbers for JSON, which has no infinite ones."""
-    return [max(-LARGEST, min(LARGEST, value)) for value in values]
+    return [max(-FARTHEST, min(FARTHEST, value)) for value in values]
 
 
 def _loads(parameters: MachineParameters, of_load: Mapping[str, Any]) -> dict[str, Any]:
@@ -220,8 +254,8 @@ def _masses() -> dict[str, Any]:
     return {
         name: {
             "units": {u.label: 1.0 / u.from_si(1.0) for u in (Unit(si, si), Unit(si, shown))},
-            "least": 0.0 if name in ("mass", "radius") else -LARGEST,
-            "most": LARGEST,
+            "least": 0.0 if name in ("mass", "radius") else -FARTHEST,
+            "most": FARTHEST,
             "allowed": "≥ 0" if name in ("mass", "radius") else "any number",
         }
         for name, (si, shown) in fields.items()

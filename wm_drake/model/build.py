@@ -65,13 +65,7 @@ def add_washing_machine(
     placed = placed_elements(plant, poses, parameters)
     points = measured_points(tub_points(poses, parameters), np.zeros(6))
     wiring = Wiring(builder, plant, layout, prefix)
-    by_label, on_tub, links = dict[str, ElementSystem](), list[tuple[str, Any]](), list[Link]()
-    for label, element, kind, tree in placed.by_tree():
-        system = by_label[label] = ElementSystem(kind, element.packed(), element.state_size)
-        if tree:
-            links.append(Link(label, system, tree))
-        else:
-            on_tub.append((label, system))
+    by_label, on_tub, links = _element_systems(placed)
     drive = motor_of(parameters.drive)
     friction = ElementSystem(DRUM_FRICTION, packed_friction(drive)) if drive else None
     tub_force, sensors = TubForce(), Sensors(points)
@@ -146,9 +140,7 @@ def build_machine(
     builder = DiagramBuilder()
     systems = add_washing_machine(builder, parameters)
     if meshcat is not None:
-        shown = systems.outputs.get("tub_in_cabinet", systems.outputs["state"])
-        state = systems.outputs["state"]
-        add_visualizer(builder, parameters, systems.state_layout, shown, meshcat, state)
+        add_visualizer(builder, systems, meshcat)
     for name, port in systems.inputs.items():
         builder.ExportInput(port, name)
     for name, port in systems.outputs.items():
@@ -161,6 +153,20 @@ def build_machine(
 def machine_of(machine: AnyMachine) -> Machine:
     """Return a machine that may be given by its parameters, name or file, built."""
     return machine if isinstance(machine, Machine) else build_machine(machine)
+
+
+def _element_systems(
+    placed: PlacedElements,
+) -> tuple[dict[str, ElementSystem], list[tuple[str, Any]], list[Link]]:
+    """Return the systems of all elements by label, those on the tub, and those of tubes."""
+    by_label, on_tub, links = dict[str, ElementSystem](), list[tuple[str, Any]](), list[Link]()
+    for label, element, kind, tree in placed.by_tree():
+        system = by_label[label] = ElementSystem(kind, element.packed(), element.state_size)
+        if tree:
+            links.append(Link(label, system, tree))
+        else:
+            on_tub.append((label, system))
+    return by_label, on_tub, links
 
 
 def _by_kind(placed: PlacedElements, by_label: dict[str, ElementSystem]) -> dict[str, Any]:

@@ -4,14 +4,15 @@ import numpy as np
 from pydrake.geometry import Box, Meshcat, MeshcatVisualizer, Rgba, SceneGraph
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import Context, DiagramBuilder, EventStatus, LeafSystem, OutputPort
+from pydrake.systems.framework import Context, DiagramBuilder, EventStatus, LeafSystem
 from pydrake.systems.primitives import MatrixGain
 from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
 from wm_drake.elements.motion import POSE
 from wm_drake.model.bodies import add_bodies
+from wm_drake.model.machine import MachineSystems
 from wm_drake.model.scene import with_fixed_cabinet
-from wm_drake.model.state_layout import StateLayout, state_layout_of
+from wm_drake.model.state_layout import state_layout_of
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
 from wm_drake.systems.callbacks import NO_SLOTS, callback
@@ -73,34 +74,24 @@ def with_rigid_bearing(parameters: MachineParameters) -> MachineParameters:
     return parameters.model_copy(update={"imperfections": rigid})
 
 
-def add_visualizer(
-    builder: DiagramBuilder,
-    parameters: MachineParameters,
-    state_layout: StateLayout,
-    state: OutputPort,
-    meshcat: Meshcat,
-    plant_state: OutputPort,
-) -> None:
+def add_visualizer(builder: DiagramBuilder, systems: MachineSystems, meshcat: Meshcat) -> None:
     """Add systems that show a machine in Meshcat while a simulation runs.
 
     The shapes belong to a second plant that only follows the positions, so they cannot touch the
     dynamics. With a compliant bearing the drum is shown on the tub's axis. A cabinet that moves is
     shown where it is, on a floor.
-
-    Args:
-        state: Output port of the plant's state; for a cabinet that moves, port of the state of tub
-            and drum seen from it.
     """
+    state = systems.outputs.get("tub_in_cabinet", systems.outputs["state"])
     scene_graph = builder.AddNamedSystem("shapes", SceneGraph())
     plant = MultibodyPlant(time_step=0.0)
     plant.RegisterAsSourceForSceneGraph(scene_graph)
-    shown = with_fixed_cabinet(with_rigid_bearing(parameters))
+    shown = with_fixed_cabinet(with_rigid_bearing(systems.parameters))
     add_bodies(plant, shown)
     layout = state_layout_of(plant, shown)
     select = np.zeros((plant.num_positions(), state.size()))
     shown_trees = np.concatenate(layout.trees)
-    moved_trees = np.concatenate(state_layout.trees[: len(layout.trees)])
-    if parameters.cabinet_moves:  # the state is that of tub and drum alone
+    moved_trees = np.concatenate(systems.state_layout.trees[: len(layout.trees)])
+    if systems.cabinet:  # the state is that of tub and drum alone
         moved_trees = np.arange(len(shown_trees))
     select[shown_trees, moved_trees] = 1.0
     positions = builder.AddNamedSystem("shown_positions", MatrixGain(select))
@@ -111,10 +102,16 @@ def add_visualizer(
         poses.get_output_port(), scene_graph.get_source_pose_port(plant.get_source_id())
     )
     MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)
-    if parameters.cabinet_moves and parameters.cabinet is not None:
-        add_floor(meshcat, parameters.cabinet.floor)
-        pose = np.eye(plant_state.size())[state_layout.cabinet]
-        selected = builder.AddNamedSystem("cabinet_pose", MatrixGain(pose))
-        cabinet = builder.AddNamedSystem("shown_cabinet", ShownCabinet(meshcat))
-        builder.Connect(plant_state, selected.get_input_port())
-        builder.Connect(selected.get_output_port(), cabinet.GetInputPort("pose"))
+    if systems.cabinet and systems.parameters.cabinet is not None:
+        add_floor(meshcat, systems.parameters.cabinet.floor)
+        _add_cabinet(builder, systems, meshcat)
+
+
+def _add_cabinet(builder: DiagramBuilder, systems: MachineSystems, meshcat: Meshcat) -> None:
+    """Add the systems that show a cabinet that moves where it is."""
+    state = systems.outputs["state"]
+    pose = np.eye(state.size())[systems.state_layout.cabinet]
+    selected = builder.AddNamedSystem("cabinet_pose", MatrixGain(pose))
+    cabinet = builder.AddNamedSystem("shown_cabinet", ShownCabinet(meshcat))
+    builder.Connect(state, selected.get_input_port())
+    builder.Connect(selected.get_output_port(), cabinet.GetInputPort("pose"))

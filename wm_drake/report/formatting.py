@@ -6,14 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from wm_drake.parameters.units import Unit
-
-MM_PER_M = Unit("m", "mm").from_si(1.0)
-GM_PER_KGM = Unit("kg*m", "g*m").from_si(1.0)
-MPA_PER_PA = Unit("Pa", "MPa").from_si(1.0)
-MS_PER_S = Unit("s", "ms").from_si(1.0)
-RPM_PER_RAD_S = Unit("rad/s", "rpm").from_si(1.0)
-
 MISSING = "–"
 """Text of a value that does not exist."""
 

@@ -161,7 +161,6 @@ class SectionedPage:
         method: Sentences on the method, below the facts.
         tables: Tables of what was run, below them.
         advice: Section without anchor between the summary and the contents.
-        numbers_title: Heading of the numbers of the machine.
         script: Script of the page, beside that of the pictures.
         live: Page that runs the machine, shown in a frame when it is opened; "" for none.
     """
@@ -176,7 +175,6 @@ class SectionedPage:
     method: str = ""
     tables: Sequence[Table] = ()
     advice: Section | None = None
-    numbers_title: str = "Parameters"
     script: Path | None = None
     live: str = ""
 

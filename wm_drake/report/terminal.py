@@ -3,18 +3,10 @@
 import os
 import sys
 from contextvars import ContextVar
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any
 
 import rich.console
 import typer
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from rich.table import Table
-
-Printed: TypeAlias = "Iterable[Table | str]"
-"""What a result prints: tables and sentences."""
 
 QUIET: ContextVar[bool] = ContextVar("quiet", default=False)
 """Whether the running command has the option `--quiet`."""

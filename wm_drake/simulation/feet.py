@@ -1,7 +1,6 @@
 """Loads of the feet of the cabinet and margins against lift-off, sliding, turning and tilting."""
 
 import functools
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -116,26 +115,30 @@ def _loads(
     return loads, of_feet
 
 
-def foot_measures(
-    cabinet: Cabinet,
-    gravity: float,
-    wrenches: FloatArray,
-    profile: SpinProfile,
-    period: float,
-    *,
-    floor_forces: FloatArray | None = None,
-    ranges: Sequence[np.ndarray] = (),
-) -> dict[str, FloatArray]:
+@dataclass(frozen=True)
+class FeetLoaded:
+    """What the measures of the feet are computed from.
+
+    Attributes:
+        cabinet, gravity: Cabinet and gravity. [m/s^2]
+        wrenches: (n, 6) moment about the origin of W and force of all mounts on the cabinet, in W.
+            [N m, N]
+        floor_forces: (n, 4, 3) forces of the floor on the feet of a cabinet that moves. [N]
+        ranges: Which samples belong to each part of the run, for a profile without regions.
+    """
+
+    cabinet: Cabinet
+    gravity: float
+    wrenches: FloatArray
+    floor_forces: FloatArray | None = None
+    ranges: tuple[np.ndarray, ...] = ()
+
+
+def foot_measures(feet: FeetLoaded, profile: SpinProfile, period: float) -> dict[str, FloatArray]:
     """Return the measures of the feet of a run.
 
     Args:
-        gravity: [m/s^2]
-        wrenches: (n, 6) moment about the origin of W and force of all mounts on the cabinet, in W.
-            [N m, N]
         period: Time between samples. [s]
-        floor_forces: As for `foot_loads`.
-        ranges: Which samples (n,) belong to each part of the run, in place of the regions of a
-            profile that has none.
 
     Returns:
         By the names of `BY_FOOT`, `MARGINS` and `REGION_VARIABLES`: smallest and largest normal
@@ -143,13 +146,14 @@ def foot_measures(
         smallest margins of sliding [N], turning [N m] and tilting [N m] over the run; the same in
         each region (regions,). NaN without samples, and for regions without `region_samples`.
     """
-    p = packed_feet(cabinet, gravity)
-    parts: list[Any] = [*region_samples(profile, period, len(wrenches))] or [*ranges]
+    p, count = packed_feet(feet.cabinet, feet.gravity), len(feet.wrenches)
+    parts: list[Any] = [*region_samples(profile, period, count)] or [*feet.ranges]
     extremes, smallest = np.empty((3, FEET_COUNT)), np.empty((1 + len(parts), len(MARGINS)))
-    region_of = np.full(len(wrenches), -1, dtype=np.int64)
+    region_of = np.full(count, -1, dtype=np.int64)
     for number, part in enumerate(parts):
         region_of[part] = number
-    foot_extremes(*_loads(p, wrenches, floor_forces), p, region_of, extremes, smallest)
+    loads = _loads(p, feet.wrenches, feet.floor_forces)
+    foot_extremes(*loads, p, region_of, extremes, smallest)
     smallest[~np.isfinite(smallest)] = np.nan
     rows = (NORMAL_SMALLEST, NORMAL_LARGEST, TANGENTIAL_LARGEST)
     of_feet = dict(zip(BY_FOOT, (extremes[row] for row in rows), strict=True))

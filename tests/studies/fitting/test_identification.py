@@ -10,7 +10,7 @@ from wm_drake.studies.fitting.assessment import assess, correlation_time
 from wm_drake.studies.fitting.fit import SearchLog
 from wm_drake.studies.fitting.methods import METHODS, identify
 from wm_drake.studies.fitting.page import estimates_of
-from wm_drake.studies.fitting.problem import FitProblem, Measurement, Unknown, point_by_point
+from wm_drake.studies.fitting.problem import FitProblem, Measurement, Unknown
 from wm_drake.studies.fitting.surfaces import (
     QuadraticSurface,
     SurfaceRegion,
@@ -175,7 +175,7 @@ def test_rmse_per_test_is_absolute_and_normalised_by_the_largest_measured_value(
             Measurement("low", np.array([1.0, 3.0])),
             Measurement("high", np.array([4.0, 4.0, 4.0, 4.0])),
         ),
-        point_by_point(lambda x: (np.full(2, x[0]), np.full(4, x[0]))),
+        lambda points: np.repeat(points, 6, axis=1),
     )
     fit = identify(problem)
     assert fit.values[0] == pytest.approx(20.0 / 6.0, rel=1e-6)  # mean of all six

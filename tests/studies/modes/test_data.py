@@ -18,7 +18,7 @@ NAMES = {STUCK: [["sway", "roll"], ["sway", "roll"], ["sway", "yaw"]], SLIDING: 
 
 def mode(name, hertz, damping=0.1):
     shares = np.full(6, 1.0 / 6.0)
-    return Mode(name, 1j, hertz, damping, np.ones(6, complex), shares, np.ones(1), np.ones(1))
+    return Mode(name, hertz, damping, np.ones(6, complex), shares, np.ones(1), np.ones(1))
 
 
 def diagram(count):

@@ -15,7 +15,7 @@ from wm_drake.studies.modes.shapes import ANGLE_ARM, NAMES, Mode, nearness
 
 def mode(name, shape=(0.0,) * 6, damping=0.1):
     none = np.zeros(0)
-    return Mode(name, 1j, 1.0, damping, np.array(shape, complex), none, none, none)
+    return Mode(name, 1.0, damping, np.array(shape, complex), none, none, none)
 
 
 def pure_modes():

@@ -1,7 +1,5 @@
 """What the page of the steady response leads with, on hand-made branches."""
 
-import re
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -10,7 +8,7 @@ from hand_made_records import harmonic_record
 from wm_drake.model.scene import Scene
 from wm_drake.report.quantity import SPEED
 from wm_drake.studies.response.figures import reachable_peaks, response_figure
-from wm_drake.studies.response.page import branches_table, largest_table, summary
+from wm_drake.studies.response.page import branches_table, largest_table
 from wm_drake.studies.response.quantities import AMPLITUDE, RUN_SPEED
 from wm_drake.studies.response.response import settled_trajectory, steady_response
 from wm_drake.studies.response.study import _run_up, case_of_response, largest_of, peaks_of
@@ -46,12 +44,6 @@ def cases():
     return [case(True, (4.0, 6.0, 12.6, 7.0, 5.0)), without]
 
 
-def test_summary_has_the_numbers_that_are_reached_touch_and_are_unstable_in_this_order(cases):
-    numbers = re.findall(r"[\d.]+ (?:mm|rpm)", summary(cases))
-    assert numbers[:4] == ["12.6 mm", "140 rpm", "14.0 mm", "140 rpm"]
-    assert numbers[4:8] == ["120 rpm", "4.5 mm", "160 rpm", "203.4 mm"]
-
-
 def test_table_and_peaks_have_reachable_motions_only(reference, cases):
     with_gasket, without = cases
     assert without.reachable.values.tolist() == [True, False, True, False, True]
@@ -62,9 +54,8 @@ def test_table_and_peaks_have_reachable_motions_only(reference, cases):
     assert reachable_peaks(without) == []  # both peaks are out of reach
 
 
-def test_nothing_reachable_is_nan_and_said():
+def test_nothing_reachable_is_nan():
     nothing = case(True, (9.0,) * 5, stable=(False,) * 5)
-    assert "at 100 to 180 rpm, up to 9.0 mm" in summary([nothing])
     assert np.isnan([*largest_of(nothing).amplitude, *largest_of(nothing).speed]).all()
 
 

@@ -19,6 +19,7 @@ from wm_drake.report.figure import Cells
 from wm_drake.report.formatting import number, percent
 from wm_drake.report.scripts import packed_plotly
 from wm_drake.report.table import readable
+from wm_drake.simulation.spring_tension import slack_springs
 from wm_drake.studies.spin.data import amplitudes_of, differences_of, mounts_of, of_sensors
 from wm_drake.studies.spin.figures import orbits_figure, revolution_starts, simplified_indices
 from wm_drake.studies.spin.page import Files, spin_answer, warnings_of
@@ -87,6 +88,10 @@ class Tags(HTMLParser):
         return [attrs for name, attrs in self.found if name == tag]
 
 
+def plots_of(tags: Tags) -> list[dict[str, str | None]]:
+    return [attrs for attrs in tags.all("div") if attrs.get("class") == "plot"]
+
+
 def test_page_is_one_html_document_with_balanced_tags(page: str) -> None:
     tags = Tags(page)
     assert tags.open == []
@@ -127,7 +132,7 @@ def test_links_within_the_page_lead_somewhere(page: str) -> None:
 
 
 def test_every_figure_says_what_it_shows(page: str) -> None:
-    images = [a for a in Tags(page).all("div") if a.get("class") == "plot"]
+    images = plots_of(Tags(page))
     # three per case, the gaps, the floor, and the mount forces and accelerations of the first load
     assert len(images) == 10
     assert all(len(image["aria-label"] or "") > 20 for image in images)
@@ -157,11 +162,10 @@ def test_mount_forces_and_accelerations_of_planted_motion(
 
 @pytest.mark.slow
 def test_detail_draws_the_vibration_of_every_load(result: SpinRuns, page: str) -> None:
-    assert page.count("drawn for this load only, that with the largest amplitude") == 1
     detailed = spin_answer(result, files=Files(detail=True)).page(Facts())
-    assert detailed.count("Mount forces over time, load") == len(result.results)
-    assert page.count("Mount forces over time, load") == 1
-    assert "the option --detail" not in detailed
+    counts = [len(plots_of(Tags(text))) for text in (page, detailed)]
+    pictures = len(vibration_plots(result, result.results[0]))
+    assert counts[1] - counts[0] == pictures * (len(result.results) - 1) > 0
 
 
 def test_spectra_show_the_sensor_with_the_largest_amplitude(machine: MachineParameters) -> None:
@@ -205,30 +209,26 @@ def test_all_cases_diverged_still_give_a_page(machine: MachineParameters) -> Non
 
 def test_overlap_is_warned_of(machine: MachineParameters) -> None:
     runs = spin_result(machine, [case_result(machine, gap=-0.003)])
-    (text,) = warnings_of(runs)
-    assert "tub shell and wall right overlap by 3.0 mm" in text
-    assert spin_answer(runs).labelled()["gaps"].data.touches.values.all()
+    assert len(warnings_of(runs)) == 1
+    gaps = spin_answer(runs).labelled()["gaps"].data
+    assert (gaps.touches.item(), gaps.smallest_gap.item()) == (True, pytest.approx(-0.003))
+    assert (gaps.moving_part.item(), gaps.part_of_the_housing.item()) == ("tub shell", "wall right")
 
 
-@pytest.mark.parametrize(
-    ("gap", "size"), [(0.0187, "18.7 mm between"), (-0.0169, "−16.9 mm (they touch) between")]
-)
+@pytest.mark.parametrize(("gap", "size"), [(0.0187, "18.7 mm"), (-0.0169, "−16.9 mm")])
 def test_a_gap_is_said_with_its_parts_speed_and_time(
     machine: MachineParameters, gap: float, size: str
 ) -> None:
-    text = f"{size} tub shell and wall right, at 240 rpm (0.50 s)"
-    assert case_result(machine, gap=gap).gap_text == text
+    text = case_result(machine, gap=gap).gap_text
+    assert re.findall(r"−?[\d.]+ [a-z]+", text) == [size, "240 rpm", "0.50 s"]
 
 
 def test_page_says_the_steps_that_the_runs_took(machine: MachineParameters) -> None:
     cases = [case_result(machine), case_result(machine), case_result(machine)]
     shorter = {"integrator": "multistep", "step_s": 1.25e-3}
     cases[1] = replace(cases[1], record=cases[1].record.assign_attrs(shorter))
-    words = (
-        "steps of up to 2.5 ms with controlled error, samples every 5 ms; "
-        "multistep, steps of 1.25 ms, samples every 5 ms"
-    )
-    assert words in dict(spin_answer(spin_result(machine, cases)).details)["Engine"]
+    text = dict(spin_answer(spin_result(machine, cases)).details)["Engine"]
+    assert re.findall(r"[\d.]+ ms", text) == ["2.5 ms", "5 ms", "1.25 ms", "5 ms"]
 
 
 def test_names_cannot_inject_markup(machine: MachineParameters) -> None:
@@ -367,16 +367,13 @@ def test_slack_springs_are_warned_of(machine: MachineParameters) -> None:
     loads = {"middle": (0.0, 12.0, 0.0), "back": (0.0, 3.0, 40.0), "front": (-5.0, 1.0, 1.0)}
     cases = [slack_case(machine, load, tensions) for load, tensions in loads.items()]
     result = spin_result(machine, cases)
-    (warning,) = [text for text in warnings_of(result) if "slack" in text]
-    assert warning.startswith(
-        "Springs go slack: left in load middle (with gasket), back (with gasket); "
-        "rear in load middle (with gasket). A slack spring"
-    )
+    slack = {case.case.name: slack_springs(case.measures.smallest_tension) for case in cases}
+    assert slack == {"middle": ["left", "rear"], "back": ["left"], "front": []}
     springs = spin_answer(result).tables()["springs"].set_index("load")
     assert springs.loc["front", ["left_N", "right_N", "rear_N"]].tolist() == [-5.0, 1.0, 1.0]
     assert springs.is_slack.tolist() == [True, True, False]
     taut = spin_result(machine, [case_result(machine)])
-    assert not any("slack" in text for text in warnings_of(taut))
+    assert warnings_of(taut) == []
 
 
 def test_sensors_in_one_plane_have_one_orbit(machine: MachineParameters) -> None:

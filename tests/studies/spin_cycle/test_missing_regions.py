@@ -8,8 +8,8 @@ import xarray as xr
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.spin import Region
 from wm_drake.simulation.vibration import region_rms, region_samples
+from wm_drake.studies.spin_cycle.findings import missing_warnings
 from wm_drake.studies.spin_cycle.measured import read_accelerations
-from wm_drake.studies.spin_cycle.page import missing_warnings
 from wm_drake.studies.spin_cycle.study import average_errors, largest, missing_regions
 
 PERIOD = 5e-3

@@ -42,6 +42,8 @@ BODY, TUBES = 6, 7
 """Degrees of freedom of a floating body, and of the tubes of a damper."""
 VELOCITIES = TREE_STATE.offsets["angular_velocity"]
 """Where the velocities of a `TREE_STATE` begin; its positions are before them, in this order."""
+MOVING = (*range(TUBES), *range(VELOCITIES, VELOCITIES + TUBES))
+"""Indices of the positions and velocities of the tubes of a damper, from where its state begins."""
 CARRIER_VELOCITIES = BODY_STATE.offsets["angular_velocity"]
 
 MidpointWork = namedtuple("MidpointWork", ("rate", "inputs", "middle", "past", "change"))
@@ -97,6 +99,25 @@ def integrate_midpoint_lanes(steps, begin, end, p, elements, relaxation, x, work
         advance(state, middle, rate, past, change, h, matrices, elements)
         state[DRUM_ANGLE] = zero + drum[2 * i + 2, 3]
         state[DRUM_RATE] = zero + drum[2 * i + 2, 0]
+
+
+@law
+def write_newton_matrix(jacobian, h, newton):
+    """Write the inverse of R of a damper, 1 - h/2 da/dv - h^2/4 da/dq E, by rows.
+
+    Args:
+        jacobian: Of the states `MOVING`, by rows. (196,) [1/s]
+        h: Length of a step. [s]
+        newton: Written. (49,)
+    """
+    for row in range(TUBES):
+        a = 2 * TUBES * (TUBES + row)
+        for column in range(TUBES):
+            total = (1.0 if row == column else 0.0) - 0.5 * h * jacobian[a + TUBES + column]
+            for k in range(TUBES):
+                e = jacobian[2 * TUBES * k + TUBES + column]
+                total = total - 0.25 * h * h * jacobian[a + k] * e
+            newton[TUBES * row + column] = total
 
 
 @law

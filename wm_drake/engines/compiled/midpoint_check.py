@@ -16,9 +16,8 @@ from wm_drake.elements.state_map import (
     TUBES,
     VELOCITIES,
 )
-from wm_drake.engines.compiled.midpoint import BODY
+from wm_drake.engines.compiled.midpoint import BODY, MOVING, write_newton_matrix
 from wm_drake.engines.compiled.midpoint import TUBES as TUBES_FREEDOM
-from wm_drake.engines.compiled.midpoint import VELOCITIES as FIRST_VELOCITY
 from wm_drake.engines.compiled.packing import Layout
 from wm_drake.engines.compiled.step_check import free_states
 from wm_drake.model.machine import Setup
@@ -41,26 +40,13 @@ def relaxation_matrices(
         jacobians: (lanes, n, n) of its free states, the first one at rest. [1/s]
         step: Step size. [s]
     """
-    place = _places(setup, layout)
-    return np.array(
-        [
-            np.linalg.inv(_newton_matrix(jacobians[0], place, begin, step))
-            for begin in layout.states.begins_of(TUBES)
-        ]
-    )
-
-
-def _newton_matrix(
-    jacobian: FloatArray, place: dict[int, int], begin: int, step: float
-) -> FloatArray:
-    """Return the inverse of R of the damper whose state begins at an index. (7, 7)"""
-    q = [place[begin + k] for k in range(TUBES_FREEDOM)]
-    v = [place[begin + FIRST_VELOCITY + k] for k in range(TUBES_FREEDOM)]
-    by_position = jacobian[np.ix_(v, q)] @ jacobian[np.ix_(q, v)]
-    newton: FloatArray = (
-        np.eye(TUBES_FREEDOM) - 0.5 * step * jacobian[np.ix_(v, v)] - 0.25 * step**2 * by_position
-    )
-    return newton
+    place, newton = _places(setup, layout), np.empty((TUBES_FREEDOM, TUBES_FREEDOM))
+    matrices = []
+    for begin in layout.states.begins_of(TUBES):
+        moving = [place[begin + k] for k in MOVING]
+        write_newton_matrix(jacobians[0][np.ix_(moving, moving)].ravel(), step, newton.ravel())
+        matrices.append(np.linalg.inv(newton))
+    return np.array(matrices)
 
 
 def midpoint_follows(setup: Setup, layout: Layout, jacobians: FloatArray, step: float) -> bool:

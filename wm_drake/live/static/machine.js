@@ -68,12 +68,15 @@ export function scheduleOf({time: corners, speed}, {step, period, control, steps
   return schedule;
 }
 
-/** Return how a profile is stepped: as exported, with shorter steps for a faster drum. */
-export function steppingOf({speed}, {step, largestTurn, integrator, ...rest}) {
+/** Return how a profile is stepped: as exported, or as the moved numbers need it, [place, value] each; shorter for a faster drum. */
+export function steppingOf({speed}, {at, stepping: {largestTurns, moved, ...exported}}, changes) {
+  const cost = ({integrator, step}) => (integrator === 'runge_kutta' ? 4 : 1) / step;
+  const needed = changes.filter(([place]) => place >= at.parameters) // before them are those of the load
+    .map(([place, value]) => moved.find((one) => one.place === place && one.low <= value && value <= one.high) ?? exported);
+  let {integrator, step} = needed.length ? needed.reduce((most, one) => (cost(one) > cost(most) ? one : most)) : exported;
   const fastest = Math.max(...speed.map(Math.abs));
-  let length = step;
-  while (fastest * length > largestTurn) length *= 0.5;
-  return {...rest, step: length, stepsBefore: integrator === 'multistep' ? rest.stepsBefore : -1};
+  while (fastest * step > largestTurns[integrator]) step *= 0.5;
+  return {...exported, integrator, step, stepsBefore: integrator === 'multistep' ? exported.stepsBefore : -1};
 }
 
 /** A machine in WebAssembly. `model` has the places of its numbers. */
@@ -134,6 +137,7 @@ export class Machine {
     const v = this.view(this.v, this.model.at.size);
     v.set(this.model.numbers);
     for (const [place, value] of changes) v[place] = value;
+    this.changes = changes;
     return this.call('wm_set_up', this.v, this.c);
   }
 
@@ -141,13 +145,13 @@ export class Machine {
   run(profile) {
     const {model} = this;
     this.free = this.kept;
-    const key = JSON.stringify(profile);
-    if (key !== this.profile) {
-      this.stepping = steppingOf(profile, model.stepping);
-      this.schedule = scheduleOf(profile, this.stepping);
-      this.profile = key;
+    const stepping = steppingOf(profile, model, this.changes);
+    const key = JSON.stringify([profile, stepping]);
+    if (key !== this.scheduled) {
+      this.schedule = scheduleOf(profile, stepping);
+      this.scheduled = key;
     }
-    this.view(this.v, model.at.size)[model.at.length] = this.stepping.step;
+    this.view(this.v, model.at.size)[model.at.length] = stepping.step;
     const s = this.schedule;
     const rows = s.time.length;
     const [motion, marks] = [this.put(s.motion), this.put(s.marks)];

@@ -1,5 +1,7 @@
 // The engine of a page without a server: it answers what the server answers, from runs in workers.
 
+import {steppingOf} from './machine.js';
+
 const data = JSON.parse(document.getElementById('machine-data').textContent);
 const {model, machine} = data;
 const NOT_AT_REST = {
@@ -56,12 +58,13 @@ function chosen(state) {
   }
   if (problems.length) throw new Problems(problems);
   if (profile.time.some((t, k) => k > 0 && !(t > profile.time[k - 1]))) throw wrong('profile.time', 'the times must rise');
-  if (profile.time.at(-1) / model.stepping.step > model.mostSteps) throw wrong('profile.time', `the run is too long for this page; allowed are ${model.mostSteps} steps`);
+  const stepping = steppingOf(profile, model, changes);
+  if (profile.time.at(-1) / stepping.step > model.mostSteps) throw wrong('profile.time', `the run is too long for this page; allowed are ${model.mostSteps} steps`);
   const fastest = Math.max(...profile.speed.map(Math.abs));
   if (fastest > model.fastest) throw wrong('profile.speed', `samples and filter of this page are for up to ${Math.floor(RPM * model.fastest)} rpm; export the machine with a faster profile`);
   if (!state.gasket && 'gasket' in model.places) changes.push([model.places.gasket, 0]);
   changes.push([model.at.speed, profile.speed[0]]);
-  return {changes, loads, profile, values};
+  return {changes, loads, profile, values, stepping};
 }
 
 /** Return the described load of a state, or null. */
@@ -130,7 +133,7 @@ const pool = new Pool(Math.max(1, Math.min(navigator.hardwareConcurrency || 2, O
 /* ---- answers, as the server gives them ---- */
 
 function gapOf({gap, diverged}, profile) {
-  const text = diverged === null ? '' : `the run diverged at ${diverged.toFixed(3)} s, with the steps of the exported machine`;
+  const text = diverged === null ? '' : `the run diverged at ${diverged.toFixed(3)} s, with the steps of this page`;
   if (!gap) return {gap: null, diverged: text};
   const [moving, fixed] = data.pairs[gap.pair];
   return {
@@ -162,7 +165,7 @@ function corners(time, values, sign) {
 }
 
 async function run({state}) {
-  const {changes, loads, profile, values} = chosen(state);
+  const {changes, loads, profile, values, stepping} = chosen(state);
   const own = described(state);
   const all = own ? {described: own, ...loads} : loads;
   const first = own ? 'described' : state.load;
@@ -188,7 +191,7 @@ async function run({state}) {
     loads: names.map((load, k) => ({load, ...gapOf(found[k], profile)})),
     measured: own ? [] : data.measured[state.load][state.gasket ? 'yes' : 'no'] ?? [],
     warnings: [], band: data.band,
-    stepping: {integrator: model.stepping.integrator, step: `${Number((1e3 * model.stepping.step).toPrecision(6))} ms`},
+    stepping: {integrator: stepping.integrator, step: `${Number((1e3 * stepping.step).toPrecision(6))} ms`},
   };
 }
 

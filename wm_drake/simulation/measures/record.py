@@ -14,10 +14,10 @@ from wm_drake.model.scene import Gap, Scene
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cabinet import Walk, walk
 from wm_drake.simulation.drive import DriveMeasures, drive_measures
-from wm_drake.simulation.feet import FootLoads, foot_loads
+from wm_drake.simulation.feet import FeetLoaded, FootLoads, foot_loads
 from wm_drake.simulation.measures.kind import Measure, Variable
 from wm_drake.simulation.measures.registry import MEASURES, measure_named
-from wm_drake.simulation.measures.run import FeetLoaded, Need, Run
+from wm_drake.simulation.measures.run import Need, Run
 from wm_drake.simulation.mount_forces import speed_ranges
 from wm_drake.simulation.mount_histories import sum_mounts_history
 from wm_drake.simulation.mounts import sums_size

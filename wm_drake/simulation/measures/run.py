@@ -2,18 +2,16 @@
 
 import functools
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 import numpy as np
 
 from wm_drake.model.scene import Gap, Path, Scene
 from wm_drake.parameters import SpinProfile
-from wm_drake.parameters.cabinet import Cabinet
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.band import pass_band
 from wm_drake.simulation.displacements import amplitudes, filtered
-from wm_drake.simulation.feet import foot_measures
+from wm_drake.simulation.feet import FeetLoaded, foot_measures
 
 Need: TypeAlias = Literal["sensors", "shapes", "tub", "mounts", "feet", "springs", "stops"]
 """Groups of inputs that cost time, so that a batch computes them only for measures that name them:
@@ -26,25 +24,6 @@ Need: TypeAlias = Literal["sensors", "shapes", "tub", "mounts", "feet", "springs
     springs   `Run.smallest_tensions` and `Run.smallest_elongations`
     stops     `Run.approaches`
 """
-
-
-@dataclass(frozen=True)
-class FeetLoaded:
-    """What the measures of the feet are computed from.
-
-    Attributes:
-        cabinet, gravity: Cabinet and gravity. [m/s^2]
-        wrenches: (n, 6) moment about the origin of W and force of all mounts on the cabinet, in W.
-            [N m, N]
-        floor_forces: (n, 4, 3) forces of the floor on the feet of a cabinet that moves. [N]
-        ranges: Which samples belong to each part of the run, for a profile without regions.
-    """
-
-    cabinet: Cabinet
-    gravity: float
-    wrenches: FloatArray
-    floor_forces: FloatArray | None
-    ranges: tuple[np.ndarray, ...] = ()
 
 
 class Run(ABC):
@@ -154,16 +133,7 @@ class Run(ABC):
     @functools.cached_property
     def foot_measures(self) -> dict[str, FloatArray]:
         """Return the measures of the feet by name; see `wm_drake.simulation.feet`."""
-        feet = self.feet
-        return foot_measures(
-            feet.cabinet,
-            feet.gravity,
-            feet.wrenches,
-            self.profile,
-            self.period,
-            floor_forces=feet.floor_forces,
-            ranges=feet.ranges,
-        )
+        return foot_measures(self.feet, self.profile, self.period)
 
     @property
     @abstractmethod

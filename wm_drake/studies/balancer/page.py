@@ -54,51 +54,17 @@ def balancer_answer(
     )
     base, proposal = base_of(loads), data["proposal"]
     load, curve = load_text(base), base[["free", "locked", "without_rings", "liquid"]]
-    worse = ("is_larger_at_highest_speed", "alarm")
-    each = LabelledTable(
-        "loads",
-        loads.drop_dims("from"),
-        "Free and locked balls",
-        "Each unbalance with free and with locked balls: largest amplitude of the run-up, largest "
-        "quotient of free over locked with its speed, speed from which free balls pay, amplitude "
-        "at the highest speed.",
-        marked=worse,
-        is_in_terminal=True,
-    )
-    about_rings = f"The same with {load}, over ball mass and race damping in parts of the file."
-    each_ring = LabelledTable("rings", rings, "Rings", about_rings, marked=worse)
-    release = LabelledTable(
-        "releases",
-        releases,
-        "Releases",
-        f"Runs with {load} that begin at a speed, with the balls evenly spread, as if they were "
-        f"locked before: largest amplitude from {SWING:g} s on, and at the highest speed. The tub "
-        "starts at rest; its first swing is left out.",
-        marked=("is_larger", "alarm"),
-    )
-    of_candidates = xr.Dataset(
-        {
-            name: quantity.variable(("load", "candidate"), runs.sel(response=name).values.T)
-            for name, quantity in RESPONSES.items()
-        },
-        {"load": runs["load"].values, "candidate": runs.candidate.values},
-    )
-    each_candidate = LabelledTable(
-        "candidates",
-        of_candidates,
-        "Which balancer",
-        "Each load without a balancer, with free balls and with liquid.",
-        across="candidate",
-        words=WORDS,
-    )
     parts = (
         Part("Over the drum speed", (curve_plot(base), LabelledTable("curve", curve))),
         Part("Unbalance and its place", (loads_plot(loads),)),
         Part("Mass of the balls and damping", (rings_plot(loads, rings, numbers),)),
-        Part("Which balancer to fit", (each_candidate,)),
-        Part("Each load", (each,)),
-        Part("Each ball mass and damping", (each_ring,)),
-        Part("Release of locked balls", (release, LabelledTable("numbers", numbers))),
+        Part("Which balancer to fit", (_candidates_table(runs),)),
+        Part("Each load", (_loads_table(loads),)),
+        Part("Each ball mass and damping", (_rings_table(rings, load),)),
+        Part(
+            "Release of locked balls",
+            (_releases_table(releases, load), LabelledTable("numbers", numbers)),
+        ),
     )
     return Answer(
         f"Balancers of machine {parameters.name}",
@@ -115,6 +81,58 @@ def balancer_answer(
             machine=MACHINE,
         ),
         diverged=diverged(loads, rings, releases),
+    )
+
+
+WORSE = ("is_larger_at_highest_speed", "alarm")
+"""Mark of a row in which the balls do harm at the highest speed."""
+
+
+def _loads_table(loads: xr.Dataset) -> LabelledTable:
+    return LabelledTable(
+        "loads",
+        loads.drop_dims("from"),
+        "Free and locked balls",
+        "Each unbalance with free and with locked balls: largest amplitude of the run-up, largest "
+        "quotient of free over locked with its speed, speed from which free balls pay, amplitude "
+        "at the highest speed.",
+        marked=WORSE,
+        is_in_terminal=True,
+    )
+
+
+def _rings_table(rings: xr.Dataset, load: str) -> LabelledTable:
+    caption = f"The same with {load}, over ball mass and race damping in parts of the file."
+    return LabelledTable("rings", rings, "Rings", caption, marked=WORSE)
+
+
+def _releases_table(releases: xr.Dataset, load: str) -> LabelledTable:
+    return LabelledTable(
+        "releases",
+        releases,
+        "Releases",
+        f"Runs with {load} that begin at a speed, with the balls evenly spread, as if they were "
+        f"locked before: largest amplitude from {SWING:g} s on, and at the highest speed. The tub "
+        "starts at rest; its first swing is left out.",
+        marked=("is_larger", "alarm"),
+    )
+
+
+def _candidates_table(runs: xr.DataArray) -> LabelledTable:
+    of_candidates = xr.Dataset(
+        {
+            name: quantity.variable(("load", "candidate"), runs.sel(response=name).values.T)
+            for name, quantity in RESPONSES.items()
+        },
+        {"load": runs["load"].values, "candidate": runs.candidate.values},
+    )
+    return LabelledTable(
+        "candidates",
+        of_candidates,
+        "Which balancer",
+        "Each load without a balancer, with free balls and with liquid.",
+        across="candidate",
+        words=WORDS,
     )
 
 

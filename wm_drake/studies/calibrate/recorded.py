@@ -14,15 +14,14 @@ from wm_drake.report.quantity import TIME
 from wm_drake.simulation.mount_forces import speed_ranges
 from wm_drake.simulation.records import profile_of
 from wm_drake.studies.compare.pairs import Pair
-from wm_drake.studies.compare.study import (
-    LEAST_TOLERANCE,
-    SINGLE_TOLERANCE,
+from wm_drake.studies.compare.signals import (
     band_passed,
     envelope_sizes,
     order_one_sizes,
     places_of,
     rms_of,
 )
+from wm_drake.studies.compare.study import LEAST_TOLERANCE, SINGLE_TOLERANCE
 
 By: TypeAlias = Literal["envelope", "order", "rms", "history"]
 """What is fitted: amplitudes over the drum speed, those of order 1, RMS of regions, or signals."""

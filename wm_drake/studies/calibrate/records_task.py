@@ -17,7 +17,6 @@ from wm_drake.studies.calibrate.recorded import RecordedLoad, without_edges
 from wm_drake.studies.calibrate.records import FreeNumbers, RecordModel, calibrated
 from wm_drake.studies.calibrate.records_page import records_answer
 from wm_drake.studies.calibrate.solutions import FreeQuantities
-from wm_drake.studies.compare.pairs import check_signs
 from wm_drake.studies.compare.task import CompareTask
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.experiment import Experiment, record_here
@@ -101,10 +100,8 @@ def recorded_load(test: CompareTask, executor: Executor, load_at: Any) -> Record
     Args:
         load_at: Function of a machine with the load.
     """
-    pairs = test.pairs(executor)
-    for pair in pairs:
-        check_signs(pair, test.sensors)
-    return RecordedLoad(test.case.name, load_at, tuple(map(without_edges, pairs)))
+    pairs = tuple(map(without_edges, test.pairs(executor)))
+    return RecordedLoad(test.case.name, load_at, pairs)
 
 
 def record_model(

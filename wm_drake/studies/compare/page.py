@@ -1,6 +1,7 @@
 """Show recordings beside the model: the agreement in a sentence, pictures, and tables."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 import xarray as xr
@@ -14,20 +15,20 @@ from wm_drake.report.quantity import SPEED, TIME, Quantity, quantity_of, shown, 
 from wm_drake.simulation.displacements import band_of
 from wm_drake.simulation.netcdf import netcdf_bytes
 from wm_drake.studies.answer import Answer, Part, Plot, pictures_first
-from wm_drake.studies.compare.pairs import QUANTITIES, Pair, gravity_warnings
+from wm_drake.studies.compare.agreement import agreement_of
+from wm_drake.studies.compare.checks import gravity_warnings
+from wm_drake.studies.compare.pairs import QUANTITIES, Pair
+from wm_drake.studies.compare.signals import places_of, repeats_of
 from wm_drake.studies.compare.study import (
     CONFIDENCE,
     LEAST_TOLERANCE,
     SINGLE_TOLERANCE,
-    agreement_of,
     amplitudes_of,
     clocks_of,
     integrated_of,
     order_one_of,
     orders_of,
-    places_of,
     regions_of,
-    repeats_of,
     sensors_of,
 )
 
@@ -80,8 +81,8 @@ METHOD = (
     "The model predicts what each recorder would have written: displacement, velocity or specific "
     "force (with gravity) at the point of the sensor, along its axis, behind its AC coupling and "
     "low-pass. Nothing measured is corrected. Measured and predicted signals pass the same filters "
-    "with the same gaps. An amplitude is half the distance between the envelopes, lines from peak "
-    "to peak of the filtered signal."
+    "with the same gaps. An amplitude is the smooth envelope of the filtered signal, the magnitude "
+    "of its analytic signal, as in fits to records; noise hardly changes it."
 )
 
 
@@ -143,21 +144,46 @@ def _worst_text(agreement: xr.Dataset) -> str:
 
 def _parts_of(repeats: xr.Dataset, amplitudes: xr.Dataset, quantity: str, count: int) -> list[Part]:
     """Return the sections about the sensors of a quantity."""
-    names = amplitudes.sensor.values.tolist()
-    about = sensors_of(repeats, amplitudes, quantity)
-    regions = regions_of(repeats, names, quantity)
-    one = order_one_of(repeats, names, quantity)
+    return [
+        _amplitudes_part(repeats, amplitudes, quantity, count),
+        _orders_part(repeats, amplitudes.sensor.values.tolist(), quantity),
+        _regions_part(repeats, amplitudes.sensor.values.tolist(), quantity),
+    ]
+
+
+def _amplitudes_part(
+    repeats: xr.Dataset, amplitudes: xr.Dataset, quantity: str, count: int
+) -> Part:
     tolerance = tolerance_text(count)
-    title = quantity.capitalize()
     sensors = LabelledTable(
         f"sensors_{quantity}",
-        about,
+        sensors_of(repeats, amplitudes, quantity),
         f"Sensors of {quantity}",
         "Largest amplitudes and their difference, [B] Eq. (1); distance of the envelopes over the "
         "whole run, [B] Eq. (2), by the size of the measured ones; correlation of order 1; share "
         f"of the places that agree. {tolerance}",
         is_in_terminal=True,
     )
+    each = LabelledTable(f"amplitudes_{quantity}", amplitudes)
+    shown = (_amplitudes(amplitudes, count), _residuals(amplitudes, tolerance), sensors, each)
+    return Part(f"{quantity.capitalize()}: measured and computed", shown)
+
+
+def _orders_part(repeats: xr.Dataset, names: Sequence[str], quantity: str) -> Part:
+    one = order_one_of(repeats, names, quantity)
+    orders = LabelledTable(
+        f"orders_{quantity}",
+        orders_of(repeats, names, quantity),
+        "Orders",
+        "Largest amplitude of some orders over the whole run; a dash where the samples do not "
+        "resolve the order.",
+    )
+    each = LabelledTable(f"order_one_{quantity}", one, is_in_json=False)
+    return Part(f"Order 1 of {quantity}", (_order_one(one), _phases(one), each, orders))
+
+
+def _regions_part(repeats: xr.Dataset, names: Sequence[str], quantity: str) -> Part:
+    regions = regions_of(repeats, names, quantity)
     errors = LabelledTable(
         f"errors_{quantity}",
         regions[["error"]],
@@ -166,50 +192,16 @@ def _parts_of(repeats: xr.Dataset, amplitudes: xr.Dataset, quantity: str, count:
         "|measured|, [A] Eq. (9).",
         is_in_terminal=True,
     )
-    return [
-        Part(
-            f"{title}: measured and computed",
-            (
-                _envelopes(amplitudes, count),
-                _residuals(amplitudes, tolerance),
-                sensors,
-                LabelledTable(f"amplitudes_{quantity}", amplitudes[AMPLITUDES]),
-                LabelledTable(f"envelopes_{quantity}", amplitudes[ENVELOPES], is_in_json=False),
-            ),
-        ),
-        Part(
-            f"Order 1 of {quantity}",
-            (
-                _order_one(one, ("measured", "computed")),
-                _phases(one),
-                LabelledTable(f"order_one_{quantity}", one, is_in_json=False),
-                LabelledTable(
-                    f"orders_{quantity}",
-                    orders_of(repeats, names, quantity),
-                    "Orders",
-                    "Largest amplitude of some orders over the whole run; a dash where the samples "
-                    "do not resolve the order.",
-                ),
-            ),
-        ),
-        Part(
-            f"RMS of {quantity} in the regions",
-            (
-                errors,
-                LabelledTable(
-                    f"rms_{quantity}",
-                    regions[["measured", "computed"]],
-                    "RMS of each sensor",
-                    "RMS within the pass band in each region of the profile; without regions in "
-                    "the profile, in ranges of drum speed.",
-                ),
-            ),
-        ),
-    ]
+    rms = LabelledTable(
+        f"rms_{quantity}",
+        regions[["measured", "computed"]],
+        "RMS of each sensor",
+        "RMS within the pass band in each region of the profile; without regions in the profile, "
+        "in ranges of drum speed.",
+    )
+    return Part(f"RMS of {quantity} in the regions", (errors, rms))
 
 
-AMPLITUDES = ["measured", "computed", "tolerance", "difference", "agrees"]
-ENVELOPES = ["envelope_least", "envelope_most", "envelope_computed"]
 RECORDED, COMPUTED = "recorded", "computed"
 
 
@@ -233,32 +225,25 @@ def _panels(data: xr.Dataset, marks: Callable[[xr.Dataset], list[fig.Mark]], y: 
     return fig.Figure(panels=fig.in_grid(panels, columns, share="x"), height=210.0)
 
 
-def _envelopes(amplitudes: xr.Dataset, count: int) -> Plot:
+def _amplitudes(amplitudes: xr.Dataset, count: int) -> Plot:
     def marks(of: xr.Dataset) -> list[fig.Mark]:
-        drawn: list[fig.Mark] = []
-        x = shown(of.place)
-        for side in ("upper", "lower"):
-            one = of.sel(side=side)
-            low, high = shown(one.envelope_least), shown(one.envelope_most)
-            color = fig.MEASURED
-            if count > 1:
-                known = np.isfinite(low)
-                band = fig.band(
-                    x[known], low[known], high[known], color=color, opacity=0.35, key=RECORDED
-                )
-                drawn.append(band)
-                middle = 0.5 * (low + high)
-                drawn.append(fig.Line(x, middle, color=color, width=1.2, key=RECORDED))
-            else:
-                drawn.append(fig.Line(x, high, color=color, width=2.4, key=RECORDED))
-            drawn.append(fig.Line(x, shown(one.envelope_computed), color=fig.OURS, key=COMPUTED))
-        return drawn
+        x, measured = shown(of.place), shown(of.measured)
+        computed = fig.Line(x, shown(of.computed), color=fig.OURS, key=COMPUTED)
+        line = fig.Line(x, measured, color=fig.MEASURED, width=2.4, key=RECORDED)
+        if count == 1:
+            return [line, computed]
+        low, high = shown(of.measured_least), shown(of.measured_most)
+        known = np.isfinite(low)
+        band = fig.band(
+            x[known], low[known], high[known], color=fig.MEASURED, opacity=0.35, key=RECORDED
+        )
+        return [band, replace(line, width=1.2), computed]
 
-    of_repeats = f"the range of {count} repeats" if count > 1 else "lines of one record"
+    of_repeats = f"mean and range of {count} repeats" if count > 1 else "one record"
     return Plot(
-        _panels(amplitudes, marks, quantity_of(amplitudes.envelope_computed).unit_text),
-        "Measured and computed envelopes of each sensor.",
-        f"Upper and lower envelope within the pass band. Recorded: {of_repeats}.",
+        _panels(amplitudes, marks, quantity_of(amplitudes.measured).unit_text),
+        "Measured and computed amplitudes of each sensor.",
+        f"Amplitude within the pass band: its smooth envelope. Recorded: {of_repeats}.",
     )
 
 
@@ -280,16 +265,16 @@ def _residuals(amplitudes: xr.Dataset, tolerance: str) -> Plot:
     )
 
 
-def _order_one(one: xr.Dataset, names: Sequence[str]) -> Plot:
+def _order_one(one: xr.Dataset) -> Plot:
     def marks(of: xr.Dataset) -> list[fig.Mark]:
         x = shown(of.place)
         return [
-            fig.Line(x, shown(of[names[0]]), color=fig.MEASURED, width=2.4, key=RECORDED),
-            fig.Line(x, shown(of[names[1]]), color=fig.OURS, key=COMPUTED),
+            fig.Line(x, shown(of.measured), color=fig.MEASURED, width=2.4, key=RECORDED),
+            fig.Line(x, shown(of.computed), color=fig.OURS, key=COMPUTED),
         ]
 
     return Plot(
-        _panels(one, marks, quantity_of(one[names[0]]).unit_text),
+        _panels(one, marks, quantity_of(one.measured).unit_text),
         "Amplitude of order 1 of each sensor.",
         "Amplitude of order 1, which turns with the unbalance.",
     )

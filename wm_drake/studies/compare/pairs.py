@@ -1,6 +1,6 @@
-"""Recordings on the times of runs: clocks, speeds, signs; order 1 of measured and predicted."""
+"""Recordings on the times of runs: clocks, speeds; order 1 of measured and predicted."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,14 +24,8 @@ from wm_drake.simulation.recorded_signal import recorded_signal
 from wm_drake.simulation.records import Record, profile_of
 from wm_drake.studies.compare.recordings import TestRecording, pulse_angle, speed_of_pulses
 
-REVERSED = -0.5
-"""Correlation of order 1 below which a sensor is taken to have the other sign."""
-
 CONTRADICTION = 0.05
 """Largest misfit of a recorded drum speed, by the highest speed of the profile."""
-
-LEAST_CORRELATION = 0.2
-"""Largest correlation of signals that have nothing in common: an assumption."""
 
 SPEED_STEP = 0.25
 """Time between the points of a measured profile. [s]"""
@@ -234,70 +228,3 @@ def order_one(pair: Pair) -> xr.Dataset:
         },
         {"time": TIME.variable("time", measured.time.values), "sensor": sensors},
     )
-
-
-def check_signs(pair: Pair, sensors: Mapping[str, RecordedSensor]) -> None:
-    """Check that no sensor has the other sign, and that the signals have something in common.
-
-    Signs are told by the correlations of order 1, or by gravity. The angle of the drum at the start
-    is unknown, so a single sensor without gravity can have either sign.
-
-    Raises:
-        InputError: a sensor has the other sign, or no signal is like its prediction.
-    """
-    path = str(pair.recording.path)
-    correlations = order_one(pair).correlation
-    for name, sensor in sensors.items():
-        k = list(sensors).index(name)
-        if _has_opposite_gravity(pair, sensor, k):
-            raise _reversed(path, name, "its mean has the other sign than gravity")
-        value = float(correlations.sel(sensor=name))
-        if value < REVERSED:
-            text = f"its order 1 has the correlation {value:.2f} with the prediction"
-            raise _reversed(path, name, text)
-    if len(sensors) and float(np.abs(correlations).max()) < LEAST_CORRELATION:
-        raise input_error(
-            f"no signal is like its prediction: the largest correlation of order 1 is "
-            f"{float(np.abs(correlations).max()):.2f}; is it the load, the profile and the machine "
-            "of the test? A channel of the drum speed would align it",
-            where=path,
-        )
-
-
-LEAST_GRAVITY = 3.0
-"""Smallest mean of an accelerometer that tells its sign. [m/s^2]"""
-
-
-def _has_opposite_gravity(pair: Pair, sensor: RecordedSensor, k: int) -> bool:
-    if not sensor.shows_gravity:
-        return False
-    measured, predicted = (float(np.nanmean(signal[:, k])) for signal in pair.both)
-    return measured * predicted < 0.0 and min(abs(measured), abs(predicted)) > LEAST_GRAVITY
-
-
-def _reversed(path: str, name: str, why: str) -> Exception:
-    return input_error(
-        f"has the other sign than its sensor is declared with: {why}; turn its axis, or set "
-        "polarity (negative for a signal of the other sign)",
-        where=path,
-        key=name,
-    )
-
-
-def gravity_warnings(pairs: Sequence[Pair], sensors: Mapping[str, RecordedSensor]) -> list[str]:
-    """Return a warning of each accelerometer that does not show the gravity that it should."""
-    warnings = []
-    for k, (name, sensor) in enumerate(sensors.items()):
-        if not sensor.shows_gravity:
-            continue
-        measured, predicted = (
-            float(np.mean([np.nanmean(pair.both[side][:, k]) for pair in pairs])) for side in (0, 1)
-        )
-        unit = QUANTITIES["acceleration"]
-        if abs(measured - predicted) > 1.0:
-            warnings.append(
-                f"{name}: its mean is {unit.text(measured)}, with gravity it would be "
-                f"{unit.text(predicted)}. If it is AC-coupled or without gravity, say so: "
-                "ac_coupling, or gravity: removed."
-            )
-    return warnings

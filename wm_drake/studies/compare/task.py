@@ -22,12 +22,12 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.records import Record
 from wm_drake.studies.answer import Answer
+from wm_drake.studies.compare.checks import check_pair
 from wm_drake.studies.compare.gaps import gaps_of
 from wm_drake.studies.compare.options import CompareOptions
 from wm_drake.studies.compare.page import compare_answer
 from wm_drake.studies.compare.pairs import (
     Pair,
-    check_signs,
     measured_profile,
     pair_at,
     paired,
@@ -88,15 +88,23 @@ class CompareTask(Task):
     def run(self, executor: Executor) -> Answer:
         """Run the machine, align the recordings, and compare."""
         pairs = self.pairs(executor)
-        for pair in pairs:
-            check_signs(pair, self.sensors)
         gaps = gaps_of(pairs, self.sensors, self.points, Scene(self.machine.parameters))
         driven = "that of the profile" if self.options.speed == "profile" else "recorded"
         details = (("Load", self.case.name), ("Drum speed of the model", driven))
         return compare_answer(self.machine.parameters, pairs, self.sensors, gaps, details)
 
     def pairs(self, executor: Executor) -> list[Pair]:
-        """Run the machine, and return the recordings on the times of the runs."""
+        """Run the machine, and return the recordings on the times of the runs.
+
+        Raises:
+            InputError: a recording contradicts its run, or shows nothing of it; see `check_pair`.
+        """
+        pairs = self._pairs(executor)
+        for pair in pairs:
+            check_pair(pair, self.sensors)
+        return pairs
+
+    def _pairs(self, executor: Executor) -> list[Pair]:
         speeds = [recorded_speed(recording, self.test) for recording in self.recordings]
         pairs: list[Pair] = []
         if self.options.speed == "profile" or any(speed is None for speed in speeds):

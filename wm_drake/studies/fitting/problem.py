@@ -1,9 +1,8 @@
 """Problem of a fit: unknown numbers, and residuals that a search makes small.
 
 No problem depends on an engine: its model is any function of the unknowns. It is evaluated at many
-points at once, so that it can run them side by side; `point_by_point` makes it from a function of
-one point. An unknown may have a prior, an expected value with its standard deviation, whose
-distance counts beside the residuals of the measurements.
+points at once, so that it can run them side by side. An unknown may have a prior, an expected value
+with its standard deviation, whose distance counts beside the residuals of the measurements.
 """
 
 from collections.abc import Callable, Sequence
@@ -359,11 +358,6 @@ class Rows(NamedTuple):
     exact: FloatArray
     smooth: FloatArray
     wished: int = 0
-
-
-def point_by_point(model: Callable[[FloatArray], Sequence[FloatArray]]) -> EvaluatePoints:
-    """Return a model of many points from one of a point (p,): an array per measurement."""
-    return lambda points: np.array([np.concatenate(model(point)) for point in points])
 
 
 def rmse(residuals: FloatArray) -> FloatArray:

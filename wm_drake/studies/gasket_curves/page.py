@@ -75,7 +75,6 @@ def curves_answer(
         for rotates, prefix in PREFIXES.items()
     ]
     whole = LabelledTable("numbers", numbers)
-    elements = tuple(int(numbers[f"elements_{way}"]) for way in ("along", "around"))
     return Answer(
         f"Curves of gasket {name}",
         summary(curves, numbers),
@@ -99,11 +98,7 @@ def curves_answer(
             ("Drawing", f"{name}: {drawing.about}"),
             ("Rubber", _rubber_text(drawing.rubber, numbers)),
             ("Frequency of the damping", text_of(numbers.frequency)),
-            (
-                "Mesh",
-                f"{elements[0]} by {elements[1]} elements of half the ring, {3 * elements[0]} of "
-                "the wedge; 27 nodes each",
-            ),
+            ("Mesh", _mesh_text(numbers)),
         ),
         METHOD,
         {
@@ -113,6 +108,11 @@ def curves_answer(
         tuple(text for one in curves.values() for text in _warnings_of(one, drawing.contact)),
         diverged=ends,
     )
+
+
+def _mesh_text(numbers: xr.Dataset) -> str:
+    along, around = (int(numbers[f"elements_{way}"]) for way in ("along", "around"))
+    return f"{along} by {around} elements of half the ring, {3 * along} of the wedge; 27 nodes each"
 
 
 def _warnings_of(checked: Checked, has_contact: bool) -> Iterable[str]:

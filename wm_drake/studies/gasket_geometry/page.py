@@ -43,6 +43,38 @@ def geometry_answer(
         best: Best drawing that was run.
     """
     name, counts = conditions.attrs["gasket"], drawings.kind.values.tolist()
+    too_large = "no drawing that was run keeps all limits; the best one exceeds them the least"
+    return Answer(
+        f"Drawings of gasket {name}",
+        summary(factors, drawings, surfaces, conditions),
+        None,
+        (
+            Part("Gap over each factor", (_over_factors(factors, drawings, surfaces),)),
+            Part(
+                "Surface and runs",
+                (
+                    _agreement(drawings),
+                    LabelledTable("drawings", drawings.drop_dims("factor")),
+                    LabelledTable("conditions", conditions),
+                ),
+            ),
+            Part("What each factor does", _factor_tables(name, surfaces)),
+            Part("Files", links=(("best.yaml", "the best drawing"),)),
+        ),
+        (
+            ("Drawing", name),
+            ("Drawings", f"{counts.count('design')} of the design, {counts.count('fresh')} fresh"),
+            ("Loads", conditions.attrs["loads"]),
+            ("Limits", _limits_text(conditions)),
+        ),
+        METHOD,
+        {"best.yaml": yaml_text(drawing_tree(best))},
+        () if conditions.keeps_limits else (too_large,),
+    )
+
+
+def _factor_tables(name: str, surfaces: xr.Dataset) -> tuple[LabelledTable, LabelledTable]:
+    """Return the part of each factor in the variance of the responses, and what it changes."""
     words = {name: quantity.words for name, quantity in RESPONSES.items()}
     shares = LabelledTable(
         "contributions",
@@ -62,34 +94,7 @@ def geometry_answer(
         "factor, with the others in the middle.",
         is_in_terminal=True,
     )
-    too_large = "no drawing that was run keeps all limits; the best one exceeds them the least"
-    return Answer(
-        f"Drawings of gasket {name}",
-        summary(factors, drawings, surfaces, conditions),
-        None,
-        (
-            Part("Gap over each factor", (_over_factors(factors, drawings, surfaces),)),
-            Part(
-                "Surface and runs",
-                (
-                    _agreement(drawings),
-                    LabelledTable("drawings", drawings.drop_dims("factor")),
-                    LabelledTable("conditions", conditions),
-                ),
-            ),
-            Part("What each factor does", (shares, changes)),
-            Part("Files", links=(("best.yaml", "the best drawing"),)),
-        ),
-        (
-            ("Drawing", name),
-            ("Drawings", f"{counts.count('design')} of the design, {counts.count('fresh')} fresh"),
-            ("Loads", conditions.attrs["loads"]),
-            ("Limits", _limits_text(conditions)),
-        ),
-        METHOD,
-        {"best.yaml": yaml_text(drawing_tree(best))},
-        () if conditions.keeps_limits else (too_large,),
-    )
+    return shares, changes
 
 
 def drawing_tree(drawing: GasketDrawing) -> dict[str, Any]:

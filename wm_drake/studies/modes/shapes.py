@@ -48,8 +48,7 @@ class Mode:
 
     Attributes:
         name: Of its motion, one of `NAMES`; no two modes of a linearisation have the same.
-        eigenvalue: lambda. [1/s]
-        frequency_hz: Natural frequency |lambda| / (2 pi). [Hz]
+        frequency_hz: Natural frequency |lambda| / (2 pi), with the eigenvalue lambda [1/s]. [Hz]
         damping_ratio: -Re(lambda) / |lambda|.
         shape: Motion of T: roll, pitch, yaw, x, y, z. The largest component is 1 after angles are
             multiplied by `ANGLE_ARM`. (6,) complex [rad, m]
@@ -59,7 +58,6 @@ class Mode:
     """
 
     name: str
-    eigenvalue: complex
     frequency_hz: float
     damping_ratio: float
     shape: ComplexArray
@@ -93,7 +91,6 @@ def modes_of(spectrum: Spectrum, wrench_slopes: FloatArray) -> list[Mode]:
         modes.append(
             Mode(
                 names[index],
-                complex(value),
                 float(spectrum.frequency_hz[index]),
                 float(spectrum.damping_ratio[index]),
                 shape_of(vector),

@@ -35,6 +35,7 @@ MEASURES = ("regions", "gap", "spring tensions", "mounts", "cabinet")
 MASS = Quantity("mass", Unit("kg", "g"), 0)
 PHASE = Quantity("phase", Unit("rad", "deg"), 0)
 ERROR = Quantity("average error", Share(), 1)
+INTEGRATED = Quantity("direct vs. integrated", Share(), 2)
 
 
 def measures_of(parameters: MachineParameters) -> tuple[str, ...]:

@@ -17,12 +17,9 @@ from wm_drake.studies.fitting.fit import Fit, verdict_of
 from wm_drake.studies.fitting.page import estimates_of, fit_parts, of_unknowns, search_facts
 from wm_drake.studies.fitting.sought import Sought
 from wm_drake.studies.spin_cycle.figures import bars_figure
-from wm_drake.studies.spin_cycle.page import (
-    case_description,
-    missing_warnings,
-    profile_plot,
-    rms_table,
-)
+from wm_drake.studies.spin_cycle.findings import case_description, missing_warnings
+from wm_drake.studies.spin_cycle.page import profile_plot
+from wm_drake.studies.spin_cycle.tables import rms_table
 from wm_drake.studies.spin_identify.study import (
     KNOWN,
     RELATIVE_ERROR,
@@ -54,19 +51,6 @@ def spin_identify_answer(
     truth = dict(zip(names, planted, strict=True)) if planted is not None else None
     bars = [_bars(model, identified, index) for index in range(len(model.cases))]
     search, estimates, *parts = fit_parts(fit, RELATIVE_ERROR, truth)
-    cases = identified[["error_before", "error_after"]].assign(
-        about=("case", [case_description(case) for case in model.cases])
-    )
-    numbers = identified[["average_error_before", "average_error_after"]].assign(
-        verdict=((), _verdict(identified)), is_virtual_experiment=((), is_virtual)
-    )
-    errors = LabelledTable(
-        "cases",
-        cases[["about", "error_before", "error_after"]],
-        "Errors of the cases",
-        "Relative error, [A] Eq. (9), with norms over sensors and axes: mean over the regions, "
-        "before and after the search.",
-    )
     return Answer(
         f"Parameters of machine {model.parameters.name} identified from a spin cycle",
         summary(model, identified, is_virtual=is_virtual),
@@ -88,7 +72,7 @@ def spin_identify_answer(
                 (_parameters(model, fit, identified, truth),),
                 remarks=estimates.remarks,
             ),
-            Part("Errors", (errors, LabelledTable("numbers", numbers))),
+            _errors(model, identified, is_virtual=is_virtual),
             *parts,
         ),
         (
@@ -219,6 +203,24 @@ def residuals_shown(identified: xr.Dataset) -> tuple[Plot, LabelledTable]:
     figure = fig.Figure(panels=fig.in_grid(panels, 1), height=190.0)
     residuals = identified.residual.rename(accelerometer="sensor").to_dataset(name="residual")
     return Plot(figure, "Residuals of each region.", caption), LabelledTable("residuals", residuals)
+
+
+def _errors(model: SpinModel, identified: xr.Dataset, *, is_virtual: bool) -> Part:
+    """Return the errors of each case, and for files the average error and the verdict."""
+    cases = identified[["error_before", "error_after"]].assign(
+        about=("case", [case_description(case) for case in model.cases])
+    )
+    errors = LabelledTable(
+        "cases",
+        cases[["about", "error_before", "error_after"]],
+        "Errors of the cases",
+        "Relative error, [A] Eq. (9), with norms over sensors and axes: mean over the regions, "
+        "before and after the search.",
+    )
+    numbers = identified[["average_error_before", "average_error_after"]].assign(
+        verdict=((), _verdict(identified)), is_virtual_experiment=((), is_virtual)
+    )
+    return Part("Errors", (errors, LabelledTable("numbers", numbers)))
 
 
 def _bars(model: SpinModel, identified: xr.Dataset, index: int) -> Plot:

@@ -21,6 +21,7 @@ from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.fitting.fit import Fit
 from wm_drake.studies.fitting.methods import identify
 from wm_drake.studies.fitting.problem import FitProblem, Measurement, Progress
+from wm_drake.studies.fitting.search import silent
 from wm_drake.studies.fitting.sought import Sought, SoughtNumbers, at_point, sought_in, sought_of
 from wm_drake.studies.spin_cycle.measured import DIMS, RMS
 from wm_drake.studies.spin_cycle.study import average_errors, labels_of, region_errors, runs_of
@@ -135,7 +136,7 @@ def identify_from_spin(
     *,
     planted: FloatArray | None = None,
     seed: int = 0,
-    progress: Progress = lambda fraction, least: None,
+    progress: Progress = silent,
 ) -> tuple[Fit, xr.Dataset]:
     """Identify the unknowns from measured RMS displacements.
 

@@ -169,11 +169,12 @@ class UncertainMachine:
             InputError: a quantity reaches a value that is not allowed.
         """
         problems = []
+        medians = self.joint.values(np.zeros((1, len(self.variables))))[0]
         for index, variable in enumerate(self.variables):
-            for end, score in (("lower", -np.inf), ("upper", np.inf)):
-                scores = np.zeros((1, len(self.variables)))
-                values = self.joint.values(scores)[0]
-                values[index] = variable.marginal.values(np.array([score]))[0]
+            ends = variable.marginal.values(np.array([-np.inf, np.inf]))
+            for end, value in zip(("lower", "upper"), ends, strict=True):
+                values = medians.copy()
+                values[index] = value
                 try:
                     is_usable(self._case(f"{end} end of {variable.name}", values.tolist()))
                 except InputError as error:
