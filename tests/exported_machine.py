@@ -51,7 +51,10 @@ def movable(data):
 
 @dataclass
 class PageRun:
-    """Answer of a page: displacements before the filter (n, sensors), amplitudes, gap. [m]"""
+    """Answer of a page: displacements before the filter (n, sensors), amplitudes, gap [m]; frame.
+
+    The frame is that of the smallest gap.
+    """
 
     moved: Any
     sizes: Any
@@ -59,6 +62,7 @@ class PageRun:
     status: float
     diverged: float | None
     bands: Any
+    frame: dict | None = None
 
 
 def page_run(data, found):
@@ -67,7 +71,9 @@ def page_run(data, found):
     moved = np.frombuffer(base64.b64decode(found["moved"])).reshape(points, -1)[:sensors].T
     gap = found.get("gap") and found["gap"]["distance"]
     sizes = np.array(found["sizes"], dtype=float)
-    return PageRun(moved, sizes, gap, found["status"], found.get("diverged"), found.get("bands"))
+    frame = found.get("gap") and found["gap"].get("frame")
+    diverged, bands = found.get("diverged"), found.get("bands")
+    return PageRun(moved, sizes, gap, found["status"], diverged, bands, frame)
 
 
 @dataclass

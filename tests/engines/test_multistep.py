@@ -203,6 +203,9 @@ def test_a_cabinet_that_grows_by_itself_may_grow():
     growing = np.tile(np.array([[0.0, 1.0], [1e-4, 0.0]]), (WIDTH, 1, 1))
     assert is_followed(growing, np.full(2, CABINET), 1.0, growing)
     assert not is_followed(growing, np.full(2, SMOOTH), 1.0)
+    assert is_followed(growing, np.full(2, SMOOTH), 1.0, may_grow=True)
+    unstable = np.tile(np.array([[0.0, 1.0], [-4.0, 0.0]]), (WIDTH, 1, 1))
+    assert not is_followed(unstable, np.full(2, SMOOTH), 1.0, may_grow=True)
 
 
 @pytest.mark.slow

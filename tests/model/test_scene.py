@@ -41,12 +41,25 @@ def test_tub_shell_to_side_wall_is_the_support_function_of_a_cylinder(scene):
     at_rest, _ = scene.distance(REST, pair)
     # a cylinder about y, turned by yaw: its extent in x is r cos(yaw) + l/2 sin(yaw), about its centre 30 mm to the front
     radius, length, centre, wall = 0.262, 0.40, -0.03, 0.30
-    assert at_rest == pytest.approx(wall - radius, abs=1e-5)
+    assert at_rest == pytest.approx(wall - radius, abs=1e-7)
     yaw, x = 0.03, 0.01
     moved, point = scene.distance(np.array([0, 0, yaw, x, 0, 0]), pair)
     extent = radius * np.cos(yaw) + 0.5 * length * np.sin(yaw) + x - centre * np.sin(yaw)
-    assert moved == pytest.approx(wall - extent, abs=2e-5)
-    assert point[0] == pytest.approx(extent, abs=1e-4)
+    assert moved == pytest.approx(wall - extent, abs=1e-7)
+    assert point[0] == pytest.approx(extent, abs=1e-7)
+
+
+def test_distances_of_shapes_that_are_apart_are_exact(scene):
+    """A distance lies between that of two of their points and the gap along a direction."""
+    for pose in random_poses(5, 3):
+        for (moving, fixed, away, distance), names in zip(
+            scene.separations(pose), scene.pair_names(), strict=True
+        ):
+            bound = moving.lower_extent(away, pose[None]) + fixed.lower_extent(-away, REST[None])
+            _, points = scene.nearest_points(pose, *names.split("|"))
+            assert distance > 0.0
+            assert bound[0] - 1e-9 <= distance <= bound[0] + 2e-7
+            assert np.linalg.norm(points[0] - points[1]) == pytest.approx(distance, abs=2e-7)
 
 
 def test_smallest_gap_is_that_of_brute_force(scene):

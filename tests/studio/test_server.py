@@ -135,21 +135,6 @@ def test_smallest_gap_is_drawn_where_it_is(answer):
     )
 
 
-def test_masses_are_drawn_where_drake_has_them(answer, machine, reference):
-    (unbalance,) = reference.loads["middle"].unbalances
-    motion, plant = answer["motion"], machine.plant
-    record = simulate(machine, "middle")
-    context, at = plant.CreateDefaultContext(), len(motion["time"]) // 2
-    drum = plant.GetBodyByName("drum")
-    angle = np.interp(motion["time"][at], record.time.values, record.drum_angle.values)
-    plant.SetPositions(context, [*motion["poses"][at], angle])
-    expected = plant.EvalBodyPoseInWorld(context, drum) @ np.array(unbalance.position())
-    np.testing.assert_allclose(motion["places"][at][0], expected, atol=1e-4)
-    (mass,) = motion["masses"]
-    assert mass["wet"] == 0.0
-    assert 4.0 / 3.0 * np.pi * 1000.0 * mass["radius"] ** 3 == pytest.approx(unbalance.mass)
-
-
 def test_measured_amplitudes_stand_beside(client, answer):
     experiment = next(of for of in answer["measured"] if of["source"] == "experiment")
     assert experiment["amplitude"]["Xr"] == 14.55

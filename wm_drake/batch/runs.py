@@ -58,6 +58,8 @@ class ShownMotion:
         filtered: Filtered displacements at the sensors. (n, sensors) [m]
         largest: Sample of the largest amplitude of all sensors.
         left: Share of the water of each wet mass of the load at that sample. (wet,)
+        balls: Of each ring on the drum: places in T of its balls, from the point of the drum axis.
+            (n, balls, 3) [m]
     """
 
     time: FloatArray
@@ -68,6 +70,7 @@ class ShownMotion:
     filtered: FloatArray
     largest: int
     left: FloatArray
+    balls: list[FloatArray]
 
 
 @dataclass(frozen=True)
@@ -435,6 +438,10 @@ class LaneRun(Run):
             self.filtered.copy(),
             int(largest),
             self._water_left[largest].copy(),
+            [
+                self.lane.samples[: self.good, np.add.outer(ring, range(3))]
+                for ring in self.item.layout.balls
+            ],
         )
 
     @property

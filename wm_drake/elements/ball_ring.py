@@ -17,7 +17,7 @@ distance D:
 """
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Self
 
 import numpy as np
@@ -27,7 +27,7 @@ from wm_drake.compiler.compilation import law
 from wm_drake.compiler.elementary import angle_of, sqrt, where
 from wm_drake.compiler.packed import SCALAR, VECTOR, PackedLayout, generated
 from wm_drake.compiler.vectors import add, cross, dot, rotate, scale, subtract
-from wm_drake.elements.kind import DrumPlace, ElementKind, Output, PlacedElement, State
+from wm_drake.elements.kind import DrumPlace, ElementKind, Output, PlacedElement, RingPicture, State
 from wm_drake.elements.on_drum import rate_in_tub, seen_from_drum, turned_with_drum
 from wm_drake.laws.rolling import rolling_bristle_rate, rolling_resistance
 from wm_drake.parameters import units as u
@@ -249,6 +249,13 @@ def placed_ring(ends: DrumPlace, parameters: BallRing) -> PlacedElement:
     return PlacedElement(ring_of(parameters.balls), ends, NUMBERS.pack(**numbers), start)
 
 
+def places_of(ring: BallRing, outputs: Mapping[str, FloatArray]) -> FloatArray:
+    """Return the places of the balls in D, as `RingPicture.places`, of a race about the axis."""
+    angle, radius = outputs["angle"][:, : ring.balls], ring.race_radius
+    height = np.full_like(angle, ring.y)
+    return np.stack([radius * np.sin(angle), height, radius * np.cos(angle)], axis=-1)
+
+
 def _turning(places: FloatArray, axis: FloatArray, drum_rate: float) -> FloatArray:
     """Return the states of balls (balls, 3) that turn with the drum. (7 balls,)"""
     velocities = drum_rate * np.cross(axis, places)
@@ -327,6 +334,7 @@ def ring_of(balls: int) -> ElementKind:
         frictionless={"rolling": 0.0},
         words="ring of balls in a race on the drum",
         picture="points",
+        ring=RingPicture(("race_radius",), "ball_diameter", places_of),
         place=placed_ring,
     )
 

@@ -104,6 +104,24 @@ class State:
     initial: float = 0.0
 
 
+@dataclass(frozen=True)
+class RingPicture:
+    """How pictures draw a ring on the drum: circles about its axis, and what moves in it as balls.
+
+    Attributes:
+        radii: Fields of the parameters that are radii of circles.
+        across: Field that is the diameter of a drawn ball.
+        places: Function (parameters, outputs by name) that returns where the balls are in D, from
+            the origin of D. (n, balls, 3) [m]
+        is_liquid: Whether what moves is liquid.
+    """
+
+    radii: tuple[str, ...]
+    across: str
+    places: Callable[[Any, Mapping[str, FloatArray]], FloatArray]
+    is_liquid: bool = False
+
+
 @dataclass(frozen=True, eq=False)
 class ElementKind:
     """A kind of element.
@@ -128,6 +146,9 @@ class ElementKind:
         frictionless: Values of fields of the layout that take the dry friction out, for modes.
         words: What an element of the kind is, for pages.
         picture: What pictures draw: a strut between the two points, or nothing but its end points.
+        ring: How pictures draw a ring on the drum. The place in T of each of its balls, from the
+            point of the drum axis, is in three states whose names begin with `place_x`, `place_y`
+            and `place_z`.
         on_plant: Law (plant_state, state, p, generalized_force, written, rate) that writes the last
             three, see `wm_drake.systems.element_system`. By default it is generated from
             `evaluate`.
@@ -152,6 +173,7 @@ class ElementKind:
     frictionless: Mapping[str, Any] = field(default_factory=dict)
     words: str = ""
     picture: Literal["strut", "points"] = "strut"
+    ring: RingPicture | None = None
     on_plant: Any = None
     trees: int = 1
     place: Callable[..., Any] | None = None
@@ -177,6 +199,11 @@ class ElementKind:
     def on_drum(self) -> bool:
         """Return whether its elements act on the drum, and not between tub and housing."""
         return issubclass(self.parameters, DrumElement)
+
+    @property
+    def balls(self) -> list[int]:
+        """Return the index in the states of the place, three numbers, of each ball of a ring."""
+        return [k for k, state in enumerate(self.states) if state.name.startswith("place_x")]
 
     @property
     def output_parts(self) -> dict[str, slice]:
@@ -292,9 +319,9 @@ wrench: `ChosenLaw` (i, x, dx, motion, p, at, first) that returns moment about T
 element i on the tub, and writes the time derivatives of its states unless dx is None; outputs:
 `ChosenLaw` (i, x, motion, p, at, first, answer, column) that writes its outputs and returns the
 index behind them; at, states: index of each element in the packed numbers, and of its first state;
-on_cabinet: 1 for an element whose reaction acts on the cabinet, 0 for one on the drum; torque:
-`ChosenLaw` (i, x, motion, p, at, first) that returns the torque on the drum, None without elements
-on the drum. A machine without such elements has None in place of this.
+on_cabinet: numbers i of the elements whose reaction acts on the cabinet, which are those not on the
+drum; torque: `ChosenLaw` (i, x, motion, p, at, first) that returns the torque on the drum, None
+without elements on the drum. A machine without such elements has None in place of this.
 """
 
 
@@ -309,7 +336,7 @@ def registered_laws(
     if not kinds:
         return None
     begins, firsts = (np.array(values, dtype=np.int64) for values in (at, states))
-    on_cabinet = np.array([0.0 if kind.on_drum else 1.0 for kind in kinds])
+    on_cabinet = np.flatnonzero([not kind.on_drum for kind in kinds])
     wrench, outputs, torque = _laws_of(tuple(kinds))
     return RegisteredLaws(wrench, outputs, begins, firsts, on_cabinet, torque)
 

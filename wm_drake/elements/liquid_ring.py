@@ -18,6 +18,7 @@ axis and the gyroscopic moment of I w.
 """
 
 import functools
+from collections.abc import Mapping
 from typing import Annotated, Any, Self
 
 import numpy as np
@@ -28,7 +29,7 @@ from wm_drake.compiler.compilation import law
 from wm_drake.compiler.elementary import sqrt
 from wm_drake.compiler.packed import SCALAR, VECTOR, PackedLayout
 from wm_drake.compiler.vectors import add, cross, dot, rotate, rotate_back, scale, subtract
-from wm_drake.elements.kind import DrumPlace, ElementKind, Output, PlacedElement, State
+from wm_drake.elements.kind import DrumPlace, ElementKind, Output, PlacedElement, RingPicture, State
 from wm_drake.elements.on_drum import rate_in_tub, seen_from_drum
 from wm_drake.laws.stop import stop_force
 from wm_drake.laws.table import CURVE, pack_number, pack_table, stiffness_force
@@ -279,6 +280,11 @@ def _hanging(
     return state
 
 
+def places_of(ring: LiquidRing, outputs: Mapping[str, FloatArray]) -> FloatArray:
+    """Return the place of the centre of mass of the liquid in D, as `RingPicture.places`."""
+    return (outputs["moment"] / ring.mass + np.array([0.0, ring.y, 0.0]))[:, None]
+
+
 LIQUID_RING = ElementKind(
     name="liquid_ring",
     parameters=LiquidRing,
@@ -297,6 +303,7 @@ LIQUID_RING = ElementKind(
     acts_at_rest=False,
     words="partly filled ring of liquid on the drum",
     picture="points",
+    ring=RingPicture(("outer_radius", "inner_radius"), "width", places_of, is_liquid=True),
     place=placed_ring,
 )
 """The kind in machine files."""

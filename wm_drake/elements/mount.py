@@ -1,6 +1,7 @@
 """Forces of the mounts on the cabinet: of springs, dampers, bushings and telescopic dampers.
 
-A mount is everything that connects the oscillating group to the cabinet (the housing of the SDF).
+A mount is everything that connects the oscillating group to the cabinet (the housing of the SDF);
+an element on the drum is none.
 """
 
 import functools
@@ -13,7 +14,7 @@ from wm_drake.compiler.chosen import call
 from wm_drake.compiler.compilation import law, long_running
 from wm_drake.compiler.elementary import in_each_lane, lanes_to_rows, rows_to_lanes
 from wm_drake.compiler.lanes import WIDTH, align_stack, keep, lane_array
-from wm_drake.compiler.matrices import plus, scaled
+from wm_drake.compiler.matrices import plus
 from wm_drake.compiler.vectors import add, cross, scale
 from wm_drake.elements.bushing import six_component_bushing_wrench
 from wm_drake.elements.friction_damper import (
@@ -185,10 +186,9 @@ def _write_telescopic_dampers(x, p, telescopes, tubes, wrenches, column):
 def _write_others(x, p, motion, others, wrenches, column):
     """Write the wrench of each element of another package; `others` is None without any."""
     if others is not None:
-        for i in range(len(others.at)):
+        for i in others.on_cabinet:
             wrench = call(others.wrench, i, x, None, motion, p, others.at[i], others.states[i])
-            reaction = scaled(others.on_cabinet[i], reaction_on_cabinet(motion.position, wrench))
-            column = write_wrench(wrenches, column, reaction)
+            column = write_wrench(wrenches, column, reaction_on_cabinet(motion.position, wrench))
 
 
 @law

@@ -1,6 +1,6 @@
 """Compiled functions of a page that find the smallest gap between tub and housing.
 
-They do what `wm_drake.model.scene` does with Drake.
+They do what `wm_drake.model.scene` does, with the same distances of shapes that are apart.
 """
 
 from typing import Any
@@ -8,115 +8,10 @@ from typing import Any
 import numpy as np
 from numba import cfunc, njit, types
 
-from wm_drake.compiler.compilation import law
-from wm_drake.compiler.elementary import sine_cosine, sqrt
-from wm_drake.compiler.vectors import (
-    add,
-    cross,
-    dot,
-    rotate,
-    rotate_back,
-    rotation_from_rpy,
-    scale,
-    subtract,
-)
+from wm_drake.compiler.elementary import sqrt
+from wm_drake.compiler.vectors import dot
 from wm_drake.export.kernel import OPTIONS, PAIR_SIZE, POINTER, SHAPE_SIZE, numbers_at
-from wm_drake.model.outline import lowest_point
-
-MOST_PROJECTIONS = 20000
-"""Projections after which the nearest points of two shapes count as found."""
-TOUCHING = 1e-7
-"""Accuracy of a distance of two shapes. [m]"""
-
-
-@law
-def nearest_in(shape, is_round, q):
-    """Return the point of a shape nearest a point, both in the frame of its body. [m]
-
-    Args:
-        shape, is_round: As for `lowest_point`.
-        q: The point.
-    """
-    x, y = (shape[3], shape[4], shape[5]), (shape[6], shape[7], shape[8])
-    z, centre = (shape[9], shape[10], shape[11]), (shape[0], shape[1], shape[2])
-    r = subtract(q, centre)
-    a, b, along = dot(x, r), dot(y, r), dot(z, r)
-    if is_round:
-        away = sqrt(a * a + b * b)
-        inside = shape[12] / away if away > shape[12] else 1.0
-        a, b = a * inside, b * inside
-    else:
-        a, b = min(max(a, -shape[12]), shape[12]), min(max(b, -shape[13]), shape[13])
-    along = min(max(along, -shape[14]), shape[14])
-    return add(centre, add(scale(a, x), add(scale(b, y), scale(along, z))))
-
-
-@law
-def separation(motion, moving, fixed, rounds, d):
-    """Return the gap of two shapes along a direction: a lower bound of their distance. [m]
-
-    Args:
-        motion: Rotation and position of the body of the first shape.
-        moving, fixed: Numbers of the shapes.
-        rounds: Whether each is a cylinder.
-        d: Unit vector in W along which the first moves away from the second.
-    """
-    bound = lowest_point(rotate_back(motion[0], d), moving, rounds[0]) + dot(motion[1], d)
-    return bound + lowest_point((-d[0], -d[1], -d[2]), fixed, rounds[1])
-
-
-@law
-def distance_of(motion, moving, fixed, rounds, d):
-    """Return the distance of two shapes, the direction that separates them, and nearest points.
-
-    A point is projected onto one shape and the other in turn. If the shapes overlap, the distance
-    is the largest `separation` near the last direction: minus the depth of the overlap.
-
-    Args:
-        motion, moving, fixed, rounds: As for `separation`.
-        d: Direction in which the search for shapes that overlap begins.
-    """
-    x = add(motion[1], rotate(motion[0], (moving[0], moving[1], moving[2])))
-    y = x
-    gap = 0.0
-    for k in range(MOST_PROJECTIONS):
-        y = nearest_in(fixed, rounds[1], x)
-        q = nearest_in(moving, rounds[0], rotate_back(motion[0], subtract(y, motion[1])))
-        x = add(motion[1], rotate(motion[0], q))
-        line = subtract(x, y)
-        gap = sqrt(dot(line, line))
-        if gap < TOUCHING:
-            break
-        if k % 8 == 7:
-            d = scale(1.0 / gap, line)
-            if gap - separation(motion, moving, fixed, rounds, d) < TOUCHING:
-                return gap, d, x, y
-    best = separation(motion, moving, fixed, rounds, d)
-    if gap >= TOUCHING:  # nearly: the bound is the safe side
-        return best, d, x, y
-    turn = 0.3
-    while turn > 1e-6:
-        improved = False
-        side = (1.0, 0.0, 0.0) if abs(d[0]) < 0.7 else (0.0, 1.0, 0.0)
-        u = cross(d, side)
-        u = scale(1.0 / sqrt(dot(u, u)), u)
-        w = cross(d, u)
-        for k in range(16):
-            s, c = sine_cosine(0.39269908169872414 * k)
-            trial = add(d, scale(turn, add(scale(c, u), scale(s, w))))
-            trial = scale(1.0 / sqrt(dot(trial, trial)), trial)
-            bound = separation(motion, moving, fixed, rounds, trial)
-            if bound > best:
-                best, d, improved = bound, trial, True
-        if not improved:
-            turn = 0.5 * turn
-    return best, d, x, y
-
-
-@law
-def pose_of(x):
-    """Return rotation and position of the tub from a sample."""
-    return rotation_from_rpy(x[0], x[1], x[2]), (x[3], x[4], x[5])
+from wm_drake.model.outline import distance_of, pose_of, separation
 
 
 def _pair_reader(plan: Any) -> Any:

@@ -1,8 +1,8 @@
 """Compiled functions of a machine in a web page: they set it up, run it and measure the run.
 
 As in `wm_drake.export.kernel`, all numbers of an instance are in one array v, and what does not
-change in a second array c. Only the equilibrium (`page_statics`) and the distance of two shapes
-(`page_gap`) have functions of their own; the run is that of a batch (`page_run`).
+change in a second array c. Only the equilibrium (`page_statics`) and the search for the smallest
+gap (`page_gap`) have functions of their own; the run is that of a batch (`page_run`).
 """
 
 import json

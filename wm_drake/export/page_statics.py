@@ -286,7 +286,7 @@ def _on_tub(plan: Any) -> Any:
     They are those of gravity and all mounts at the state `at.trial`.
     """
     at, resting = plan.at, plan.resting
-    others = len(resting.others.at) if resting.others else 0
+    others = len(resting.others.on_cabinet) if resting.others else 0
     count = sum(len(part) for part in resting[:3]) + others
 
     @njit(**OPTIONS)

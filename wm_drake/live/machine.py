@@ -7,13 +7,17 @@ from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 from wm_drake.batch.work_items import Preparation
+from wm_drake.elements.kind import element_kind
+from wm_drake.engines.compiled.step_check import fastest_motion
+from wm_drake.engines.compiled.stepping import LONGEST_STEP
 from wm_drake.errors import InputError, Problem, input_error, nearest_names
 from wm_drake.live.parts import CALCULATION, PART_ORDER, places_of
 from wm_drake.live.sliders import Slider, sliders_of
 from wm_drake.live.state import DESCRIBED, PageState
 from wm_drake.model.bodies import with_sdf_values
 from wm_drake.model.build import build_machine
-from wm_drake.model.machine import Machine
+from wm_drake.model.machine import Machine, Setup
+from wm_drake.model.replay import DENSITY
 from wm_drake.model.same_elements import check_same_elements
 from wm_drake.model.scene import Outline, Scene
 from wm_drake.model.sdf_names import sdf_names
@@ -217,6 +221,7 @@ class OpenMachine:
         with self.lock:
             places = places_of(parameters, self.machine.plant)
             numbers = [slider.for_page(places) for slider in self.sliders.values()]
+            fastest = fastest_motion(self.machine.set_up(None))
             shapes = {
                 body: [_shape(name, of) for name, of in outlines.items()]
                 for body, outlines in (
@@ -234,7 +239,29 @@ class OpenMachine:
             "sensors": {name: sensor.axis for name, sensor in parameters.sensors.items()},
             "mounts": list(mount_names(parameters)),
             "shapes": shapes,
+            "fastest": fastest.part if fastest.longest_step < LONGEST_STEP else "",
+            "rings": _rings(parameters),
+            "density": DENSITY,
         }
+
+
+def _rings(parameters: MachineParameters) -> list[dict[str, object]]:
+    """Return the keys of the numbers with which each ring on the drum is drawn."""
+    rings = []
+    for name, element in parameters.elements.items():
+        if (ring := element_kind(element.kind).ring) is not None:
+            key = f"elements.{name}"
+            radii = [f"{key}.{field}" for field in ring.radii]
+            numbers = {"y": f"{key}.y", "across": f"{key}.{ring.across}", "radii": radii}
+            rings.append({**numbers, "isLiquid": ring.is_liquid})
+    return rings
+
+
+def drum_of(setup: Setup) -> dict[str, object]:
+    """Return origin and axes, as columns of a matrix, of the drum at angle 0, in T. [m]"""
+    poses = setup.machine.cache.frame_poses(setup.machine.plant, setup.parameters)
+    origin, axes = poses.on_drum(0.0)
+    return {"origin": origin.tolist(), "axes": axes.tolist()}
 
 
 def _shape(name: str, outline: Outline) -> dict[str, object]:

@@ -24,7 +24,7 @@ from wm_drake.export.page_second import SecondProcess
 from wm_drake.export.page_steps import FARTHEST, other_steps
 from wm_drake.export.tunable import LEAST
 from wm_drake.export.wasm import wasm_module
-from wm_drake.live.machine import MOST_STEPS, OpenMachine
+from wm_drake.live.machine import MOST_STEPS, OpenMachine, drum_of
 from wm_drake.live.measures import foot_title, heads_of, mount_title, shown_measures
 from wm_drake.live.sliders import Slider
 from wm_drake.live.state import PageState
@@ -123,6 +123,7 @@ def _with_code(parameters: MachineParameters, second: SecondProcess) -> dict[str
             "constants": _finite(model.constants.tolist()),
             "places": model.places,
             "sample": elements.begins.size + elements.begins.rates,
+            "balls": contents.layout.balls,
             "padding": round(PADDING_PERIODS / contents.band[0] / contents.period),
             "leastPadding": LEAST_PADDING,
             "mostSteps": MOST_STEPS,
@@ -142,6 +143,7 @@ def _with_code(parameters: MachineParameters, second: SecondProcess) -> dict[str
         "profile": {"time": profile.time, "speed": profile.speed},
         "band": contents.band,
         "depths": depths,
+        "drum": drum_of(setup),
         "pairs": [[shape_name(n) for n in pair.split("|")] for pair in model.pair_names],
         "measured": _measured(opened),
         "rows": [row for name in shown_measures(parameters) for row in _rows(opened, name, count)],

@@ -64,7 +64,10 @@ class Slider:
         return (self.high - self.low) / 100.0 / self.unit.from_si(1.0)
 
     def for_page(self, places: Mapping[str, tuple[str, str]]) -> dict[str, Any]:
-        """Return the number as the page shows it; `short` is unique enough for a narrow column."""
+        """Return the number as the page shows it.
+
+        `short` is unique enough for a narrow column, `factor` the SI value of its unit.
+        """
         part, group = part_and_group(self.key, places)
         *parents, name = self.key.split(".")
         if self.is_entry:
@@ -87,6 +90,7 @@ class Slider:
             "label": label,
             "short": f"{last} {label}".strip(),
             "unit": self.unit.label,
+            "factor": 1.0 / self.unit.from_si(1.0),
             "value": self.unit.from_si(float(self.number.nominal or 0.0)),
             "low": self.low,
             "high": self.high,

@@ -1,14 +1,28 @@
-"""Bounds of distances: support functions of cylinders and boxes that are fixed to a moving body."""
+"""Distances of cylinders and boxes that are fixed to a moving body, and their lower bounds."""
 
 import numpy as np
 
 from wm_drake.compiler.compilation import law, long_running
-from wm_drake.compiler.elementary import lanes_to_rows, rows_to_lanes, sqrt, where
+from wm_drake.compiler.elementary import lanes_to_rows, rows_to_lanes, sine_cosine, sqrt, where
 from wm_drake.compiler.lanes import WIDTH, align_stack, keep, lane_array
-from wm_drake.compiler.vectors import dot, rotate_back, rotation_from_rpy
+from wm_drake.compiler.vectors import (
+    add,
+    cross,
+    dot,
+    rotate,
+    rotate_back,
+    rotation_from_rpy,
+    scale,
+    subtract,
+)
 
 BLOCK = 16
 """Number of samples whose bounds of distances are kept as one."""
+
+MOST_PROJECTIONS = 20000
+"""Projections after which the nearest points of two shapes count as found."""
+TOUCHING = 1e-7
+"""Accuracy of a distance of two shapes. [m]"""
 
 
 @law
@@ -32,6 +46,111 @@ def lowest_point(in_body, shape, is_round):
     else:
         reach = shape[12] * abs(along[0]) + shape[13] * abs(along[1]) + shape[14] * abs(along[2])
     return dot(in_body, (shape[0], shape[1], shape[2])) - reach
+
+
+@law
+def nearest_in(shape, is_round, q):
+    """Return the point of a shape nearest a point, both in the frame of its body. [m]
+
+    Args:
+        shape, is_round: As for `lowest_point`.
+        q: The point.
+    """
+    x, y = (shape[3], shape[4], shape[5]), (shape[6], shape[7], shape[8])
+    z, centre = (shape[9], shape[10], shape[11]), (shape[0], shape[1], shape[2])
+    r = subtract(q, centre)
+    a, b, along = dot(x, r), dot(y, r), dot(z, r)
+    if is_round:
+        away = sqrt(a * a + b * b)
+        inside = shape[12] / away if away > shape[12] else 1.0
+        a, b = a * inside, b * inside
+    else:
+        a, b = min(max(a, -shape[12]), shape[12]), min(max(b, -shape[13]), shape[13])
+    along = min(max(along, -shape[14]), shape[14])
+    return add(centre, add(scale(a, x), add(scale(b, y), scale(along, z))))
+
+
+@law
+def separation(motion, moving, fixed, rounds, d):
+    """Return the gap of two shapes along a direction: a lower bound of their distance. [m]
+
+    Args:
+        motion: Rotation and position of the body of the first shape.
+        moving, fixed: Numbers of the shapes.
+        rounds: Whether each is a cylinder.
+        d: Unit vector in W along which the first moves away from the second.
+    """
+    bound = lowest_point(rotate_back(motion[0], d), moving, rounds[0]) + dot(motion[1], d)
+    return bound + lowest_point((-d[0], -d[1], -d[2]), fixed, rounds[1])
+
+
+@law
+def distance_of(motion, moving, fixed, rounds, d):
+    """Return the distance of two shapes, the direction that separates them, and nearest points.
+
+    A point is projected onto one shape and the other in turn. If the shapes overlap, the distance
+    is the largest `separation` near the last direction: minus the depth of the overlap.
+
+    Args:
+        motion, moving, fixed, rounds: As for `separation`.
+        d: Direction in which the search for shapes that overlap begins.
+    """
+    x = add(motion[1], rotate(motion[0], (moving[0], moving[1], moving[2])))
+    y = x
+    gap = 0.0
+    for k in range(MOST_PROJECTIONS):
+        y = nearest_in(fixed, rounds[1], x)
+        q = nearest_in(moving, rounds[0], rotate_back(motion[0], subtract(y, motion[1])))
+        x = add(motion[1], rotate(motion[0], q))
+        line = subtract(x, y)
+        gap = sqrt(dot(line, line))
+        if gap < TOUCHING:
+            break
+        if k % 8 == 7:
+            d = scale(1.0 / gap, line)
+            if gap - separation(motion, moving, fixed, rounds, d) < TOUCHING:
+                return gap, d, x, y
+    best = separation(motion, moving, fixed, rounds, d)
+    if gap >= TOUCHING:  # nearly: the bound is the safe side
+        return best, d, x, y
+    turn = 0.3
+    while turn > 1e-6:
+        improved = False
+        side = (1.0, 0.0, 0.0) if abs(d[0]) < 0.7 else (0.0, 1.0, 0.0)
+        u = cross(d, side)
+        u = scale(1.0 / sqrt(dot(u, u)), u)
+        w = cross(d, u)
+        for k in range(16):
+            s, c = sine_cosine(0.39269908169872414 * k)
+            trial = add(d, scale(turn, add(scale(c, u), scale(s, w))))
+            trial = scale(1.0 / sqrt(dot(trial, trial)), trial)
+            bound = separation(motion, moving, fixed, rounds, trial)
+            if bound > best:
+                best, d, improved = bound, trial, True
+        if not improved:
+            turn = 0.5 * turn
+    return best, d, x, y
+
+
+@law
+def pose_of(x):
+    """Return rotation and position of the tub from a sample."""
+    return rotation_from_rpy(x[0], x[1], x[2]), (x[3], x[4], x[5])
+
+
+@long_running
+def nearest_points(pose, moving, fixed, are_round, answer):
+    """Find the nearest points of two shapes at a pose of the body that carries the first.
+
+    Args:
+        pose: Roll, pitch, yaw, x, y, z. (6,) [rad, m]
+        moving, fixed, are_round: As for `raise_bounds`.
+        answer: Written: distance; direction that separates them; points of both shapes. (10,) [m]
+    """
+    up = (0.0, 0.0, 1.0)
+    answer[0], away, first, second = distance_of(pose_of(pose), moving, fixed, are_round, up)
+    for k in range(3):
+        answer[1 + k], answer[4 + k], answer[7 + k] = away[k], first[k], second[k]
 
 
 @long_running

@@ -7,19 +7,20 @@ import gc
 import html
 import json
 import logging
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from pydrake.geometry import Box, Cylinder, Meshcat, MeshcatParams, Rgba, Sphere
 from pydrake.math import RigidTransform, RotationMatrix
 
-from wm_drake.elements.kind import Ends
+from wm_drake.elements.kind import Ends, element_kind
 from wm_drake.model.frame_poses import FramePoses
 from wm_drake.model.placed_elements import placed_elements
 from wm_drake.model.scene import Scene, with_fixed_cabinet
 from wm_drake.model.visualization import SHAPES, add_floor, cabinet_pose
 from wm_drake.parameters import Load, MachineParameters
+from wm_drake.parameters.element_kinds import DrumElement
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 
@@ -27,12 +28,16 @@ SPRING_COLOUR = Rgba(0.0, 0.447, 0.698, 1.0)
 DAMPER_COLOUR, ROD_COLOUR = Rgba(0.90, 0.62, 0.0, 1.0), Rgba(0.25, 0.25, 0.25, 1.0)
 GASKET_COLOUR, RING_COLOUR = Rgba(0.0, 0.62, 0.45, 0.35), Rgba(0.0, 0.45, 0.33, 1.0)
 UNBALANCE_COLOUR, WATER_COLOUR = Rgba(0.835, 0.369, 0.0, 1.0), Rgba(0.0, 0.32, 0.80, 1.0)
+BALL_COLOUR, RACE_COLOUR = Rgba(0.25, 0.25, 0.28, 1.0), Rgba(0.2, 0.2, 0.2, 1.0)
 
 COILS, COIL_RADIUS, WIRE_RADIUS = 9, 0.017, 0.0028
 """Coils of a drawn spring, radius of the coil and of the wire. [m] For drawing only."""
 
 TUBE_RADIUS, ROD_RADIUS = 0.014, 0.007
 """Radii of the two tubes of a drawn damper. [m] For drawing only."""
+
+RACE_WIRE = 0.0015
+"""Radius of the line of a drawn ring on the drum. [m]"""
 
 TUBE_SHARE, ROD_SHARE = 0.55, 0.75
 """Lengths of the two tubes of a drawn damper, as shares of its length at rest; they overlap."""
@@ -63,6 +68,7 @@ class Motion:
         cabinet: (n, 6) Roll, pitch, yaw and position of a cabinet that moves; the positions are
             seen from it. None for a fixed one. [rad, m]
         left: (wet,) Share of water that is left in each wet mass of the load; None for all of it.
+        balls: (n, balls, 3) places in D of the balls of each ring on the drum, by its name. [m]
     """
 
     time: FloatArray
@@ -70,6 +76,7 @@ class Motion:
     speed: FloatArray
     cabinet: FloatArray | None = None
     left: FloatArray | None = None
+    balls: Mapping[str, FloatArray] = field(default_factory=dict)
 
 
 def replay_page(
@@ -107,15 +114,21 @@ def _drawn_page(
     meshcat.SetCameraPose(camera_in_world=[0.5, -1.15, 0.34], target_in_world=[0.0, 0.0, -0.04])
     parameters = with_fixed_cabinet(parameters)
     scene = Scene(parameters, meshcat)
-    parts = [*_parts(scene, parameters, gasket), *_unbalances(load, motion.left)]
+    parts = [
+        *_parts(scene, parameters, gasket),
+        *_rings(parameters, motion.balls),
+        *_unbalances(load, motion.left),
+    ]
     for part in parts:
         part.add(meshcat)
 
     def move_parts(moment: float) -> None:
-        frame = _Frame(moment, scene.pose_in_world("tub"), scene.pose_in_world("drum"))
+        number = int(np.argmin(np.abs(motion.time - motion.time[0] - moment)))
+        poses = scene.pose_in_world("tub"), scene.pose_in_world("drum")
+        frame = _Frame(moment, *poses, number)
         for part in parts:
             part.move(meshcat, frame)
-        _move_cabinet(meshcat, motion, moment)
+        _move_cabinet(meshcat, motion, frame)
 
     if motion.cabinet is not None and parameters.cabinet is not None:
         add_floor(meshcat, parameters.cabinet.floor)
@@ -124,23 +137,23 @@ def _drawn_page(
     return _with_caption(str(meshcat.StaticHtml()), motion, title, [part.kind for part in parts])
 
 
-def _move_cabinet(meshcat: Meshcat, motion: Motion, moment: float) -> None:
-    """Record the pose of a cabinet that moves, with all that is drawn in its frame."""
-    if motion.cabinet is None:
-        return
-    frame = int(np.argmin(np.abs(motion.time - motion.time[0] - moment)))
-    X_WC = cabinet_pose(motion.cabinet[frame])
-    for path in (SHAPES, "/elements"):
-        meshcat.SetTransform(path, X_WC, moment)
-
-
 @dataclass(frozen=True)
 class _Frame:
-    """One frame of a replay: its time in the animation [s], and the poses of tub and drum."""
+    """One frame of a replay: time in the animation [s], poses of tub and drum, number of sample."""
 
     moment: float
     X_WT: RigidTransform
     X_WD: RigidTransform
+    number: int = 0
+
+
+def _move_cabinet(meshcat: Meshcat, motion: Motion, frame: _Frame) -> None:
+    """Record the pose of a cabinet that moves, with all that is drawn in its frame."""
+    if motion.cabinet is None:
+        return
+    X_WC = cabinet_pose(motion.cabinet[frame.number])
+    for path in (SHAPES, "/elements"):
+        meshcat.SetTransform(path, X_WC, frame.moment)
 
 
 class _Part:
@@ -245,20 +258,37 @@ class _Gasket(_Part):
 
 
 @dataclass(frozen=True)
-class _Unbalance(_Part):
-    """Point mass in the drum, as a ball."""
+class _Ball(_Part):
+    """Point mass in the drum, as a ball: its places (n, 3) or (1, 3) in D."""
 
     path: str
-    p_DoU_D: FloatArray
+    places: FloatArray
     radius: float
     colour: Rgba
-    kind = "unbalance"
+    kind: str = "unbalance"
 
     def add(self, meshcat: Meshcat) -> None:
         meshcat.SetObject(self.path, Sphere(self.radius), self.colour)
 
     def move(self, meshcat: Meshcat, frame: _Frame) -> None:
-        meshcat.SetTransform(self.path, frame.X_WD @ RigidTransform(self.p_DoU_D), frame.moment)
+        X_DU = RigidTransform(self.places[min(frame.number, len(self.places) - 1)])
+        meshcat.SetTransform(self.path, frame.X_WD @ X_DU, frame.moment)
+
+
+@dataclass(frozen=True)
+class _Circle(_Part):
+    """Circle about the drum axis."""
+
+    path: str
+    p_DoC_D: FloatArray
+    radius: float
+    kind = "balancer"
+
+    def add(self, meshcat: Meshcat) -> None:
+        meshcat.SetTriangleMesh(self.path, *ring(self.radius, RACE_WIRE), RACE_COLOUR)
+
+    def move(self, meshcat: Meshcat, frame: _Frame) -> None:
+        meshcat.SetTransform(self.path, frame.X_WD @ RigidTransform(self.p_DoC_D), frame.moment)
 
 
 def _parts(scene: Scene, parameters: MachineParameters, gasket: bool) -> Iterator[_Part]:
@@ -286,6 +316,21 @@ def _parts(scene: Scene, parameters: MachineParameters, gasket: bool) -> Iterato
         yield _Gasket("/elements/gasket", tub, housing)
 
 
+def _rings(parameters: MachineParameters, balls: Mapping[str, FloatArray]) -> Iterator[_Part]:
+    """Yield the rings on the drum and what moves in them; `balls` as in `Motion`."""
+    for name, element in parameters.elements.items():
+        drawn, path = element_kind(element.kind).ring, f"/elements/rings/{name}"
+        if drawn is None or not isinstance(element, DrumElement):
+            continue
+        for number, field_name in enumerate(drawn.radii):
+            centre, radius = np.array([0.0, element.y, 0.0]), getattr(element, field_name)
+            yield _Circle(f"{path}/circle_{number}", centre, radius)
+        colour, kind = (WATER_COLOUR, "liquid") if drawn.is_liquid else (BALL_COLOUR, "ball")
+        for number, places in enumerate(np.moveaxis(balls.get(name, np.empty((0, 0, 3))), 1, 0)):
+            across = 0.5 * getattr(element, drawn.across)
+            yield _Ball(f"{path}/ball_{number}", places, across, colour, kind)
+
+
 def ball_radius(mass: float) -> float:
     """Return the radius of the ball that stands for a mass of laundry. [m]"""
     return float((3.0 * mass / (4.0 * np.pi * DENSITY)) ** (1.0 / 3.0))
@@ -302,8 +347,8 @@ def _unbalances(load: Load | None, left: FloatArray | None) -> Iterator[_Part]:
         wet = water.get(index, 0.0)
         ends = zip(UNBALANCE_COLOUR.rgba, WATER_COLOUR.rgba, strict=True)
         colour = Rgba(*(dry + wet * (blue - dry) for dry, blue in ends))
-        place = np.array(unbalance.position())
-        yield _Unbalance(f"/elements/unbalance/{index}", place, radius, colour)
+        place = np.array([unbalance.position()])
+        yield _Ball(f"/elements/unbalance/{index}", place, radius, colour)
 
 
 def _stretch(meshcat: Meshcat, path: str, factor: float, moment: float) -> None:
@@ -377,6 +422,9 @@ LEGEND = {
     "damper": "#e69f00",
     "gasket": "#009e73",
     "unbalance": "#d55e00",
+    "balancer": "#333333",
+    "ball": "#404047",
+    "liquid": "#0052cc",
     "water": "#0052cc",
 }
 """Colours of the legend, the same as those of the shapes."""

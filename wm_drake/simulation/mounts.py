@@ -10,6 +10,7 @@ from wm_drake.elements.state_map import CARRIER, ELEMENT, STRETCHES
 from wm_drake.engines.trajectory import Trajectory
 from wm_drake.model.machine import Setup
 from wm_drake.parameters import MachineParameters
+from wm_drake.parameters.element_kinds import DrumElement
 from wm_drake.parameters.sections import SECTIONS
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.mount_histories import SIGNAL_SIZE, SIGNAL_SUMS, VECTOR_SIZE, VECTOR_SUMS
@@ -24,10 +25,13 @@ KINDS = ("peak", "rms", "dynamic_rms")
 def mount_names(parameters: MachineParameters) -> tuple[str, ...]:
     """Return the mounts of a machine by their key paths in the machine file, such as springs.left.
 
-    The order is that of `wm_drake.elements.mount.Mounts`.
+    The order is that of `wm_drake.elements.mount.Mounts`. Elements on the drum are no mounts.
     """
     return tuple(
-        section.key(name) for section in SECTIONS.values() for name in section.elements(parameters)
+        section.key(name)
+        for section in SECTIONS.values()
+        for name, element in section.elements(parameters).items()
+        if not isinstance(element, DrumElement)
     )
 
 

@@ -14,18 +14,16 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from wm_drake.batch.runs import Runner, RunResult, ShownMotion
 from wm_drake.batch.work_items import BatchKey, Preparation, WorkItem
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.errors import InputError, Problem
-from wm_drake.live.machine import OpenMachine, is_same
+from wm_drake.live.machine import OpenMachine, drum_of, is_same
 from wm_drake.live.measures import foot_title, heads_of, mount_title, shown_measures
 from wm_drake.live.state import PageState
 from wm_drake.model.expectations import unusual_springs
 from wm_drake.model.machine import Setup
-from wm_drake.model.replay import ball_radius
 from wm_drake.model.scene import Gap
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.plausibility import unusual_numbers
@@ -100,7 +98,7 @@ def picture(machine: OpenMachine, runner: Runner, state: PageState) -> dict[str,
         },
         "values": machine.shown_values(case, state),
         **_gap_of(main),
-        "gap_points": _gap_points(runner, main, setup),
+        "gap_points": _gap_points(runner, main),
         "loads": [{"load": run.case.name, **_gap_of(run)} for run in runs],
         "measured": machine.measured(state),
         "warnings": [{"key": p.key, "message": p.message} for p in warnings],
@@ -264,12 +262,11 @@ def _motion(run: RunResult, setup: Setup) -> dict[str, Any]:
     return {
         "envelopes": _envelopes(motion),
         "orbits": _orbits(motion, setup),
-        "motion": {  # times [s] and poses of the tub (roll, pitch, yaw, x, y, z) [rad, m]
+        "motion": {
             "time": np.round(motion.time[replay], 4).tolist(),
-            "poses": np.round(motion.poses[replay], 6).tolist(),
-            "rest": np.round(motion.rest_pose, 6).tolist(),
+            "frames": _frames(motion, replay),
             "masses": _masses(run, motion),
-            "places": _places_of_masses(run, setup, replay),
+            "drum": drum_of(setup),
         },
         "largest": {
             "time": float(motion.time[largest]),
@@ -278,30 +275,26 @@ def _motion(run: RunResult, setup: Setup) -> dict[str, Any]:
     }
 
 
+def _frames(motion: ShownMotion, samples: Any) -> list[dict[str, Any]]:
+    """Return pose of the tub, angle of the drum, and balls of each ring, at some samples."""
+    poses, angles = motion.poses[samples], motion.drum_angle[samples]
+    balls = [np.round(ring[samples], 5).tolist() for ring in motion.balls]
+    return [
+        {"pose": pose, "angle": angle, "balls": [ring[k] for ring in balls]}
+        for k, (pose, angle) in enumerate(
+            zip(np.round(poses, 6).tolist(), np.round(angles, 4).tolist(), strict=True)
+        )
+    ]
+
+
 def _masses(run: RunResult, motion: ShownMotion) -> list[dict[str, float]]:
-    """Return the radius of the ball of each mass of the load [m], and its share of water left."""
+    """Return the masses of the load, each with the share of water that is left in it."""
     load = run.case.load
     water = dict(zip(load.wet, motion.left.tolist(), strict=True))
     return [
-        {"radius": ball_radius(mass), "wet": water.get(number, 0.0)}
-        for number, mass in enumerate(load.masses(motion.left))
+        {"mass": mass, "radius": u.radius, "y": u.y, "phase": u.phase, "wet": water.get(k, 0.0)}
+        for k, (u, mass) in enumerate(zip(load.unbalances, load.masses(motion.left), strict=True))
     ]
-
-
-def _places_of_masses(run: RunResult, setup: Setup, samples: Any) -> list[Any]:
-    """Return the places of the masses of the load in W at some samples. (n, masses, 3) [m]"""
-    motion, machine = run.motion, setup.machine
-    assert motion is not None  # the page shows it
-    poses = machine.cache.frame_poses(machine.plant, setup.parameters)
-    origin, axes = poses.on_drum(0.0)
-    turned = Rotation.from_euler("y", motion.drum_angle[samples, None])
-    of_tub = Rotation.from_euler("xyz", motion.poses[samples, :3])
-    at = motion.poses[samples, 3:]
-    places = [
-        at + of_tub.apply(origin + turned.apply(unbalance.position()) @ axes.T)
-        for unbalance in run.case.load.unbalances
-    ]
-    return np.round(np.stack(places, axis=1), 5).tolist() if places else [[]] * len(at)
 
 
 def _envelopes(motion: ShownMotion) -> list[dict[str, Any]]:
@@ -369,16 +362,14 @@ def _forces(record: Record) -> dict[str, Any]:
     }
 
 
-def _gap_points(runner: Runner, run: RunResult, setup: Setup) -> dict[str, Any] | None:
-    """Return the two nearest points in W [m] and the pose of the tub at the smallest gap."""
+def _gap_points(runner: Runner, run: RunResult) -> dict[str, Any] | None:
+    """Return the two nearest points in W [m] and the frame of the smallest gap."""
     gap, motion = run.gap, run.motion
     if gap is None or motion is None:
         return None
     at = int(np.argmin(np.abs(motion.time - gap.time)))
-    pose = motion.poses[at]
-    _, points = runner.scene().nearest_points(pose, gap.moving, gap.fixed)
-    (places,) = _places_of_masses(run, setup, [at])
-    return {"points": points.tolist(), "pose": pose.tolist(), "places": places}
+    _, points = runner.scene().nearest_points(motion.poses[at], gap.moving, gap.fixed)
+    return {"points": points.tolist(), "frame": _frames(motion, [at])[0]}
 
 
 def _whole(values: FloatArray) -> list[int]:

@@ -79,7 +79,12 @@ def jacobians(
 
 
 def is_followed(
-    jacobians: FloatArray, internal: np.ndarray, step: float, cabinet: FloatArray | None = None
+    jacobians: FloatArray,
+    internal: np.ndarray,
+    step: float,
+    cabinet: FloatArray | None = None,
+    *,
+    may_grow: bool = False,
 ) -> bool:
     """Return whether steps with one derivative keep linearised machines from growing.
 
@@ -91,6 +96,8 @@ def is_followed(
         step: Step size. [s]
         cabinet: (WIDTH, m, m) Jacobians of the m states `CABINET` under a constant wrench of the
             mounts; None without any. [1/s]
+        may_grow: Whether a machine with a fixed cabinet may do so too, as one with liquid that lies
+            at the top of a drum at rest.
     """
     if not np.all(np.isfinite(jacobians)):
         return False
@@ -112,7 +119,7 @@ def is_followed(
     if not np.all(np.isfinite(numbers)):  # also where no number was seen on the way to it
         return False
     grown = quarters[3] > LARGEST_GROWTH * quarters[1]
-    if m and np.any(grown):
+    if (m or may_grow) and np.any(grown):
         motion_growth = np.exp(0.5 * STEPS * step * _fastest_growth(jacobians[grown]))
         return bool(
             np.all(quarters[3, grown] <= LARGEST_GROWTH * motion_growth * quarters[1, grown])

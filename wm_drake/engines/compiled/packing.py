@@ -72,6 +72,13 @@ class Layout:
     kinds: tuple[ElementKind, ...] = ()
     water: tuple[tuple[int, ...], tuple[int, ...], int] | None = None
 
+    @property
+    def balls(self) -> list[list[int]]:
+        """Return the index in the state of the place of each ball in T, for each ring."""
+        begins = self.states.begins_of(ELEMENT).tolist()
+        each = zip(self.kinds, begins, strict=True)
+        return [[begin + k for k in kind.balls] for kind, begin in each if kind.ring]
+
     @functools.cached_property
     def mounts(self) -> Mounts:
         """Return the indices of the mounts in the form that compiled functions use."""

@@ -7,6 +7,7 @@ torque jumps. A choice depends on the parameters and the profile of a run only, 
 or on its load.
 """
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -50,6 +51,9 @@ PIECES = (1, 2)
 """Into how many steps with one derivative a step may be divided: four take as long as one step of
 the Runge-Kutta scheme."""
 
+SHORTER = (1.0, 1.5, 2.0)
+"""How much shorter steps of the multistep integrator may be than the step; they end at samples."""
+
 
 @dataclass(frozen=True)
 class Stepping:
@@ -90,8 +94,8 @@ def choose_stepping(
         step: Largest step; shorter where the samples of a fast profile are closer. [s]
         integrator: "multistep", "midpoint" or "runge_kutta" for steps of this size; "auto" for the
             midpoint rule with telescopic dampers if a step of 0.25 ms or half of it suits it, else
-            for the multistep integrator if the step, or half of it, suits it, else for the
-            Runge-Kutta scheme.
+            for the multistep integrator if the step, or one down to half of it, suits it, else for
+            the Runge-Kutta scheme.
 
     Raises:
         InputError: the step is too long for the integrator, or the sample time of a controller for
@@ -115,10 +119,14 @@ def choose_stepping(
             if midpoint:
                 return midpoint
         if integrator != "midpoint":
-            for length in _lengths(step, integrator, LONGEST_STEP):
+            for length in _lengths(step, integrator, period):
                 turn = fastest * length
                 if turn <= LARGEST_TURN and is_followed(
-                    linear.jacobians, linear.kinds, MARGIN * length, linear.cabinet
+                    linear.jacobians,
+                    linear.kinds,
+                    MARGIN * length,
+                    linear.cabinet,
+                    may_grow=any(kind.on_drum for kind in layout.kinds),
                 ):
                     return Stepping("multistep", length)
     check_step(setup, step)
@@ -160,8 +168,10 @@ def _midpoint(
     return None
 
 
-def _lengths(step: float, integrator: Integrator, longest: float) -> list[float]:
-    """Return the steps that may be taken with one derivative, with `longest` for "auto". [s]"""
+def _lengths(step: float, integrator: Integrator, period: float) -> list[float]:
+    """Return the steps that may be taken with one derivative, each a part of the period. [s]"""
     if integrator != "auto":
         return [step]
-    return [step / n for n in PIECES if step / n < longest * (1.0 + 1e-9)]
+    first = round(period / step)
+    lengths = [step * (first / math.ceil(first * n)) for n in SHORTER]
+    return [length for length in lengths if length < LONGEST_STEP * (1.0 + 1e-9)]

@@ -99,6 +99,7 @@ async function openMachine(next) {
   byId('about').textContent = `${machine.name}: ${machine.about}`;
   byId('load').replaceChildren(...[...machine.loads, DESCRIBED].map((name) => make('option', {value: name}, name)));
   byId('gasket').disabled = !machine.gasket;
+  byId('rings').hidden = !machine.rings.length;
   document.title = `${machine.name} – wm-drake`;
   makePanels();
   search();
@@ -171,7 +172,7 @@ async function runPicture(number) {
     showPicture();
     requestAnimationFrame(() => performance.mark('picture')); // read by analyses/time_page.py
     showProblems([], found.warnings);
-    status(`${fixed(performance.now() - begin, 0)} ms · ${found.stepping.integrator}, steps of ${found.stepping.step}`);
+    status(`${fixed(performance.now() - begin, 0)} ms · ${found.stepping.integrator}, steps of ${found.stepping.step}${machine.fastest && `, short for ${machine.fastest}`}`);
   } catch (error) {
     if (number === asked) showRefusal(error);
   } finally {
@@ -407,22 +408,26 @@ function showMotion() {
   byId('at-gap').disabled = !answer.gap_points;
   const gap = answer.gap_points && {...answer.gap_points, distance: answer.gap.distance};
   if (frame < 0 && gap) {
-    showPose(gap.pose, gap, ballsAt(gap.places), `${fixed(answer.gap.time, 2)} s, ${fixed(answer.gap.rpm, 0)} rpm: ${answer.gap.moving} to ${answer.gap.fixed}`);
+    showFrame(gap.frame, gap, `${fixed(answer.gap.time, 2)} s, ${fixed(answer.gap.rpm, 0)} rpm: ${answer.gap.moving} to ${answer.gap.fixed}`);
     return;
   }
   const at = Math.min(Math.max(frame, 0), motion.time.length - 1);
   byId('frame').value = String(at);
-  showPose(motion.poses[at], null, ballsAt(motion.places?.[at]), `${fixed(motion.time[at], 2)} s`);
+  showFrame(motion.frames[at], null, `${fixed(motion.time[at], 2)} s`);
 }
 
-/** Return the masses of the load at places; a page without a server has none. */
-function ballsAt(places) {
-  return (places ?? []).map((place, k) => ({place, ...answer.motion.masses[k]}));
-}
-
-function showPose(pose, gap, balls, words) {
-  scene.show(pose, gap, balls, words);
+function showFrame(frameAt, gap, words) {
+  scene.show(frameAt, {...answer.motion, rings: rings(), density: machine.density}, gap, words);
   byId('frame-time').textContent = words;
+}
+
+/** Return the rings on the drum of the machine that is drawn, in metres. */
+function rings() {
+  const number = (key) => {
+    const {value, factor} = list.rows.get(key).number;
+    return (answer.values[key] ?? value) * factor;
+  };
+  return machine.rings.map(({y, across, radii, isLiquid}) => ({y: number(y), across: number(across), radii: radii.map(number), isLiquid}));
 }
 
 function play() {

@@ -183,15 +183,15 @@ async function run({state}) {
     envelopes: Array.from({length: sensors}, (_, k) => (isFiltered
       ? {upper: corners(main.time, column(k), 1), lower: corners(main.time, column(k), -1)} : {upper: [[], []], lower: [[], []]})),
     orbits: main.paths ? data.depths.map((y, k) => ({y: 1e3 * y, x: Array.from(main.paths[2 * k], (d) => 1e6 * d), z: Array.from(main.paths[2 * k + 1], (d) => 1e6 * d)})) : [],
-    motion: main.motion ? {...main.motion, rest: main.rest} : null,
+    motion: main.motion ? {...main.motion, masses: all[first].unbalances, drum: data.drum} : null,
     duration: profile.time.at(-1),
     profile: {time: profile.time, rpm: profile.speed.map((w) => RPM * w)},
     values, ...gapOf(main, profile),
-    gap_points: main.gap && {points: main.gap.points, pose: main.gap.pose},
+    gap_points: main.gap && {points: main.gap.points, frame: main.gap.frame},
     loads: names.map((load, k) => ({load, ...gapOf(found[k], profile)})),
     measured: own ? [] : data.measured[state.load][state.gasket ? 'yes' : 'no'] ?? [],
     warnings: [], band: data.band,
-    stepping: {integrator: stepping.integrator, step: `${Number((1e3 * stepping.step).toPrecision(4))} ms`},
+    stepping: {integrator: stepping.integrator, step: `${Number((1e3 * stepping.step).toPrecision(6))} ms`},
   };
 }
 

@@ -44,6 +44,28 @@ function faces(shape) {
   return found;
 }
 
+/**
+ * Return the balls and circles of what turns with the drum, in the frame of the tub.
+ *
+ * `drum` has origin and axes of the drum at angle 0; `masses` of the load become balls of `density`.
+ * `balls` has the places of the balls of each ring from the drum axis, not turned. [m]
+ */
+export function inDrum({drum: {origin, axes}, masses, rings, density}, {angle, balls}) {
+  const inTub = (p) => plus(origin, times(axes, p));
+  const around = (radius, y, phase) => inTub([radius * Math.sin(phase), y, radius * Math.cos(phase)]);
+  return {
+    balls: [
+      ...masses.map(({mass, radius, y, phase, wet = 0}) => ({
+        kind: 'mass', wet, place: around(radius, y, phase + angle), radius: Math.cbrt((0.75 * mass) / (Math.PI * density)),
+      })),
+      ...rings.flatMap(({y, across, isLiquid}, k) => balls[k].map((place) => ({
+        kind: isLiquid ? 'water' : 'ball', wet: 0, place: plus(inTub([0, y, 0]), place), radius: 0.5 * across,
+      }))),
+    ],
+    circles: rings.flatMap(({y, radii}) => radii.map((radius) => Array.from({length: 2 * ROUND}, (_, k) => around(radius, y, (Math.PI * k) / ROUND)))),
+  };
+}
+
 export class SceneView {
   constructor(parent) {
     this.turn = -0.55;
@@ -74,12 +96,13 @@ export class SceneView {
   }
 
   /**
-   * Show a pose of the tub (roll, pitch, yaw, x, y, z), the nearest points [m] if given, and masses
-   * of the load: place, radius [m], and share of water left; `words` say when it is.
+   * Show a frame: pose of the tub (roll, pitch, yaw, x, y, z), angle of the drum and balls of each
+   * ring; what turns with the drum, as for `inDrum`; the nearest points [m] if given; `words` say
+   * when it is.
    */
-  show(pose, gap, balls, words) {
-    this.pose = pose;
-    this.balls = balls;
+  show(frame, turning, gap, words) {
+    this.pose = frame.pose;
+    this.drum = inDrum(turning, frame);
     this.gap = gap;
     const which = gap ? `, smallest gap ${fixed(gap.distance)} mm` : '';
     this.svg.setAttribute('aria-label', `tub in the housing${which}, at ${words}`);
@@ -107,11 +130,12 @@ export class SceneView {
       draw('path', {class: 'housing', d: this.housing.flat().map(closed).join('')}),
       ...this.tub.map((shape) => draw('path', {class: 'tub', d: shape.map((face) => closed(face.map(moved))).join('')})),
     ];
-    for (const {place, radius, wet} of this.balls) {
-      const [cx, cy] = seen(place).map((value) => value.toFixed(1));
+    parts.push(draw('path', {class: 'ring', d: this.drum.circles.map((circle) => closed(circle.map(moved))).join('')}));
+    for (const {place, radius, kind, wet} of this.drum.balls) {
+      const [cx, cy] = seen(moved(place)).map((value) => value.toFixed(1));
       const ball = {cx, cy, r: (scale * radius).toFixed(1)};
-      parts.push(draw('circle', {class: 'mass', ...ball}));
-      parts.push(draw('circle', {class: 'water', 'fill-opacity': String(wet), ...ball}));
+      parts.push(draw('circle', {class: kind, ...ball}));
+      if (wet) parts.push(draw('circle', {class: 'water', 'fill-opacity': String(wet), ...ball}));
     }
     if (this.gap) {
       const [x, y] = seen(this.gap.points[0]);

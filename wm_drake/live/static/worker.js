@@ -2,7 +2,7 @@
 
 import {Machine} from './machine.js';
 
-const FRAMES = 300;   // most poses of the motion around the largest amplitude
+const FRAMES = 300;   // most frames of the motion around the largest amplitude
 const BINS = 350;     // parts of a run of which forces have a smallest and a largest value
 const DRUM_ANGLE = 6; // index in a sample
 
@@ -11,7 +11,13 @@ let last = '';        // changes and profile of the run whose samples are kept
 let status = 0;
 
 const sampleAt = (row, size) => Array.from(machine.view(machine.samples + 8 * row * machine.model.sample, size));
-const poseAt = (row) => sampleAt(row, 6);
+
+/** Return pose of the tub, angle of the drum, and balls of each ring, in a sample. */
+function frameAt(row) {
+  const {sample, balls} = machine.model;
+  const x = sampleAt(row, sample);
+  return {pose: x.slice(0, DRUM_ANGLE), angle: x[DRUM_ANGLE], balls: balls.map((ring) => ring.map((k) => x.slice(k, k + 3)))};
+}
 
 function prepare({changes, profile}) {
   const wanted = JSON.stringify([changes, profile]);
@@ -21,16 +27,16 @@ function prepare({changes, profile}) {
   if (status === 0) machine.run(profile);
 }
 
-/** Return times and poses around a sample. */
+/** Return times and frames around a sample. */
 function motionAround(largest, {span, rate}) {
   const {time} = machine.schedule;
   const period = time[1] - time[0];
   const half = Math.floor((0.5 * span) / period + 1e-9);
   const stride = Math.max(1, Math.round(1 / (rate * period)));
-  const found = {time: [], poses: []};
+  const found = {time: [], frames: []};
   for (let row = Math.max(0, largest - half); row < machine.good && row <= largest + half && found.time.length < FRAMES; row += stride) {
     found.time.push(time[row]);
-    found.poses.push(poseAt(row));
+    found.frames.push(frameAt(row));
   }
   return found;
 }
@@ -58,7 +64,7 @@ function picture({orbits, replay}) {
   for (let k = count.sensors + 3; k < count.points; k += 1) {
     paths.push(machine.view(machine.moved + 8 * k * rows, rows).slice(...window));
   }
-  return {filtered, paths, largest, motion: motionAround(largest, replay), rest: poseAt(0)};
+  return {filtered, paths, largest, motion: motionAround(largest, replay)};
 }
 
 function measures() {
@@ -80,7 +86,7 @@ export function answer(job) {
   return {
     status, good, time: job.kind === 'gap' ? [] : Array.from(time.slice(0, good)), rows,
     diverged: good < rows ? time[good] : null,
-    gap: gap && {...gap, time: time[gap.row], pose: poseAt(gap.row)},
+    gap: gap && {...gap, time: time[gap.row], frame: frameAt(gap.row)},
     ...more, ...(good > 1 && ['numbers', 'measures'].includes(job.kind) ? measures() : {}),
     ...(good > 1 && job.kind === 'numbers' ? {bands: machine.forces(Math.min(BINS, good))} : {}),
     ...(job.kind === 'samples' ? {moved: machine.view(machine.moved, rows * machine.model.count.points).slice()} : {}),

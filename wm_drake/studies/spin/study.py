@@ -17,6 +17,7 @@ import xarray as xr
 
 from wm_drake.batch.runs import Runner
 from wm_drake.batch.work_items import Preparation
+from wm_drake.elements.kind import element_kind
 from wm_drake.engines.memory import RECORDS_OF_BATCH
 from wm_drake.errors import InputError, WmDrakeError
 from wm_drake.model.build import build_machine
@@ -338,6 +339,20 @@ def _water_in(case: CaseResult, shown: Record) -> FloatArray | None:
     return np.asarray((masses - dry)[at] / (wet - dry)[at])
 
 
+def _balls_in(parameters: MachineParameters, shown: Record) -> dict[str, FloatArray]:
+    """Return the places in D of the balls of each ring on the drum over a motion, by its name."""
+    balls = {}
+    for name, element in parameters.elements.items():
+        kind = element_kind(element.kind)
+        if kind.ring is not None:
+            outputs = {
+                output.name: shown[f"{kind.name}_{output.name}"].sel({kind.name: name}).values
+                for output in kind.outputs
+            }
+            balls[name] = kind.ring.places(element, outputs)
+    return balls
+
+
 def write_replay(parameters: MachineParameters, case: CaseResult, path: Path) -> None:
     """Write the page of the 3D replay of a case around its largest amplitude."""
     from wm_drake.model.replay import Motion, replay_page
@@ -351,7 +366,14 @@ def write_replay(parameters: MachineParameters, case: CaseResult, path: Path) ->
     words = "" if gasket or parameters.gasket is None else ", without gasket"
     text = replay_page(
         parameters,
-        Motion(time, positions, shown.drum_speed.values, cabinet, _water_in(case, shown)),
+        Motion(
+            time,
+            positions,
+            shown.drum_speed.values,
+            cabinet,
+            _water_in(case, shown),
+            _balls_in(parameters, shown),
+        ),
         title=f"Machine {parameters.name}, load {case.case.name}{words}",
         load=case.case.load,
         gasket=gasket,
