@@ -108,7 +108,7 @@ def test_balls_and_liquid_are_where_the_record_has_them(rings):
         np.testing.assert_allclose([p[1] for p in in_d], y, atol=1e-9)
 
 
-@pytest.mark.slow
+@pytest.mark.hours
 def test_an_exported_page_has_the_frames_of_the_studio(rings, tmp_path):
     answer = picture(rings, picture_runner_of(rings), PageState(machine="", load="middle"))
     export_page(rings.parameters, tmp_path / "machine.html")
