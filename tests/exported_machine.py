@@ -1,4 +1,4 @@
-"""An exported page that runs in node: the same engine of JavaScript as Chromium's, without its start.
+"""An exported page that runs in node: the engine of JavaScript of Chromium, without its start.
 
 A page computes without a document, in workers; here the code of its worker runs alone.
 """

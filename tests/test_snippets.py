@@ -1,7 +1,7 @@
 """Each snippet of the manual and the README is run, or the test says what else runs it.
 
-The Python snippets and YAML blocks of the how-to pages are in test_readme; the cells of tutorials are
-executed when the manual is built; the commands of the gallery by analyses/make_gallery.py.
+The Python snippets and YAML blocks of the how-to pages are in test_readme; the cells of tutorials
+are executed when the manual is built; the commands of the gallery by analyses/make_gallery.py.
 """
 
 import re

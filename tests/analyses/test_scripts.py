@@ -11,10 +11,12 @@ from analysis_tools.validation_page import FAILS, HOLDS, NOT_COMPARABLE
 ANALYSES = Path(__file__).parents[2] / "analyses"
 VERDICTS = {HOLDS, FAILS, NOT_COMPARABLE, "met", "missed"}
 LONG = {  # more than five seconds
-    "calibrate_reference.py", "check_coverage.py", "check_spin_of_tubes.py", "choose_step.py", "choose_damper_law.py",
+    "calibrate_reference.py", "check_coverage.py", "check_spin_of_tubes.py", "choose_step.py",
+    "choose_damper_law.py",
     "check_spin_coverage.py",
     "check_next.py", "check_record_coverage.py",
-    "compare_ball_balancer.py", "compare_dampers.py", "compare_measured_balls.py", "compare_rotor_rig.py", "spin_up_fmu.py",
+    "compare_ball_balancer.py", "compare_dampers.py", "compare_measured_balls.py", "compare_rotor_rig.py",
+    "spin_up_fmu.py",
     "compare_designs.py", "compare_mujoco.py", "compare_searches.py", "compare_speed.py",
     "fit_coulomb_to_mstv.py", "write_paper_a.py", "write_paper_b.py",
     "show_timeline.py", "time_page.py", "write_paper_c.py", "write_validation.py",

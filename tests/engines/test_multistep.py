@@ -79,7 +79,7 @@ def test_the_linear_machine_grows_where_the_roots_leave_the_unit_circle(unit, li
 
 
 def amplification(bodies, pull, drive, decay):
-    """Return the matrix that takes a step of length 1 of b' = bodies b + pull z, z' = drive b - decay z.
+    """Return the matrix of a step of length 1 of b' = bodies b + pull z, z' = drive b - decay z.
 
     Written apart from the compiled code, with its state b, z, the last five rates, two last inputs.
     """

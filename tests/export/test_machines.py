@@ -1,4 +1,4 @@
-"""FMUs of machines that together have the parts of all shipped ones compute what the engine does."""
+"""FMUs of machines with the parts of all shipped ones compute what the engine does."""
 
 import shutil
 

@@ -39,7 +39,8 @@ def test_shapes_of_tub_weights_and_housing_are_measured(scene):
 def test_tub_shell_to_side_wall_is_the_support_function_of_a_cylinder(scene):
     pair = pair_named(scene, "tub_shell", "wall_right")
     at_rest, _ = scene.distance(REST, pair)
-    # a cylinder about y, turned by yaw: its extent in x is r cos(yaw) + l/2 sin(yaw), about its centre 30 mm to the front
+    # a cylinder about y, turned by yaw: its extent in x is r cos(yaw) + l/2 sin(yaw), about its
+    # centre 30 mm to the front
     radius, length, centre, wall = 0.262, 0.40, -0.03, 0.30
     assert at_rest == pytest.approx(wall - radius, abs=1e-7)
     yaw, x = 0.03, 0.01

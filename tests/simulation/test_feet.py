@@ -1,4 +1,4 @@
-"""Feet of the cabinet: static weights, a rotating force, batch against record, regions, messages."""
+"""Feet of the cabinet: weights, a rotating force, batch against record, regions, messages."""
 
 import numpy as np
 import pytest

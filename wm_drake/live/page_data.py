@@ -17,6 +17,7 @@ from wm_drake.export.page_kernel import AFTERWARDS, FIRST, MEANWHILE, page_code
 from wm_drake.export.page_model import (
     UNBALANCE_FIELDS,
     Candidates,
+    PageModel,
     page_model,
     without_wrong,
 )
@@ -101,13 +102,11 @@ def _with_code(parameters: MachineParameters, second: SecondProcess) -> dict[str
     contents = Contents(opened.machine, move, profile, depths)
     of_run = page_model(contents, {}).plan  # before it is known what may change
     second.compile(of_run)
-    stepping = contents.stepping
-    _check_length(profile.duration / stepping.step)
+    _check_length(profile.duration / contents.stepping.step)
     model = page_model(contents, candidates)
     code = page_code(model.plan, FIRST)
     set_up = function_here("wm_set_up", code["wm_set_up"])
     model = without_wrong(model, set_up, contents, candidates)
-    elements, count = model.plan.elements, model.plan.count
     moved, limits = other_steps(contents, candidates, model.places)
     code |= page_code(of_run, AFTERWARDS)
     second.wait()
@@ -116,28 +115,7 @@ def _with_code(parameters: MachineParameters, second: SecondProcess) -> dict[str
         "program": program(),
         "tree": machine_tree(parameters),
         "machine": _machine(opened, model.places, model.refused, limits),
-        "model": {
-            "at": model.plan.at._asdict(),
-            "count": count._asdict(),
-            "numbers": model.numbers.tolist(),
-            "constants": _finite(model.constants.tolist()),
-            "places": model.places,
-            "sample": elements.begins.size + elements.begins.rates,
-            "balls": contents.layout.balls,
-            "padding": round(PADDING_PERIODS / contents.band[0] / contents.period),
-            "leastPadding": LEAST_PADDING,
-            "mostSteps": MOST_STEPS,
-            "fastest": (1.0 + 1e-9) * 2.0 * math.pi / (SAMPLES_OF_TURN * contents.period),
-            "stepping": {
-                "integrator": stepping.integrator,
-                "step": stepping.step,
-                "period": contents.period,
-                "moved": moved,
-                "largestTurns": LARGEST_TURNS,
-                "control": contents.layout.control_period,
-                "stepsBefore": STEPS_BEFORE,
-            },
-        },
+        "model": _model(contents, model, moved),
         "wasm": base64.b64encode(_wasm(model.plan, code)).decode(),
         "loads": _loads(parameters, model.of_load),
         "profile": {"time": profile.time, "speed": profile.speed},
@@ -146,12 +124,49 @@ def _with_code(parameters: MachineParameters, second: SecondProcess) -> dict[str
         "drum": drum_of(setup),
         "pairs": [[shape_name(n) for n in pair.split("|")] for pair in model.pair_names],
         "measured": _measured(opened),
-        "rows": [row for name in shown_measures(parameters) for row in _rows(opened, name, count)],
+        "rows": [
+            row
+            for name in shown_measures(parameters)
+            for row in _rows(opened, name, model.plan.count)
+        ],
         "forces": _forces(parameters, model.plan.gasket >= 0),
         "masses": _masses(),
         "drawing": {
             "orbits": {"revolutions": ORBIT_REVOLUTIONS, "longest": LONGEST_ORBIT},
             "replay": {"span": REPLAY_SPAN, "rate": REPLAY_RATE},
+        },
+    }
+
+
+def _model(
+    contents: Contents, model: PageModel, moved: Sequence[Mapping[str, Any]]
+) -> dict[str, Any]:
+    """Return what the engine of the page works on: numbers, their places, and how runs are stepped.
+
+    Args:
+        moved: Steps of moved numbers, from `other_steps`.
+    """
+    begins, stepping = model.plan.elements.begins, contents.stepping
+    return {
+        "at": model.plan.at._asdict(),
+        "count": model.plan.count._asdict(),
+        "numbers": model.numbers.tolist(),
+        "constants": _finite(model.constants.tolist()),
+        "places": model.places,
+        "sample": begins.size + begins.rates,
+        "balls": contents.layout.balls,
+        "padding": round(PADDING_PERIODS / contents.band[0] / contents.period),
+        "leastPadding": LEAST_PADDING,
+        "mostSteps": MOST_STEPS,
+        "fastest": (1.0 + 1e-9) * 2.0 * math.pi / (SAMPLES_OF_TURN * contents.period),
+        "stepping": {
+            "integrator": stepping.integrator,
+            "step": stepping.step,
+            "period": contents.period,
+            "moved": moved,
+            "largestTurns": LARGEST_TURNS,
+            "control": contents.layout.control_period,
+            "stepsBefore": STEPS_BEFORE,
         },
     }
 

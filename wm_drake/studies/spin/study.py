@@ -148,7 +148,7 @@ class SpinRuns:
 
     @property
     def stepping_text(self) -> str:
-        """How the cases were integrated and sampled, each way once."""
+        """Return how the cases were integrated and sampled, each way once."""
         return "; ".join(dict.fromkeys(case.stepping_text for case in self.results))
 
     def sensors_of(self, case: CaseResult) -> dict[str, Sensor]:
