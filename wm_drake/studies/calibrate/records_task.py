@@ -17,6 +17,7 @@ from wm_drake.studies.calibrate.recorded import RecordedLoad, without_edges
 from wm_drake.studies.calibrate.records import FreeNumbers, RecordModel, calibrated
 from wm_drake.studies.calibrate.records_page import records_answer
 from wm_drake.studies.calibrate.solutions import FreeQuantities
+from wm_drake.studies.compare.recordings import check_distinct
 from wm_drake.studies.compare.task import CompareTask
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.experiment import Experiment, record_here
@@ -53,6 +54,7 @@ class CalibrateRecordsTask(Task):
             CompareTask(options.model_copy(update={"records": files, "load": load}), machine)
             for load, files in _by_load(options).items()
         ]
+        check_distinct([recording for test in self.tests for recording in test.recordings])
 
     @property
     def identity(self) -> Mapping[str, Any]:

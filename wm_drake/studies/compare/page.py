@@ -31,6 +31,7 @@ from wm_drake.studies.compare.study import (
     regions_of,
     sensors_of,
 )
+from wm_drake.studies.health import health_part
 
 NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 
@@ -62,7 +63,8 @@ def compare_answer(
         parts.append(_gaps(gaps))
     if any(sensor.quantity == "acceleration" for sensor in sensors.values()):
         parts.append(_integrated(integrated_of(repeats, sensors, pairs)))
-    parts += [_clocks(pairs), _declared(sensors)]
+    found = {pair.recording.path.name: pair.recording.findings for pair in pairs}
+    parts += [_clocks(pairs), health_part(found), _declared(sensors)]
     low, high = band_of(pairs[0].run)
     records = ", ".join(pair.recording.path.name for pair in pairs)
     return Answer(

@@ -8,7 +8,7 @@ import xarray as xr
 
 from wm_drake.errors import input_error
 from wm_drake.parameters import SpinProfile
-from wm_drake.parameters.recorded_sensors import RecordedSensor, RecordedTest
+from wm_drake.parameters.recorded_sensors import RecordedSensor
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.report.quantity import SPEED, TIME, Quantity
@@ -22,7 +22,7 @@ from wm_drake.simulation.alignment import (
 )
 from wm_drake.simulation.recorded_signal import recorded_signal
 from wm_drake.simulation.records import Record, profile_of
-from wm_drake.studies.compare.recordings import TestRecording, pulse_angle, speed_of_pulses
+from wm_drake.studies.compare.recordings import TestRecording, pulse_angle
 
 CONTRADICTION = 0.05
 """Largest misfit of a recorded drum speed, by the highest speed of the profile."""
@@ -81,17 +81,14 @@ def predicted_signals(
     return np.stack(columns, axis=1)
 
 
-def paired(
-    recording: TestRecording, run: Record, predicted: FloatArray, test: RecordedTest
-) -> Pair:
+def paired(recording: TestRecording, run: Record, predicted: FloatArray) -> Pair:
     """Return a recording on the times of a run.
 
     Raises:
         InputError: its speed, or its signals without one, contradict the run.
     """
-    speed = recorded_speed(recording, test)
-    alignment = _alignment(recording, run, predicted, test)
-    return replace(pair_at(recording, run, predicted, alignment), speed=speed)
+    alignment = _alignment(recording, run, predicted)
+    return replace(pair_at(recording, run, predicted, alignment), speed=recording.speed)
 
 
 def pair_at(
@@ -103,22 +100,13 @@ def pair_at(
     return Pair(recording, run, alignment, measured, predicted)
 
 
-def recorded_speed(recording: TestRecording, test: RecordedTest) -> FloatArray | None:
-    """Return the recorded drum speed at the samples of a recording. (n,) [rad/s]"""
-    if recording.pulses is not None and test.speed is not None:
-        return speed_of_pulses(recording, test.speed)
-    return recording.speed
-
-
-def _alignment(
-    recording: TestRecording, run: Record, predicted: FloatArray, test: RecordedTest
-) -> Alignment:
-    time, speed = recording.channels.time, recorded_speed(recording, test)
+def _alignment(recording: TestRecording, run: Record, predicted: FloatArray) -> Alignment:
+    time, speed = recording.channels.time, recording.speed
     if speed is None:
         values = np.stack([*recording.channels.values.values()], axis=1)
         return align_signals(time, values, predicted, run)
-    if recording.pulses is not None and test.speed is not None:
-        result = align_pulses(recording.pulses, pulse_angle(test.speed), run)
+    if recording.pulses is not None and recording.about is not None:
+        result = align_pulses(recording.pulses, pulse_angle(recording.about), run)
     else:
         result = align_speed(time, speed, run)
     _check_speed(recording, speed, run, result)

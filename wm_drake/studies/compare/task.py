@@ -32,10 +32,14 @@ from wm_drake.studies.compare.pairs import (
     pair_at,
     paired,
     predicted_signals,
-    recorded_speed,
     speed_of_order_one,
 )
-from wm_drake.studies.compare.recordings import TestRecording, read_test, used_sensors
+from wm_drake.studies.compare.recordings import (
+    TestRecording,
+    check_distinct,
+    read_test,
+    used_sensors,
+)
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import channel_names, existing_file, problems_of_file, selected_cases
 from wm_drake.studies.study import Task
@@ -68,7 +72,10 @@ class CompareTask(Task):
         for path in paths:
             if paths.count(path) > 1:
                 raise input_error(f"'{path}' is given twice", where="RECORD")
-        recordings = [read_test(path, self.test, names) for path in paths]
+        recordings = [
+            read_test(path, self.test, names, self.case.profile.duration) for path in paths
+        ]
+        check_distinct(recordings)
         self.sensors = used_sensors(recordings, self.test)
         self.recordings = [_of_sensors(recording, self.sensors) for recording in recordings]
 
@@ -105,12 +112,12 @@ class CompareTask(Task):
         return pairs
 
     def _pairs(self, executor: Executor) -> list[Pair]:
-        speeds = [recorded_speed(recording, self.test) for recording in self.recordings]
+        speeds = [recording.speed for recording in self.recordings]
         pairs: list[Pair] = []
         if self.options.speed == "profile" or any(speed is None for speed in speeds):
             run = self._runs(executor, [self.case.profile])[0]
             predicted = predicted_signals(run, self.sensors, self.points)
-            pairs = [paired(one, run, predicted, self.test) for one in self.recordings]
+            pairs = [paired(one, run, predicted) for one in self.recordings]
         if self.options.speed == "profile":
             return pairs
         followed = [

@@ -21,4 +21,5 @@ class OrdersTask(Task):
 
     def run(self, executor: Executor) -> Answer:  # noqa: ARG002
         """Compute the maps."""
-        return orders_answer(orders_of(self.signals, self.highest))
+        findings = self.signals.attrs.get("findings", ())
+        return orders_answer(orders_of(self.signals, self.highest), findings)

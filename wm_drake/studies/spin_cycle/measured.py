@@ -141,7 +141,9 @@ def _samples(
     """
     recording = read_recording(path, names)
     uses = {
-        word: ChannelUse(recording.word(word) or recording.chosen(word), ACCELERATION, unit)
+        word: ChannelUse(
+            recording.word(word) or recording.chosen(word), ACCELERATION, unit, kind="vibration"
+        )
         for word in words
     }
     channels = recording.synchronous(uses)
