@@ -18,7 +18,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from wm_drake.batch.runs import Advance, BatchOptions, BatchJobs, RunResult
+from wm_drake.batch.runs import Advance, BatchJobs, BatchOptions, RunResult
 from wm_drake.errors import InputError, WmDrakeError
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine

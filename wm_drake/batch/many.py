@@ -9,7 +9,7 @@ import xarray as xr
 
 from wm_drake.batch.drake_runs import drake_pool
 from wm_drake.batch.run_table import RunTable
-from wm_drake.batch.runs import Advance, BatchOptions, BatchJobs, Runner, RunResult
+from wm_drake.batch.runs import Advance, BatchJobs, BatchOptions, Runner, RunResult
 from wm_drake.batch.work_items import Preparation, WorkItem
 from wm_drake.engines import DEFAULT_ENGINE
 from wm_drake.engines.memory import RECORDS_OF_BATCH
