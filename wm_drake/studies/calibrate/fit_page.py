@@ -109,9 +109,9 @@ def summary(
     elif fit.rmse > model.most_misfit:
         text += f" {WRONG}; the values make up for it."
     pairs = list(zip(fit.estimates, model.free.unknowns, strict=False))
-    found = [f"{e.name} {Quantity('', u.unit).text(e.value)}" for e, u in pairs if e.determined]
+    values = [f"{e.name} {Quantity('', u.unit).text(e.value)}" for e, u in pairs if e.determined]
     others = [e.name for e, _ in pairs if not e.determined]
-    text += f" Determined: {listed(found)}." if found else ""
+    text += f" Determined: {listed(values)}." if values else ""
     text += f" Not determined: {listed(others)}." if others else ""
     known = [e.value / truth[e.name] - 1.0 for e, _ in pairs if e.determined] if truth else []
     if known:
