@@ -10,9 +10,10 @@ These are the functions of a script; the task of the study does the same, with m
     wm.doe_report(analysis).save("gasket")
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import pandas as pd
 import xarray as xr
@@ -123,10 +124,7 @@ def run_trials(
     design: Design,
     loads: Sequence[str | Case] = ("middle", "counter"),
     responses: Sequence[str] = (),
-    *,
-    engine: str = DEFAULT_ENGINE,
-    workers: int | None = None,
-    progress: Callable[[int], None] = lambda done: None,
+    **running: Any,
 ) -> Trials:
     """Run each trial of a design with each load.
 
@@ -136,7 +134,7 @@ def run_trials(
         loads: Names of loads of the machine, or cases. Default: those of [B].
         responses: What is measured, as of `wm-drake study gasket --response`. Default: D, F, M of
             [B], and the smallest gap.
-        engine, workers, progress: As for `simulate_many`.
+        running: Options of `simulate_many`: engine, workers, progress, step.
 
     Raises:
         InputError: a load, a response or the engine is unknown, or the design has as many
@@ -154,8 +152,8 @@ def run_trials(
     middle = at_levels(factors.machine, factors.every, [0] * len(factors.every))
     cases = [load if isinstance(load, Case) else case_of(middle, load) for load in loads]
     plan = GasketTrials(middle, factors.every, cases, responses)
-    simulate = partial(run_here, workers=workers, engine=engine, progress=progress)
-    return Trials(plan, design, plan.responses(design, plan.experiment(simulate)), engine)
+    runs = plan.responses(design, plan.experiment(partial(run_here, **running)))
+    return Trials(plan, design, runs, running.get("engine", DEFAULT_ENGINE))
 
 
 def anova(trials: Trials) -> Analysis:
