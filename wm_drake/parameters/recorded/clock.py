@@ -162,17 +162,17 @@ def _examined(
         Channel(word, uses[word].kind, clock.time, column, uses[word].factor)
         for word, column in zip(clock.words, clock.samples.T, strict=True)
     ]
-    found = [*clock_jumps(channels)]
+    of_clock = [*clock_jumps(channels)]
     columns = []
     for channel in channels:
         values, of_channel = examined(channel)
         columns.append(values * channel.factor)
-        found += of_channel
-    for finding in found:
+        of_clock += of_channel
+    for finding in of_clock:
         if not finding.is_bridged:
             raise input_error(str(finding), where=str(path), key=finding.channel)
         notice(path, str(finding), finding.channel)
-    findings += found
+    findings += of_clock
     return replace(clock, samples=np.column_stack(columns))
 
 

@@ -306,9 +306,9 @@ def _repeated(channel: Channel) -> np.ndarray:
             part = values[begin:end]
             if not BLOCK <= end - begin <= lag or len(np.unique(part)) <= BLOCK // 2:
                 continue
-            beside = np.r_[max(0, begin - 20) : begin, end : min(end + 20, len(values) - lag)]
-            apart = np.abs(values[beside + lag] - values[beside])
-            if len(beside) and np.nanmedian(apart) > APART * np.std(part):
+            around = np.r_[max(0, begin - 20) : begin, end : min(end + 20, len(values) - lag)]
+            apart = np.abs(values[around + lag] - values[around])
+            if len(around) and np.nanmedian(apart) > APART * np.std(part):
                 mask[begin + lag : end + lag] = True
     return mask
 

@@ -154,15 +154,14 @@ def _best_count(times: FloatArray, resolution: float) -> tuple[np.ndarray, np.nd
             origin[at, back - 1] = np.column_stack(np.unravel_index(best, shape))
             origin[at, back - 1][is_begin] = -1
     at = len(times) - 1
-    state = np.unravel_index(int(np.argmin(costs[at])), shape)
+    back, step = divmod(int(np.argmin(costs[at])), MOST_MISSING)
     kept, counts = [at], list[int]()
-    while at > 0 and state[0] >= 0:
-        back, step = int(state[0]), int(state[1])
+    while at > 0 and back >= 0:
         source = origin[at, back, step]
         at -= back + 1
         kept.append(at)
         counts.append(step + 1)
-        state = (int(source[0]), int(source[1]))
+        back, step = int(source[0]), int(source[1])
     return np.array(kept[::-1]), np.array(counts[::-1])
 
 

@@ -204,8 +204,8 @@ class Recording:
         elif len(np.unique(signal.values)) <= FEW_LEVELS:
             kind = "pulses"
         channel = Channel(address, kind, time, signal.values, factor)
-        found = [*clock_jumps([channel])] if np.all(np.diff(time) > 0.0) else []
-        return "; ".join(map(str, [*found, *examined(channel)[1]]))
+        findings = [*clock_jumps([channel])] if np.all(np.diff(time) > 0.0) else []
+        return "; ".join(map(str, [*findings, *examined(channel)[1]]))
 
     def synchronous(
         self, uses: Mapping[str, ChannelUse], time_unit: str = "s", duration: float | None = None

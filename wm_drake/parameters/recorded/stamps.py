@@ -19,7 +19,7 @@ MOST_SHARED = 0.05
 MISSED_TICKS = 2.5
 """Ticks between two stamps above which samples are missing."""
 
-BESIDE = 40
+NEAR_GAP = 40
 """Samples on each side of a gap that tell how the signals go on."""
 
 SMOOTH, ROUGH = 4.0, 10.0
@@ -92,10 +92,10 @@ def clock_jumps(channels: Sequence[Channel]) -> Iterator[Finding]:
     usual = float(np.median(steps))
     for at in np.flatnonzero(steps > HOLE * usual):
         speeds = [_passed(c, int(at), usual) for c in channels if c.kind == "speed"]
-        told = [passed for passed in speeds if passed is not None]
+        known = [passed for passed in speeds if passed is not None]
         signals = [c.values for c in channels if c.kind == "vibration"]
-        if told:
-            goes_on = told[0] < SAME
+        if known:
+            goes_on = known[0] < SAME
         else:
             goes_on = bool(signals) and _goes_on(np.stack(signals, axis=1), int(at))
         if goes_on:
@@ -110,9 +110,9 @@ def clock_jumps(channels: Sequence[Channel]) -> Iterator[Finding]:
 
 def _passed(speed: Channel, at: int, usual: float) -> float | None:
     """Return the change of a drum speed over a gap, by that of a steady change; None if unknown."""
-    begin, end = max(0, at + 1 - BESIDE), min(len(speed.values), at + 1 + BESIDE)
+    begin, end = max(0, at + 1 - NEAR_GAP), min(len(speed.values), at + 1 + NEAR_GAP)
     parts = speed.values[begin : at + 1], speed.values[at + 1 : end]
-    if min(map(len, parts)) < BESIDE // 2 or not all(np.isfinite(part).all() for part in parts):
+    if min(map(len, parts)) < NEAR_GAP // 2 or not all(np.isfinite(part).all() for part in parts):
         return None
     fits = [np.polyfit(usual * np.arange(len(part)), part, 1) for part in parts]
     noise = max(float(np.std(np.diff(part, 2))) / np.sqrt(6.0) for part in parts)
@@ -126,8 +126,8 @@ def _passed(speed: Channel, at: int, usual: float) -> float | None:
 
 def _goes_on(signals: FloatArray, at: int) -> bool:
     """Return whether signals (n, k) go on after a sample as if the next one were its neighbour."""
-    before, after = signals[max(0, at + 1 - BESIDE) : at + 1], signals[at + 1 : at + 1 + BESIDE]
-    if min(len(before), len(after)) < BESIDE // 2 or not np.isfinite([*before, *after]).all():
+    before, after = signals[max(0, at + 1 - NEAR_GAP) : at + 1], signals[at + 1 : at + 1 + NEAR_GAP]
+    if min(len(before), len(after)) < NEAR_GAP // 2 or not np.isfinite([*before, *after]).all():
         return False
     scale = np.mean(np.vstack([np.diff(before, 2, axis=0), np.diff(after, 2, axis=0)]) ** 2, axis=0)
 

@@ -1,6 +1,7 @@
 """Check the options of a fit to recordings, and run it."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -88,7 +89,14 @@ class CalibrateRecordsTask(Task):
         experiment = records_here(self.machine, executor)
         model = record_model(experiment, self.free, self.tests, loads, self.options.by)
         title = f"Machine {self.machine.parameters.name} calibrated to records"
-        return fitted_answer(executor, model, self.options.seed, (title, "calibrated"))
+        answer = fitted_answer(executor, model, self.options.seed, (title, "calibrated"))
+        return with_warnings(answer, self.tests)
+
+
+def with_warnings(answer: Answer, tests: Sequence[CompareTask]) -> Answer:
+    """Return an answer that also warns of records that are not like their predictions."""
+    warnings = [warning for test in tests for warning in test.warnings]
+    return replace(answer, warned=(*warnings, *answer.warned))
 
 
 def fitted_answer(

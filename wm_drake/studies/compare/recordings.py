@@ -92,10 +92,10 @@ def read_test(
     if about.kind == "speed":
         assert speed is not None
         return TestRecording(channels, speed / about.ratio, None, about, findings)
-    pulses, found = _pulses(recording, shaft)
+    pulses, irregular = _pulses(recording, shaft)
     pulses = replace(pulses, times=pulses.times + _later(shaft, [*used.values()]))
     speed = pulse_angle(about) * pulses.speed(channels.time)
-    return TestRecording(channels, speed, pulses, about, (*findings, *found))
+    return TestRecording(channels, speed, pulses, about, (*findings, *irregular))
 
 
 def _sensor_channels(recording: Recording, test: RecordedTest) -> dict[str, Signal]:

@@ -12,6 +12,7 @@ from wm_drake.studies.calibrate.records_task import (
     record_model,
     recorded_load,
     records_here,
+    with_warnings,
 )
 from wm_drake.studies.compare.options import CompareOptions
 from wm_drake.studies.compare.task import CompareTask
@@ -120,4 +121,5 @@ class SpinIdentifyTask(Task):
             self.options.by,
         )
         title = f"Parameters of machine {parameters.name} identified from records of a spin cycle"
-        return fitted_answer(executor, model, self.options.seed, (title, "identified"))
+        answer = fitted_answer(executor, model, self.options.seed, (title, "identified"))
+        return with_warnings(answer, list(self.tests.values()))
