@@ -69,6 +69,49 @@ def region_displacements(
     return np.stack(direct, axis=1), np.stack(integrated, axis=1)
 
 
+def recorded_displacements(
+    motion: FloatArray,
+    acceleration: FloatArray,
+    points: FloatArray,
+    rest_pose: FloatArray,
+    period: float,
+    profile: SpinProfile,
+    gravity: float,
+) -> FloatArray:
+    """Return the RMS displacements that accelerometers glued to the tub tell, by integration.
+
+    They record the specific force a_Q - g along axes that turn with the tub and are those of W at
+    rest. Where the tub tilts, gravity is in it, which integration takes for a displacement.
+
+    Args:
+        motion, acceleration, points, rest_pose, period, profile: As for `region_displacements`.
+        gravity: Acceleration of free fall. [m/s^2]
+
+    Returns:
+        (regions, k, 3) along the axes of the sensors. [m]
+    """
+    turned = np.stack(generic(rotation_from_rpy)(*motion[:, :3].T), axis=1).reshape(-1, 3, 3)
+    rest = np.array(generic(rotation_from_rpy)(*rest_pose[:3])).reshape(3, 3)
+    regions = []
+    for point in points[:, None]:
+        force = point_accelerations(motion, acceleration, point)[:, 0] + [0.0, 0.0, gravity]
+        recorded = np.einsum("ij,nkj,nk->ni", rest, turned, force)
+        regions.append(region_rms(displacement_of(recorded, period), period, profile))
+    return np.stack(regions, axis=1)
+
+
+def displacement_of(acceleration: FloatArray, period: float) -> FloatArray:
+    """Return the high-passed displacements [m] of recorded accelerations [m/s^2] (n, k).
+
+    The bias of a sensor is a mean with a Hann window: a plain mean would include the velocity at
+    the end of the record divided by its duration.
+    """
+    if not len(acceleration):
+        return acceleration
+    bias = np.average(acceleration, axis=0, weights=np.hanning(len(acceleration) + 2)[1:-1])
+    return high_passed(integrated_twice(acceleration - bias, period), period, HIGH_PASS_HZ)
+
+
 def tub_motion_of(record: Record) -> tuple[FloatArray, FloatArray]:
     """Return states (n, 13) and accelerations (n, 6) of the tub in the form of this module."""
     angle = record.drum_angle.values[:, None]

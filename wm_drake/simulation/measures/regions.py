@@ -8,7 +8,7 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.simulation.measures.kind import Measure, Variable, each_run
 from wm_drake.simulation.measures.run import Run
-from wm_drake.simulation.vibration import region_displacements
+from wm_drake.simulation.vibration import recorded_displacements, region_displacements
 
 DIMS = ("region", "accelerometer", "axis")
 
@@ -42,5 +42,30 @@ REGIONS = Measure(
         ),
     ),
     each_run(_regions),
+    ("tub",),
+)
+
+
+def _recorded(run: Run) -> Sequence[FloatArray]:
+    motion = np.ascontiguousarray(run.tub_motion)
+    at_points = run.accelerometer_points, run.rest_pose, run.period, run.profile
+    return (recorded_displacements(motion, run.tub_acceleration, *at_points, run.gravity),)
+
+
+RECORDED = Measure(
+    "recorded regions",
+    (
+        Variable(
+            "region_displacement_recorded",
+            DIMS,
+            Unit("m", "mm"),
+            "RMS displacement as recorded",
+            "RMS displacement in each region that accelerometers with gravity, which turn with the "
+            "tub, tell by integration",
+            is_in_spin=False,
+            studio=None,
+        ),
+    ),
+    each_run(_recorded),
     ("tub",),
 )
