@@ -251,6 +251,13 @@ class AppliedForce:
         return total
 
 
+def initial_state(element: Any, drum_rate: float) -> FloatArray:
+    """Return the state of a placed element at the start of a run, at a rate of the drum. [rad/s]"""
+    if isinstance(element, PlacedElement):
+        return element.initial(drum_rate)
+    return np.zeros(element.state_size)
+
+
 def structure_of(element: Any) -> list[int]:
     """Return the structure of a placed element, which is found once."""
     kept = vars(element)
