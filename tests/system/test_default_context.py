@@ -108,7 +108,9 @@ def test_a_plain_simulator_moves_as_the_compiled_engine(name):
     record = simulate(machine, case, step=2.5e-3 / 16)
     found = machine.diagram.GetOutputPort("displacement").Eval(simulator.get_context())
     size = float(np.abs(record.displacement).max())
-    np.testing.assert_allclose(found, record.displacement[-1], rtol=0.0, atol=max(1e-6, 3e-4 * size))
+    np.testing.assert_allclose(
+        found, record.displacement[-1], rtol=0.0, atol=max(1e-6, 3e-4 * size)
+    )
 
 
 def test_copies_of_the_diagram_keep_it(reference):
