@@ -14,7 +14,7 @@ from wm_drake.elements.water import packed_water
 from wm_drake.errors import input_error
 from wm_drake.model.drawn_machine import DrawnMachine, RestingMachine
 from wm_drake.model.machine import Machine, MachineSystems, MotorSystems
-from wm_drake.model.placed_elements import PlacedElements, initial_state
+from wm_drake.model.placed_elements import Parts, PlacedElements, initial_state
 from wm_drake.model.plant_copy import plant_at
 from wm_drake.model.visualization import add_visualizer
 from wm_drake.model.wiring import Link, Wiring
@@ -80,7 +80,7 @@ def add_washing_machine(
     if load is Loads.FIRST:
         load = next(iter(parameters.loads.values()), None)
     drawn, prefix = DrawnMachine(parameters), f"{name}_" if name else ""
-    resting = drawn.at_rest(load, parameters, gasket=gasket)
+    resting = drawn.at_rest(load, parameters, Parts(gasket))
     assert resting.bodies is not None  # they are asked for
     plant = builder.AddNamedSystem(f"{prefix}bodies", plant_at(drawn.plant, resting.bodies))
     layout, placed = drawn.state_layout, resting.elements

@@ -18,7 +18,7 @@ from wm_drake.model.bodies import add_bodies, add_load, drum_inertia, set_bodies
 from wm_drake.model.cabinet import cabinet_at_rest
 from wm_drake.model.equilibrium import force_as_drawn, preloaded, put_to_rest, rest_pose
 from wm_drake.model.frame_poses import FramePoses, TubPoints, measured_points, tub_points
-from wm_drake.model.placed_elements import PlacedElements, placed_elements
+from wm_drake.model.placed_elements import ALL_PARTS, Parts, PlacedElements, placed_elements
 from wm_drake.model.same_elements import check_same_elements
 from wm_drake.model.scene import Scene
 from wm_drake.model.state_layout import state_layout_of
@@ -126,15 +126,14 @@ class DrawnMachine:
         self,
         load: Load | str | None,
         parameters: MachineParameters,
+        parts: Parts = ALL_PARTS,
         *,
-        gasket: bool = True,
-        dampers: bool = True,
-        friction: bool = True,
         bodies: bool = True,
     ) -> RestingMachine:
-        """Return the machine at rest; arguments as in `MachineSystems.set_up`.
+        """Return the machine at rest; load and parameters as in `MachineSystems.set_up`.
 
         Args:
+            parts: What acts.
             bodies: False for a machine without the Context of its bodies, which is faster.
 
         Raises:
@@ -148,13 +147,10 @@ class DrawnMachine:
         context = self.bodies(None, parameters) if bodies or moving else None
         unloaded = placed_elements(self.plant, poses, parameters)
         weight = self._weight(parameters, context)
-        elements = self._preloaded(unloaded, poses, weight, context)
-        elements = elements if gasket else elements.without_gasket()
-        elements = elements if dampers else elements.without_dampers()
-        elements = elements if friction else elements.without_friction()
+        elements = self._preloaded(unloaded, poses, weight, context).with_parts(parts)
         q, residual = self._rest(elements, weight, context)
-        parts = parameters.sensors, parameters.clearance_frame, parameters.accelerometers
-        points = poses.placed("points", parts, lambda: tub_points(poses, parameters))
+        places = parameters.sensors, parameters.clearance_frame, parameters.accelerometers
+        points = poses.placed("points", places, lambda: tub_points(poses, parameters))
         measured = measured_points(points, q[layout.tub])
         cabinet, drum = None, None
         if context is not None:

@@ -18,7 +18,7 @@ from wm_drake.elements.water import packed_water
 from wm_drake.errors import input_error
 from wm_drake.model.bodies import set_drum
 from wm_drake.model.drawn_machine import DrawnMachine, RestingMachine, SetUpCache
-from wm_drake.model.placed_elements import PlacedElements
+from wm_drake.model.placed_elements import Parts, PlacedElements
 from wm_drake.model.plant_copy import copy_numbers
 from wm_drake.model.state_layout import StateLayout
 from wm_drake.parameters import Drive, Load, MachineParameters, MotorDrive, Sensor, SpinProfile
@@ -261,8 +261,8 @@ class MachineSystems:
                 there is no equilibrium.
         """
         parameters, context = parameters or self.parameters, context or self.new_context()
-        changes = {"gasket": gasket, "dampers": dampers, "friction": friction}
-        resting = self.drawn.at_rest(load, parameters, **changes, bodies=systems)
+        parts = Parts(gasket, dampers, friction)
+        resting = self.drawn.at_rest(load, parameters, parts, bodies=systems)
         setup = Setup(machine=self, context=context, **vars(resting))
         if resting.bodies is not None:
             self._set(setup, resting.bodies)
