@@ -251,9 +251,11 @@ def _is_stuck(channel: Channel, number: int) -> bool:
     steps = [abs(values[at] - values[at - 1]) for at in (begin, end) if 0 < at < total]
     moved = np.abs(around[around != 0.0])
     least = CREST * np.nanpercentile(moved, 5.0)
-    if channel.kind == "speed":  # one that is constant at last is steady
+    if channel.kind == "speed":  # steady at last
         least = max(least, AWAY * np.nanmedian(np.abs(around)))
-    elif len(steps) < 2:  # a machine that rests begins to move in small steps
+    elif not begin:  # at rest at first
+        least = max(least, np.nanmax(np.abs(around)))
+    elif len(steps) < 2:
         least = max(least, np.nanmedian(np.abs(around)))
     return bool(np.nanmax(steps, initial=0.0) > least)
 

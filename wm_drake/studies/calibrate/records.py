@@ -15,7 +15,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from wm_drake.errors import InputError
-from wm_drake.parameters import Load, SpinProfile
+from wm_drake.parameters import Load, SpinProfile, Unbalance
 from wm_drake.parameters.recorded_sensors import RecordedSensor
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
@@ -48,6 +48,9 @@ GAIN_SD = 0.01
 TILT_SD = float(np.deg2rad(2.0))
 """Deviation of each of two angles by which the axis of a sensor is off: an assumption. [rad]"""
 
+LEAST_PLACE_SD = 1e-5
+"""Deviation of the place of a sensor that is known, where that of another one is not. [m]"""
+
 OFFSET_SD, RATE_SD, ANGLE_SD = 1e-4, 1e-6, 0.05
 """Smallest deviations of a clock [s, 1] and of the angle of the drum at the start [rad]: what the
 alignment claims is not better than the model it aligns with. An assumption."""
@@ -55,12 +58,16 @@ alignment claims is not better than the model it aligns with. An assumption."""
 REACH = 6.0
 """Bounds of such an unknown, in deviations."""
 
-RunKey: TypeAlias = tuple[bytes, str, SpinProfile, float]
-"""What determines a run: numbers of the machine, load, profile, angle of the drum."""
+RunKey: TypeAlias = tuple[bytes, str, SpinProfile, float, float]
+"""What determines a run: numbers of the machine, load, profile, angle of the drum, factor of the
+mass of the load."""
 
-ColumnKey: TypeAlias = tuple[int, RunKey, int, float, float, float, float]
+ColumnKey: TypeAlias = tuple[int, RunKey, int, float, float, tuple[float, ...]]
 """What determines the signal of a sensor: recording, run, number of the sensor, offset and rate of
-the clock, and both angles of the axis."""
+the clock, both angles of the axis, and by what its place is off."""
+
+PLACE_STEP = 1e-3
+"""Step of a derivative by the place of a sensor. [m]"""
 
 KEPT_RUNS, KEPT_COLUMNS = 40, 1500
 """Numbers of runs and of amplitudes of a sensor beyond which none are kept for the next call."""
@@ -74,12 +81,14 @@ class RecordModel(BlockModel):
         sensors, points: Sensors by name, and their positions in T. [m]
         loads: Loads with their recordings.
         by: What is fitted.
+        load_deviation: Relative deviation of the mass of each load; 0 if it is known.
     """
 
     sensors: Mapping[str, RecordedSensor]
     loads: tuple[RecordedLoad, ...]
     points: Mapping[str, FloatArray]
     by: By
+    load_deviation: float = 0.0
 
     misfit = MISFIT
     most_misfit = 2.0
@@ -98,21 +107,37 @@ class RecordModel(BlockModel):
     @cached_property
     def unknowns(self) -> tuple[Unknown, ...]:
         """Unknowns of the machine, then those of the recorder."""
-        return (*self.free.unknowns, *self._of_sensors, *self._of_recordings)
+        return (
+            *self.free.unknowns,
+            *self._of_sensors,
+            *self._of_loads,
+            *self._of_recordings,
+        )
+
+    @cached_property
+    def has_places(self) -> bool:
+        """Whether the place of a sensor is uncertain."""
+        return any(sensor.place_deviation for sensor in self.sensors.values())
 
     @cached_property
     def _of_sensors(self) -> tuple[Unknown, ...]:
-        """Gain and two angles of the axis of each sensor."""
-        angle = Unit("rad", "deg")
-        return tuple(
-            unknown
-            for name in self.sensors
-            for unknown in (
-                _nuisance(f"gain of {name}", 1.0, GAIN_SD, Unit("", "")),
-                _nuisance(f"tilt of {name}", 0.0, TILT_SD, angle),
-                _nuisance(f"other tilt of {name}", 0.0, TILT_SD, angle),
-            )
-        )
+        """Gain, two angles of the axis and, where they are uncertain, the place of each sensor."""
+        angle, length, unknowns = Unit("rad", "deg"), Unit("m", "mm"), []
+        for name, sensor in self.sensors.items():
+            unknowns.append(_nuisance(f"gain of {name}", 1.0, GAIN_SD, Unit("", "")))
+            unknowns.append(_nuisance(f"tilt of {name}", 0.0, TILT_SD, angle))
+            unknowns.append(_nuisance(f"other tilt of {name}", 0.0, TILT_SD, angle))
+            for axis in "xyz" if self.has_places else "":
+                width = max(sensor.place_deviation, LEAST_PLACE_SD)
+                unknowns.append(_nuisance(f"{axis} of {name}", 0.0, width, length))
+        return tuple(unknowns)
+
+    @cached_property
+    def _of_loads(self) -> tuple[Unknown, ...]:
+        """Factor of the mass of each load, if it is uncertain."""
+        names = [load.name for load in self.loads] if self.load_deviation else []
+        width, unit = self.load_deviation, Unit("", "")
+        return tuple(_nuisance(f"mass of load {name}", 1.0, width, unit) for name in names)
 
     @cached_property
     def _of_recordings(self) -> tuple[Unknown, ...]:
@@ -165,16 +190,16 @@ class RecordModel(BlockModel):
         return mean_of(np.stack(each)) * self._sensors_at(point)[:, 0]
 
     def _sensors_at(self, point: FloatArray) -> FloatArray:
-        """Return gain and both angles of each sensor at a point (k, 3)."""
+        """Return gain, both angles, and by what the place is off, of each sensor (k, 3 or 6)."""
         count = len(self.free.unknowns)
-        return point[count : count + 3 * len(self.sensors)].reshape(-1, 3)
+        return point[count : count + len(self._of_sensors)].reshape(len(self.sensors), -1)
 
     def _keys(self, load: RecordedLoad, pair: Pair, point: FloatArray) -> list[ColumnKey]:
         """Return what determines the signal of each sensor of a recording at a point."""
         run = self._key(load, pair, point)
         offset, rate = self._of(pair, point)[:2].tolist()
-        tilts = self._sensors_at(point)[:, 1:].tolist()
-        return [(id(pair), run, k, offset, rate, *tilt) for k, tilt in enumerate(tilts)]
+        off = self._sensors_at(point)[:, 1:].tolist()
+        return [(id(pair), run, k, offset, rate, tuple(each)) for k, each in enumerate(off)]
 
     def _reduce(self, load: RecordedLoad, pair: Pair, points: FloatArray) -> None:
         """Keep what is fitted of the signals of a recording at points, all new ones at once."""
@@ -184,8 +209,8 @@ class RecordModel(BlockModel):
             return
         time = pair.run.time.values
         columns = []
-        for _, run, k, offset, rate, *tilt in new:
-            signal = self._runs[run][:, k] @ np.array([1.0, *tilt])
+        for _, run, k, offset, rate, off in new:
+            signal = self._runs[run][:, k] @ np.array([1.0, *off])
             if offset or rate:
                 moved = time + offset + rate * (time - 0.5 * time[-1])
                 signal = CubicSpline(time, signal)(np.clip(moved, time[0], time[-1]))
@@ -202,7 +227,11 @@ class RecordModel(BlockModel):
         """Return what determines the run of a recording at a point."""
         numbers = point[: len(self.free.unknowns)].tobytes()
         angle = float(self._of(pair, point)[2]) if self.by == "history" else 0.0
-        return numbers, load.name, profile_of(pair.run), angle
+        factor = 1.0
+        if self._of_loads:
+            first = len(self.free.unknowns) + len(self._of_sensors)
+            factor = float(point[first + self.loads.index(load)])
+        return numbers, load.name, profile_of(pair.run), angle, factor
 
     def _run(self, points: FloatArray) -> None:
         """Run what is not kept of points, and keep the signals (n, k, 3), NaN of failed runs."""
@@ -219,28 +248,56 @@ class RecordModel(BlockModel):
         for key, (load, pair, point) in needed.items():
             if key in self._runs:
                 continue
-            self._runs[key] = np.full((len(pair.run.time), len(self.sensors), 3), np.nan)
+            self._runs[key] = np.full(
+                (len(pair.run.time), len(self.sensors), 6 if self.has_places else 3), np.nan
+            )
             try:
                 machine = self.free.parameters_at(point[: len(self.free.unknowns)])
             except InputError:
                 continue
             if self.experiment.can_run(machine):
-                turned = turned_load(load.load_at(machine), key[-1])
+                turned = scaled_load(turned_load(load.load_at(machine), key[3]), key[4])
                 cases[key] = Case(load.name, turned, profile_of(pair.run), parameters=machine)
         keys = list(cases)
 
         def keep(number: int, record: Record) -> None:
             if not record.attrs["diverged"]:
-                self._runs[keys[number]] = turned_signals(record, self.sensors, self.points)
+                self._runs[keys[number]] = self._signals(record)
 
         if cases:
             self.experiment.record(self.experiment.machine, list(cases.values()), keep, "records")
+
+    def _signals(self, record: Record) -> FloatArray:
+        """Return signals of a run and their derivatives by angles and places. (n, k, 3 or 6)"""
+        signals = turned_signals(record, self.sensors, self.points)
+        parts = [signals]
+        for step in PLACE_STEP * np.eye(3) if self.has_places else ():
+            moved = {name: point + step for name, point in self.points.items()}
+            of_moved = turned_signals(record, self.sensors, moved)
+            parts.append((of_moved[:, :, :1] - signals[:, :, :1]) / PLACE_STEP)
+        return np.concatenate(parts, axis=2)
 
 
 def _nuisance(name: str, expected: float, deviation: float, unit: Unit) -> Unknown:
     reach = REACH * deviation
     prior = (expected, deviation)
     return Unknown(name, expected - reach, expected + reach, unit, prior=prior)
+
+
+def scaled_load(load: Load, factor: float) -> Load:
+    """Return a load whose masses and moments are larger by a factor."""
+    if factor == 1.0:
+        return load
+
+    def scaled(part: Any) -> Any:
+        name = "mass" if isinstance(part, Unbalance) else "moment"
+        return part.model_copy(update={name: factor * getattr(part, name)}) if part else None
+
+    return Load(
+        unbalances=tuple(map(scaled, load.unbalances)),
+        static=scaled(load.static),
+        couple=scaled(load.couple),
+    )
 
 
 def turned_load(load: Load, angle: float) -> Load:

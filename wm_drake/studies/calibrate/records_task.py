@@ -164,7 +164,15 @@ def record_model(
                 f"{', '.join(test.sensors)}, those of load {tests[0].case.name} {', '.join(names)}",
                 where="RECORD",
             )
-    return RecordModel(experiment, free, tests[0].sensors, tuple(loads), tests[0].points, by)
+    return RecordModel(
+        experiment,
+        free,
+        tests[0].sensors,
+        tuple(loads),
+        tests[0].points,
+        by,
+        tests[0].test.load_deviation,
+    )
 
 
 def _by_load(options: CalibrateOptions) -> dict[str | None, tuple[Path, ...]]:
