@@ -69,35 +69,29 @@ def region_displacements(
     return np.stack(direct, axis=1), np.stack(integrated, axis=1)
 
 
-def recorded_displacements(
+def specific_forces(
     motion: FloatArray,
     acceleration: FloatArray,
     points: FloatArray,
     rest_pose: FloatArray,
-    period: float,
-    profile: SpinProfile,
     gravity: float,
 ) -> FloatArray:
-    """Return the RMS displacements that accelerometers glued to the tub tell, by integration.
+    """Return what accelerometers glued to the tub record: a_Q - g, along axes that turn with it.
 
-    They record the specific force a_Q - g along axes that turn with the tub and are those of W at
-    rest. Where the tub tilts, gravity is in it, which integration takes for a displacement.
+    The axes are those of W at rest. Where the tub tilts, gravity is in the signals, which an
+    integration takes for a motion.
 
     Args:
-        motion, acceleration, points, rest_pose, period, profile: As for `region_displacements`.
+        motion, acceleration, points, rest_pose: As for `region_displacements`.
         gravity: Acceleration of free fall. [m/s^2]
 
     Returns:
-        (regions, k, 3) along the axes of the sensors. [m]
+        (n, k, 3) [m/s^2]
     """
     turned = np.stack(generic(rotation_from_rpy)(*motion[:, :3].T), axis=1).reshape(-1, 3, 3)
     rest = np.array(generic(rotation_from_rpy)(*rest_pose[:3])).reshape(3, 3)
-    regions = []
-    for point in points[:, None]:
-        force = point_accelerations(motion, acceleration, point)[:, 0] + [0.0, 0.0, gravity]
-        recorded = np.einsum("ij,nkj,nk->ni", rest, turned, force)
-        regions.append(region_rms(displacement_of(recorded, period), period, profile))
-    return np.stack(regions, axis=1)
+    force = point_accelerations(motion, acceleration, points) + [0.0, 0.0, gravity]
+    return np.asarray(np.einsum("ij,nkj,npk->npi", rest, turned, force))
 
 
 def displacement_of(acceleration: FloatArray, period: float) -> FloatArray:

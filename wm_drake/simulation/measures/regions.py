@@ -8,7 +8,12 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.simulation.measures.kind import Measure, Variable, each_run
 from wm_drake.simulation.measures.run import Run
-from wm_drake.simulation.vibration import recorded_displacements, region_displacements
+from wm_drake.simulation.vibration import (
+    displacement_of,
+    region_displacements,
+    region_rms,
+    specific_forces,
+)
 
 DIMS = ("region", "accelerometer", "axis")
 
@@ -47,9 +52,11 @@ REGIONS = Measure(
 
 
 def _recorded(run: Run) -> Sequence[FloatArray]:
-    motion = np.ascontiguousarray(run.tub_motion)
-    at_points = run.accelerometer_points, run.rest_pose, run.period, run.profile
-    return (recorded_displacements(motion, run.tub_acceleration, *at_points, run.gravity),)
+    motion, points = np.ascontiguousarray(run.tub_motion), run.accelerometer_points
+    about = run.rest_pose, run.gravity
+    signals = specific_forces(motion, run.tub_acceleration, points, *about)
+    moved = [displacement_of(signals[:, k], run.period) for k in range(len(points))]
+    return (np.stack([region_rms(one, run.period, run.profile) for one in moved], axis=1),)
 
 
 RECORDED = Measure(
