@@ -33,9 +33,10 @@ def test_error_of_a_case_arrives_with_its_problems(in_processes):
     assert raised.value.problems[0].key == "mass"
 
 
-def test_killed_worker_is_an_error(in_processes):
-    with pytest.raises(WmDrakeError, match="a worker process ended before its result"):
-        in_processes(["SIGKILL", 0.0], 1, print)
+@pytest.mark.parametrize(("end", "reason"), [("SIGKILL", r"\(SIGKILL\)"), ("exit", "__main__")])
+def test_a_worker_that_ends_is_an_error_with_its_cause(in_processes, end, reason):
+    with pytest.raises(WmDrakeError, match=reason):
+        in_processes([end, 0.0], 1, print)
 
 
 @pytest.mark.parametrize("daemon", [True, False])

@@ -5,10 +5,11 @@ import os
 import signal
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property, partial
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -267,21 +268,45 @@ def _run_in_processes(
     from concurrent.futures.process import BrokenProcessPool
 
     # a fork of a process with threads or with Drake is not safe; Ctrl-C ends a worker at once
-    spawn, at_begin = multiprocessing.get_context("spawn"), (signal.SIGINT, signal.SIG_DFL)
-    pool = ProcessPoolExecutor(count, spawn, signal.signal, at_begin)
+    pool = ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), _begin_worker)
+    others, workers = set(multiprocessing.active_children()), set[BaseProcess]()
     try:
-        futures = {pool.submit(_build_and_run, item): index for index, item in enumerate(items)}
+        # a worker that still imports would end with a traceback
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            futures = {pool.submit(_build_and_run, item): index for index, item in enumerate(items)}
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        workers = set(multiprocessing.active_children()) - others
         for future in as_completed(futures):
             future.result()
             progress(futures[future], 1.0)
         return [future.result() for future in futures]
     except BrokenProcessPool:
-        raise WmDrakeError(
-            "a worker process ended before its result; a script that uses several workers needs "
-            '`if __name__ == "__main__":`'
-        ) from None
+        raise WmDrakeError(_why_ended(workers)) from None
     finally:
         pool.shutdown(cancel_futures=True)
+
+
+def _begin_worker() -> None:
+    """Let Ctrl-C end a worker at once and without words."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+
+
+def _why_ended(workers: Iterable[BaseProcess]) -> str:
+    """Return why a worker process ended before its result; the pool ends the others by SIGTERM."""
+    codes = {code for code in (w.exitcode for w in workers) if code not in (None, -signal.SIGTERM)}
+    killed = [signal.Signals(-code).name for code in codes if code < 0]
+    if killed:
+        return (
+            f"a worker process was ended by the system ({killed[0]}); if memory is short, take "
+            "fewer workers"
+        )
+    return (
+        "a worker process ended before its result; a script that uses several workers needs "
+        '`if __name__ == "__main__":`'
+    )
 
 
 def _run_side_by_side(
