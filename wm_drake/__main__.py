@@ -28,14 +28,14 @@ class LastingStream(io.FileIO):
 
     fault: OSError | None = None
 
-    def write(self, data: Any) -> int | None:
+    def write(self, data: Any, /) -> int:
         """Write bytes, or drop them once the stream has ended."""
         if self.fault is None:
             try:
                 return super().write(data)
             except OSError as error:
                 self.fault = error
-        return len(data)
+        return len(memoryview(data))
 
 
 def lasting(stream: Any, number: int) -> tuple[io.TextIOWrapper, LastingStream]:
