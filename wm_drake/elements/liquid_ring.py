@@ -61,6 +61,7 @@ NUMBERS = PackedLayout(
     top=VECTOR,
     gravity=VECTOR,
     mass=SCALAR,
+    ratio=SCALAR,
     coriolis=SCALAR,
     inertia=SCALAR,
     most=SCALAR,
@@ -71,7 +72,7 @@ NUMBERS = PackedLayout(
     whirl=CURVE,
 )
 """Centre of the ring from To, axis of the drum and direction to its top at angle 0, in T; gravity
-in W [m/s^2]; m [kg]; 4 L/(L + 1); I [kg m^2]; largest s [m]; tau [s]; k [N/m], b [N s/m];
+in W [m/s^2]; m [kg]; L + 1; 4 L/(L + 1); I [kg m^2]; largest s [m]; tau [s]; k [N/m], b [N s/m];
 stiffness of the wall [N/m]; e(q) over s [m]."""
 read_numbers = NUMBERS.read
 
@@ -197,12 +198,13 @@ def liquid_ring(motion, state, p, at):
 
     Args:
         motion: `DrumMotion`.
-        state: Place from the centre of the ring in T [m], velocity in W [m/s], spin w [rad/s].
+        state: Place q of the centre of mass of the liquid from the centre of the ring, in T [m];
+            velocity of the particle in W [m/s]; spin w [rad/s].
         p, at: Packed numbers.
     """
     numbers = read_numbers(p, at)
     axis, mass, spin = numbers.axis, numbers.mass, state.spin
-    place = (state.place_x, state.place_y, state.place_z)
+    place = scale(numbers.ratio, (state.place_x, state.place_y, state.place_z))
     velocity = (state.velocity_x, state.velocity_y, state.velocity_z)
     w = rotate_back(motion.rotation, motion.angular_velocity)
     rate = rate_in_tub(motion, add(numbers.centre, place), velocity)
@@ -235,7 +237,7 @@ def liquid_ring(motion, state, p, at):
     return (
         (m[0], m[1], m[2], f[0], f[1], f[2], twist),
         (mass * side, 0.0 * up, mass * up, spin),
-        (rate[0], rate[1], rate[2], a[0], a[1], a[2], spin_rate),
+        (*scale(1.0 / numbers.ratio, rate), a[0], a[1], a[2], spin_rate),
     )
 
 
@@ -251,6 +253,7 @@ def numbers_of(parameters: LiquidRing, ends: DrumPlace) -> dict[str, Any]:
         "top": ends.tub_rotation[:, 2],
         "gravity": ends.gravity,
         "mass": mass,
+        "ratio": ratio,
         "coriolis": 4.0 * (ratio - 1.0) / ratio,
         "inertia": 0.5 * parameters.mass * (outer**2 + surface**2),
         "most": ratio * most,
@@ -290,15 +293,15 @@ def _at_start(
 ) -> FloatArray:
     """Return the states of a ring whose drum turns at a rate, without drag. (7,)
 
-    A ring that is closed has its liquid above the axis, at s = -(L + 1)/(2 L) g/W^2; else it is a
-    pool at the bottom.
+    A ring that is closed has its liquid above the axis, at q = -g/(2 L W^2); else it is a pool at
+    the bottom.
     """
     fall, ratio = float(np.linalg.norm(gravity)), parameters.ratio
     state = np.zeros(7)
     state[6] = drum_rate
     if most and fall:
         closed = drum_rate >= parameters.closes_from
-        lift = -fall * ratio / (2.0 * (ratio - 1.0) * drum_rate**2) if closed else most
+        lift = -fall / (2.0 * (ratio - 1.0) * drum_rate**2) if closed else most / ratio
         state[:3] = lift * gravity / fall
     return state
 
