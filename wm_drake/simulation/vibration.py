@@ -90,7 +90,7 @@ def specific_forces(
     """
     turned = np.stack(generic(rotation_from_rpy)(*motion[:, :3].T), axis=1).reshape(-1, 3, 3)
     rest = np.array(generic(rotation_from_rpy)(*rest_pose[:3])).reshape(3, 3)
-    force = point_accelerations(motion, acceleration, points) + [0.0, 0.0, gravity]
+    force = point_accelerations(motion, acceleration, points) + np.array([0.0, 0.0, gravity])
     return np.asarray(np.einsum("ij,nkj,npk->npi", rest, turned, force))
 
 
