@@ -187,9 +187,9 @@ class RecordModel(BlockModel):
             np.stack([self._columns[key] for key in self._keys(block.load, pair, point)], axis=1)
             for pair in block.pairs
         ]
-        return mean_of(np.stack(each)) * self._sensors_at(point)[:, 0]
+        return mean_of(np.stack(each)) * self.sensors_at(point)[:, 0]
 
-    def _sensors_at(self, point: FloatArray) -> FloatArray:
+    def sensors_at(self, point: FloatArray) -> FloatArray:
         """Return gain, both angles, and by what the place is off, of each sensor (k, 3 or 6)."""
         count = len(self.free.unknowns)
         return point[count : count + len(self._of_sensors)].reshape(len(self.sensors), -1)
@@ -198,7 +198,7 @@ class RecordModel(BlockModel):
         """Return what determines the signal of each sensor of a recording at a point."""
         run = self._key(load, pair, point)
         offset, rate = self._of(pair, point)[:2].tolist()
-        off = self._sensors_at(point)[:, 1:].tolist()
+        off = self.sensors_at(point)[:, 1:].tolist()
         return [(id(pair), run, k, offset, rate, tuple(each)) for k, each in enumerate(off)]
 
     def _reduce(self, load: RecordedLoad, pair: Pair, points: FloatArray) -> None:

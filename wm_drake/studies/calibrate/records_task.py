@@ -19,6 +19,7 @@ from wm_drake.studies.calibrate.parameter_map import parameter_map_of
 from wm_drake.studies.calibrate.recorded import RecordedLoad, without_edges
 from wm_drake.studies.calibrate.records import RecordModel
 from wm_drake.studies.calibrate.solutions import FreeQuantities
+from wm_drake.studies.calibrate.test_file import calibrated_test, found_clocks, test_text
 from wm_drake.studies.compare.pairs import QUANTITIES
 from wm_drake.studies.compare.recordings import check_distinct
 from wm_drake.studies.compare.task import CompareTask
@@ -89,23 +90,21 @@ class CalibrateRecordsTask(Task):
         experiment = records_here(self.machine, executor)
         model = record_model(experiment, self.free, self.tests, loads, self.options.by)
         title = f"Machine {self.machine.parameters.name} calibrated to records"
-        answer = fitted_answer(executor, model, self.options.seed, (title, "calibrated"))
-        return with_warnings(answer, self.tests)
-
-
-def with_warnings(answer: Answer, tests: Sequence[CompareTask]) -> Answer:
-    """Return an answer that also warns of records that are not like their predictions."""
-    warnings = [warning for test in tests for warning in test.warnings]
-    return replace(answer, warned=(*warnings, *answer.warned))
+        return fitted_answer(executor, model, self.options.seed, (title, "calibrated"), self.tests)
 
 
 def fitted_answer(
-    executor: Executor, model: RecordModel, seed: int, words: tuple[str, str]
+    executor: Executor,
+    model: RecordModel,
+    seed: int,
+    words: tuple[str, str],
+    tests: Sequence[CompareTask],
 ) -> Answer:
     """Fit a model to its recordings, and return the answer.
 
     Args:
         words: Title of the page, and name of the file of the machine with the values found.
+        tests: Of the recordings.
     """
     with executor.fraction("search") as report:
         fit, data = calibrated(model, seed, lambda fraction, least: report(fraction))
@@ -126,7 +125,11 @@ def fitted_answer(
         if names:
             parts.append(compared(data.sel(sensor=names), quantity, fitted))
     parts.append(health_part({p.recording.path.name: p.recording.findings for p in model.pairs}))
-    return fit_answer(model, fit, data, texts, parts)
+    answer = fit_answer(model, fit, data, texts, parts)
+    calibrated_sensors = calibrated_test(model, fit, tests[0].test)
+    name, text = f"{words[1]}_test.yaml", test_text(calibrated_sensors, found_clocks(model, fit))
+    warnings = [warning for test in tests for warning in test.warnings]
+    return replace(answer, files={**answer.files, name: text}, warned=(*warnings, *answer.warned))
 
 
 def records_here(machine: Machine, executor: Executor) -> Experiment:

@@ -22,6 +22,7 @@ from wm_drake.parameters.recorded.pulses import LEAST_PULSES, Pulses, counted, r
 from wm_drake.parameters.recorded.stamps import HOLE
 from wm_drake.parameters.recorded_sensors import RecordedSensor, RecordedTest, SpeedChannel
 from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import Unit, factor_of
 
 LEAST_SAMPLES = 200
 """Smallest number of samples of a recording."""
@@ -59,11 +60,12 @@ class TestRecording:
 
 
 def read_test(
-    path: Path, test: RecordedTest, names: ChannelNames, duration: float | None = None
+    path: Path, test: RecordedTest, names: ChannelNames, unit: str, duration: float
 ) -> TestRecording:
     """Read the channels of the sensors of a test.
 
     Args:
+        unit: Unit of channels without one, of sensors that it fits; "" for none.
         duration: Duration of the profile. [s]
 
     Raises:
@@ -74,9 +76,13 @@ def read_test(
     used = _sensor_channels(recording, test)
     uses = {
         name: ChannelUse(
-            signal, test.sensors[name].signal_unit, test.sensors[name].unit, kind="vibration"
+            signal,
+            s.signal_unit,
+            s.unit or (unit if fits(unit, s.signal_unit) else ""),
+            kind="vibration",
         )
         for name, signal in used.items()
+        for s in (test.sensors[name],)
     }
     about = test.speed or _named_speed(recording)
     shaft = None if about is None else recording.chosen(names.channels.get("speed", about.channel))
@@ -96,6 +102,15 @@ def read_test(
     pulses = replace(pulses, times=pulses.times + _later(shaft, [*used.values()]))
     speed = pulse_angle(about) * pulses.speed(channels.time)
     return TestRecording(channels, speed, pulses, about, (*findings, *irregular))
+
+
+def fits(text: str, unit: Unit) -> bool:
+    """Return whether a unit, as instruments write it, measures what another one does."""
+    try:
+        factor_of(text, unit)
+    except ValueError:
+        return False
+    return bool(text)
 
 
 def _sensor_channels(recording: Recording, test: RecordedTest) -> dict[str, Signal]:

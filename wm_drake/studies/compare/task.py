@@ -77,13 +77,13 @@ class CompareTask(Task):
         with problems_of_file(options.test or Path("--machine")):
             self.points = sensor_points(machine, self.test)
         self.case = case or self._case()
-        names, _ = channel_names(options, ("time", "speed", *self.test.sensors))
+        names, unit = channel_names(options, ("time", "speed", *self.test.sensors))
         paths = [existing_file(path, "RECORD") for path in options.records]
         for path in paths:
             if paths.count(path) > 1:
                 raise input_error(f"'{path}' is given twice", where="RECORD")
         recordings = [
-            read_test(path, self.test, names, self.case.profile.duration) for path in paths
+            read_test(path, self.test, names, unit, self.case.profile.duration) for path in paths
         ]
         check_distinct(recordings)
         for recording in recordings:

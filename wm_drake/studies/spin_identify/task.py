@@ -12,7 +12,6 @@ from wm_drake.studies.calibrate.records_task import (
     record_model,
     recorded_load,
     records_here,
-    with_warnings,
 )
 from wm_drake.studies.compare.options import CompareOptions
 from wm_drake.studies.compare.task import CompareTask
@@ -122,5 +121,5 @@ class SpinIdentifyTask(Task):
             self.options.by,
         )
         title = f"Parameters of machine {parameters.name} identified from records of a spin cycle"
-        answer = fitted_answer(executor, model, self.options.seed, (title, "identified"))
-        return with_warnings(answer, list(self.tests.values()))
+        words, tests = (title, "identified"), list(self.tests.values())
+        return fitted_answer(executor, model, self.options.seed, words, tests)
