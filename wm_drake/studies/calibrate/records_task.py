@@ -19,7 +19,7 @@ from wm_drake.studies.calibrate.parameter_map import parameter_map_of
 from wm_drake.studies.calibrate.recorded import RecordedLoad, without_edges
 from wm_drake.studies.calibrate.records import RecordModel
 from wm_drake.studies.calibrate.solutions import FreeQuantities
-from wm_drake.studies.calibrate.test_file import calibrated_test, found_clocks, test_text
+from wm_drake.studies.calibrate.test_file import calibrated_test, clock_remarks, test_text
 from wm_drake.studies.compare.pairs import QUANTITIES
 from wm_drake.studies.compare.recordings import check_distinct
 from wm_drake.studies.compare.task import CompareTask
@@ -127,7 +127,7 @@ def fitted_answer(
     parts.append(health_part({p.recording.path.name: p.recording.findings for p in model.pairs}))
     answer = fit_answer(model, fit, data, texts, parts)
     calibrated_sensors = calibrated_test(model, fit, tests[0].test)
-    name, text = f"{words[1]}_test.yaml", test_text(calibrated_sensors, found_clocks(model, fit))
+    name, text = f"{words[1]}_test.yaml", test_text(calibrated_sensors, clock_remarks(model, fit))
     warnings = [warning for test in tests for warning in test.warnings]
     return replace(answer, files={**answer.files, name: text}, warned=(*warnings, *answer.warned))
 

@@ -67,7 +67,7 @@ def test_text(test: RecordedTest, remarks: Sequence[str]) -> str:
     return "".join(f"# {remark}\n" for remark in remarks) + yaml_text(tree)
 
 
-def found_clocks(model: RecordModel, fit: Fit) -> list[str]:
+def clock_remarks(model: RecordModel, fit: Fit) -> list[str]:
     """Return a remark on the clock of each record, and on the mass of each load that was sought."""
     remarks = [
         f"{e.name}: {e.value:.4g} of that of the machine"
