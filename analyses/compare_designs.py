@@ -16,7 +16,8 @@ import pandas as pd
 import xarray as xr
 
 from wm_drake import build_machine, load_machine, progress_bar, simulate_many
-from wm_drake.parameters import GASKET_FACTORS, SpinProfile, at_levels, levels_of, load_factors
+from wm_drake.parameters import SpinProfile, varying
+from wm_drake.parameters.vary_file import gasket_entries
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.doe.design import Design, make_design
 from wm_drake.studies.experiment import Experiment
@@ -58,17 +59,15 @@ def main() -> None:
     parser.add_argument("--out", type=Path, help="also write the table to this file")
     arguments = parser.parse_args()
     reference = load_machine("reference")
-    profile, known, trials = reference.profile, load_factors(GASKET_FACTORS), 1000
+    profile, known, trials = reference.profile, dict(gasket_entries()), 1000
     if arguments.quick:
         profile, trials = SpinProfile(time=(0.0, 2.0), speed=(0.0, 9.0)), 100
         known = {name: known[name] for name in list(known)[:5]}
-    levels = levels_of(reference, known)
     # at the middle levels, numbers replace the stiffnesses that are tables
-    middle = at_levels(reference, levels, [0] * len(levels))
-    machine = build_machine(middle)
-    study = GasketTrials(
-        middle, levels, [Case(name, middle.loads[name], profile) for name in LOADS], ("D", "F", "M")
-    )
+    factors = varying(reference, known, tables="linear")
+    cases = [Case(name, reference.loads[name], profile) for name in LOADS]
+    study = GasketTrials(factors, cases, ("D", "F", "M"))
+    machine = build_machine(study.parameters)
     made = designs(tuple(known), trials)
     *_, (full, _) = made.values()
     begin = time.perf_counter()

@@ -139,7 +139,7 @@ ENTRIES = (
     Entry(
         "calibrate",
         "Calibrated to measured amplitudes",
-        "wm-drake calibrate --free free.yaml --starts 1",
+        "wm-drake calibrate --vary free.yaml --starts 1",
         files=(("free.yaml", FREE),),
     ),
     Entry(

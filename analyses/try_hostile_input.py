@@ -45,7 +45,7 @@ STUDIES = (
     ("study", "spin-cycle", "--case", "1", "--case", "2"),
     ("study", "spin-identify", "--quick"),
     ("study", "tolerance", "--quick", "--samples", "64"),
-    ("calibrate", "--quick", "--free", "free.yaml"),
+    ("calibrate", "--quick", "--vary", "free.yaml"),
     ("verdict", "--quick"),
     ("study", "balancer", "--quick"),
     ("study", "gasket-geometry", "--quick", "--drawings", "6", "--fresh", "2", "--load", "middle"),

@@ -7,13 +7,8 @@ import numpy as np
 import xarray as xr
 
 from wm_drake.model.build import build_machine
-from wm_drake.parameters import (
-    GASKET_FACTORS,
-    MachineParameters,
-    at_levels,
-    levels_of,
-    load_factors,
-)
+from wm_drake.parameters import MachineParameters, varying
+from wm_drake.parameters.vary_file import gasket_entries
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.doe.design import make_design
 from wm_drake.studies.experiment import Experiment
@@ -47,13 +42,12 @@ def screening_of(
         tables: How a level changes a stiffness table; "linear" as in [B].
         loads: Names of the loads.
     """
-    levels = levels_of(machine, load_factors(GASKET_FACTORS), tables)
+    factors = varying(machine, gasket_entries(), tables=tables)
     kind = "orthogonal" if trials >= ORTHOGONAL else "d-optimal"
-    design = make_design(kind, tuple(level.name for level in levels), trials=trials)
-    middle = at_levels(machine, levels, [0] * len(levels))
+    design = make_design(kind, tuple(factors.names), trials=trials)
     cases = [Case(name, machine.loads[name], machine.profile) for name in loads]
-    study = GasketTrials(middle, levels, cases, ["D", "F", "M"])
-    experiment = Experiment(build_machine(middle), study.measures, loads=tuple(cases))
+    study = GasketTrials(factors, cases, ["D", "F", "M"])
+    experiment = Experiment(build_machine(study.parameters), study.measures, loads=tuple(cases))
     return run_screening(design, lambda plan: study.responses(plan, experiment))
 
 

@@ -17,8 +17,8 @@ from wm_drake.batch.ledger import open_ledger
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import load_machine
-from wm_drake.parameters.free import FreeFile, load_free
 from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.vary_file import VaryFile, load_vary
 from wm_drake.studies.calibrate.computed import Evaluation
 from wm_drake.studies.calibrate.parameter_map import ParameterMap, parameter_map_of
 from wm_drake.studies.calibrate.study import calibration_problem, identity_of
@@ -54,7 +54,7 @@ class FitByRuns:
     """
 
     machine: Machine
-    free: FreeFile
+    free: VaryFile
     ledger_path: Path
 
     def costs(self, points: FloatArray) -> FloatArray:
@@ -118,7 +118,7 @@ def shipped_point(parameter_map: ParameterMap) -> FloatArray:
     Returns:
         (quantity,) [SI]
     """
-    shipped = parameter_map_of(build_machine(load_machine(REFERENCE)), load_free(FREE))
+    shipped = parameter_map_of(build_machine(load_machine(REFERENCE)), load_vary(FREE))
     values = dict(zip(shipped.names, shipped.start.tolist(), strict=True))
     values["gasket_vertical"] = values["gasket_radial"]
     pairs = zip(parameter_map.names, parameter_map.expected.tolist(), strict=True)

@@ -7,8 +7,8 @@ import numpy as np
 from wm_drake.batch.ledger import key_of
 from wm_drake.batch.remembered import model_version, sources_version
 from wm_drake.model.machine import Machine
-from wm_drake.parameters.free import FreeFile
 from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.vary_file import VaryFile
 from wm_drake.studies.calibrate.computed import Evaluation
 from wm_drake.studies.calibrate.parameter_map import ParameterMap, parameter_map_of
 from wm_drake.studies.calibrate.solutions import Solution, distinct
@@ -95,7 +95,7 @@ class Calibration:
 
 
 def identity_of(
-    machine: Machine, free: FreeFile, targets: Targets, plan: SearchPlan
+    machine: Machine, free: VaryFile, targets: Targets, plan: SearchPlan
 ) -> dict[str, str]:
     """Return the texts that identify a calibration in its ledger."""
     return {
@@ -113,7 +113,7 @@ def identity_of(
 
 def calibrate(
     experiment: Experiment,
-    free: FreeFile,
+    free: VaryFile,
     targets: Targets,
     plan: SearchPlan,
     progress: Progress = silent,

@@ -11,18 +11,13 @@ import xarray as xr
 from wm_drake.errors import input_error
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
-from wm_drake.parameters import (
-    GASKET_FACTORS,
-    MachineParameters,
-    SpinProfile,
-    load_factors,
-    with_values,
-)
+from wm_drake.parameters import MachineParameters, SpinProfile, with_values
 from wm_drake.parameters.csv_files import with_distinct_times
 from wm_drake.parameters.machine import OUTPUT_PERIOD
 from wm_drake.parameters.recorded import ChannelUse, read_recording, resampled
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
+from wm_drake.parameters.vary_file import gasket_entries
 from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.displacements import smooth_envelope
@@ -256,10 +251,10 @@ def virtual_experiment(
 
 def with_damping(parameters: MachineParameters, damping: FloatArray) -> MachineParameters:
     """Return the machine with C_L and C_T on every axis of its gasket. [N s/m, N m s/rad]"""
-    factors = load_factors(GASKET_FACTORS)
+    entries = gasket_entries()
     numbers = zip(UNKNOWNS, damping, strict=True)
     return with_values(
-        parameters, {key: float(value) for name, value in numbers for key in factors[name].keys}
+        parameters, {key: float(value) for name, value in numbers for key in entries[name].keys}
     )
 
 
