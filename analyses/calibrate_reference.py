@@ -51,7 +51,7 @@ HELD_OUT = (("counter",), ("middle",), ("back", "front"))
 """Loads that are held out together, one group per prediction."""
 
 PLAN = SearchPlan(starts=1, iterations=1, deviation=0.04)
-"""The start of the free file is the end of a wide search; it is only evaluated."""
+"""The start of the vary file is the end of a wide search; it is only evaluated."""
 
 DEVIATIONS = {
     "effect": 0.03,

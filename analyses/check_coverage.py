@@ -79,7 +79,7 @@ def main() -> None:
 
 
 def _few(free: VaryFile) -> VaryFile:
-    """Return a free file of `QUANTITIES`, each searched from its expected value."""
+    """Return a vary file of `QUANTITIES`, each searched from its expected value."""
     quantities = {name: free.vary[name].model_copy(update={"start": None}) for name in QUANTITIES}
     return VaryFile(vary=quantities)
 

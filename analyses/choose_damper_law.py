@@ -113,7 +113,7 @@ def quantity_of(name: str) -> dict[str, Any]:
 
 
 def free_tree_of(law: str) -> dict[str, Any]:
-    """Return the free file of the reference machine with the numbers of a law, as a tree."""
+    """Return the vary file of the reference machine with the numbers of a law, as a tree."""
     tree: dict[str, Any] = read_yaml(FREE)
     quantities = tree["vary"]
     del quantities[VELOCITY]

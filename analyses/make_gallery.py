@@ -35,7 +35,7 @@ PLOTS = "plots.json"
 """File beside the pictures with the titles of the plots of each page."""
 
 FREE = """\
-quantities:
+vary:
   friction:
     bounds: (10, 60) N
     prior: (30, 10) N

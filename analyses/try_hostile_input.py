@@ -52,7 +52,7 @@ STUDIES = (
 )
 """Studies with a ledger, all that can be resumed, in small sizes; they are killed."""
 
-FREE = """quantities:
+FREE = """vary:
   spring:
     bounds: (1, 20) N/mm
     prior: (7.5, 2) N/mm

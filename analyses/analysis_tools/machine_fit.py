@@ -112,7 +112,7 @@ def shipped_point(parameter_map: ParameterMap) -> FloatArray:
     """Return the free quantities of the shipped machine, with its gasket alike in x and z.
 
     Args:
-        parameter_map: That of a free file of the net. A quantity that the file of the shipped
+        parameter_map: That of a vary file of the net. A quantity that the file of the shipped
             machine does not have is at its expected value, as the numbers of another damper law.
 
     Returns:

@@ -1,8 +1,10 @@
 """Forms that files of numbers that vary had before version 0.3, and the lines to write instead."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+
+from ruamel.yaml.comments import CommentedMap
 
 from wm_drake.errors import InputError, Problem
 from wm_drake.parameters.files import read_yaml, yaml_text
@@ -18,36 +20,39 @@ def check_form(path: Path) -> None:
     """Check that a file of numbers that vary does not have the form of an earlier version.
 
     Raises:
-        InputError: it has; each message has the lines to write instead.
+        InputError: it has; each message has a line to write instead.
     """
     tree = read_yaml(path)
-    problems = [
-        Problem(f"{path}:{tree.lc.key(key)[0] + 1}" if key in tree else str(path), key, message)
-        for key, message in _problems(tree)
-    ]
+    problems = [Problem(f"{path}:{line}", key, message) for line, key, message in _problems(tree)]
     if problems:
         raise InputError(problems)
 
 
-def _problems(tree: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """Yield the key and the message of each old form in a file."""
+def _problems(tree: CommentedMap) -> Iterator[tuple[int, str, str]]:
+    """Yield line, key and message of each old form in a file."""
     for name, kind in RENAMED.items():
         if name in tree:
-            yield name, f"is of {kind} of an earlier version; write 'vary:' in place of '{name}:'"
+            message = f"is of {kind} of an earlier version; write 'vary:' in place of '{name}:'"
+            yield _line(tree, name), name, message
     if "load" in tree:
-        yield "load", f"has another name now; write 'loads: {tree['load']}'"
+        yield _line(tree, "load"), "load", f"has another name now; write 'loads: {tree['load']}'"
     laundry = tree.get("laundry")
-    if isinstance(laundry, Mapping):
-        entries = {f"laundry.{name}": entry for name, entry in laundry.items()}
-        yield "laundry", _moved("is a part of vary now", entries)
-    entries = {n: e for n, e in tree.items() if isinstance(e, Mapping) and {*e} & {*FACTOR}}
-    if entries and "vary" not in tree and all(set(e) <= FACTOR for e in tree.values()):
-        first = next(iter(entries))
-        full = {n: {"low": "50 %", "high": "150 %"} | dict(e) for n, e in entries.items()}
-        yield first, _moved("is of a factor file of an earlier version", full)
+    if isinstance(laundry, CommentedMap):
+        for name, entry in laundry.items():
+            yield _line(laundry, name), "laundry", _moved(f"laundry.{name}", entry)
+    is_entry = [isinstance(e, CommentedMap) and {*e} <= FACTOR for e in tree.values()]
+    if tree and "vary" not in tree and all(is_entry):
+        for name, entry in tree.items():
+            yield _line(tree, name), name, _moved(name, {"low": "50 %", "high": "150 %"} | entry)
 
 
-def _moved(why: str, entries: Mapping[str, Any]) -> str:
-    """Return a message with the lines of entries in the section `vary`."""
-    lines = yaml_text({"vary": {name: dict(entry) for name, entry in entries.items()}})
-    return f"{why}; write these lines:\n{lines.rstrip()}"
+def _line(tree: CommentedMap, key: str) -> int:
+    return int(tree.lc.key(key)[0]) + 1
+
+
+def _moved(name: str, entry: Any) -> str:
+    """Return a message with the line of an entry in the section `vary`."""
+    flow = CommentedMap(entry)
+    flow.fa.set_flow_style()
+    line = yaml_text({name: flow}).strip()
+    return f"is of an earlier version; write below a line 'vary:' the line '  {line}'"

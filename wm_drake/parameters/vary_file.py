@@ -1,4 +1,4 @@
-"""Files of numbers that vary: one file for factors, tolerances, designs and calibrations.
+"""Vary files, of numbers that vary: one file for factors, tolerances, designs and calibrations.
 
 The section `vary` has the numbers. Other sections say what single studies need beside them; a study
 reads those that it uses.
@@ -21,8 +21,8 @@ from wm_drake.parameters.text_files import DATA, ShippedFiles
 from wm_drake.parameters.types import Name
 from wm_drake.parameters.vary import LAUNDRY, Entry, Factors
 
-VARY_FILES = ShippedFiles("file of numbers that vary", DATA / "vary")
-"""Files of numbers that vary of the package."""
+VARY_FILES = ShippedFiles("vary file", DATA / "vary")
+"""Vary files of the package."""
 
 GASKET = "gasket"
 """Shipped file with the eight factors of [B] section 4."""
@@ -150,7 +150,7 @@ class Robust(Frozen):
     """Scatter of a robust design.
 
     Attributes:
-        tolerances: Name of a shipped file of numbers that vary, or path of one.
+        tolerances: Name of a shipped vary file, or path of one.
         samples: Samples of each design, a power of two.
     """
 
@@ -238,7 +238,7 @@ class VaryFile(Frozen):
 
 
 def load_vary(name_or_path: str | Path = GASKET) -> VaryFile:
-    """Read a file of numbers that vary.
+    """Read a vary file.
 
     Args:
         name_or_path: Name of a shipped file or path of a YAML file.

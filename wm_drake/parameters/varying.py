@@ -94,7 +94,7 @@ class Varied:
         missing = [name for name in names if name not in self.at]
         if missing:
             lines = " and ".join(f"'{name}: {self._example(name)}'" for name in missing)
-            message = f"{study} needs {' and '.join(names)}; add {lines}"
+            message = f"{study} needs {' and '.join(missing)}; add {lines}"
             raise input_error(message, key=self.name)
         return [self.at[name] for name in names]
 
@@ -262,9 +262,9 @@ class Varying:
         for varied in self.every:
             try:
                 for value in varied.needed("low", "high", study=study):
-                    with_values(self.machine, varied.changes(value))
                     slopes = [n for n in varied.numbers if n.is_table and n.takes_numbers]
                     with_values(self.machine, {n.key: n.si(varied.change, value) for n in slopes})
+                    with_values(self.machine, varied.changes(value))
             except InputError as error:
                 problems += _of_entry(varied.name, error)
         if problems:

@@ -18,7 +18,7 @@ class CalibrateOptions(CompareOptions):
         "argument",
     )
     vary: str | None = option(
-        None, "File of numbers that vary, with bounds and priors: a YAML file.", "FILE"
+        None, "Vary file: the numbers to find, with bounds and priors.", "FILE"
     )
     unknown: tuple[str, ...] = option(
         (),

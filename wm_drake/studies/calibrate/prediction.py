@@ -127,7 +127,7 @@ def predict(
 ) -> list[Prediction]:
     """Repeat a calibration once for each group of held-out loads.
 
-    These searches start at or around the expected values. The start values of the free file are not
+    These searches start at or around the expected values. The start values of the vary file are not
     used, because they may come from a calibration with all loads.
 
     Args:

@@ -80,7 +80,7 @@ KEPT_RUNS, KEPT_COLUMNS = 40, 1500
 
 
 class FreeNumbers(Protocol):
-    """Unknown numbers of a machine: keys with ranges, or the quantities of a free file."""
+    """Unknown numbers of a machine: keys with ranges, or the quantities of a vary file."""
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:

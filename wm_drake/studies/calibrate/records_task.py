@@ -137,7 +137,7 @@ def _by_load(options: CalibrateOptions) -> dict[str | None, tuple[Path, ...]]:
 
 
 def _free_numbers(options: CalibrateOptions, machine: Machine) -> FreeNumbers:
-    """Return the unknowns of `--unknown`, or those of a file of numbers that vary."""
+    """Return the unknowns of `--unknown`, or those of a vary file."""
     if bool(options.unknown) == (options.vary is not None):
         raise input_error(
             "records need either --unknown NAME[=VALUES] or --vary FILE", where="--unknown"

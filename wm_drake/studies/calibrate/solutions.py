@@ -23,7 +23,7 @@ DISTINCT = 0.5
 
 @dataclass(frozen=True)
 class FreeQuantities:
-    """Quantities of a free file as the unknowns of a fit to recordings."""
+    """Quantities of a vary file as the unknowns of a fit to recordings."""
 
     parameter_map: ParameterMap
 

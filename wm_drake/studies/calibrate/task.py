@@ -53,7 +53,7 @@ class CalibrateTask(Task):
     """A calibration to targets with checked options."""
 
     def __init__(self, options: CalibrateOptions, machine: Machine) -> None:
-        """Read targets and free file, and check the settings of the searches.
+        """Read targets and vary file, and check the settings of the searches.
 
         Raises:
             InputError: an option or a file is wrong.
@@ -62,7 +62,7 @@ class CalibrateTask(Task):
             if name in options.model_fields_set:
                 raise input_error("is about records, and none is given", where=f"--{name}")
         if options.vary is None:
-            raise input_error("is missing; name a file of numbers that vary", where="--vary")
+            raise input_error("is missing; name a vary file", where="--vary")
         self.options, self.held_out = options, _groups(options.leave_out)
         measured = with_measured(machine.parameters, options.targets, "--targets")
         deviations = _fractions(options.deviation, "--deviation")

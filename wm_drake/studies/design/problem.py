@@ -102,7 +102,7 @@ class DesignGoal:
     """An objective or a constraint with what it is computed from.
 
     Attributes:
-        given: As in the design file.
+        given: As in the vary file.
         response: Response of the runs; None if it is a number of the machine.
         unit: Unit.
         limit: Limit of a constraint. [SI] NaN for an objective.

@@ -39,8 +39,7 @@ class GasketOptions(Options):
     )
     vary: str | None = option(
         None,
-        "Shipped file of numbers that vary, or a YAML file: its entries are the factors. Default: "
-        "gasket.",
+        "Shipped vary file, or a YAML file: its entries are the factors. Default: gasket.",
         "NAME|FILE",
     )
     response: tuple[str, ...] = option(

@@ -45,7 +45,7 @@ class Knowledge:
 
 
 def of_file(machine: Machine, name: str) -> Knowledge:
-    """Return what the distributions of a file of numbers that vary say.
+    """Return what the distributions of a vary file say.
 
     Laundry and loads are drawn at each run and not measured, so they are left out.
 
@@ -97,7 +97,7 @@ def of_calibration_folder(machine: Machine, name: str, folder: Path) -> Knowledg
     """Return what the results of `wm-drake calibrate` in a folder say.
 
     Args:
-        name: Name or path of the file of numbers that vary of the calibration.
+        name: Name or path of the vary file of the calibration.
 
     Raises:
         InputError: the folder has no such results, or other numbers than the file.

@@ -13,8 +13,8 @@ class NextOptions(Options):
     )
     vary: str | None = option(
         None,
-        "What is known: distributions of a shipped file of numbers that vary, or of a YAML file. "
-        "Default: unmeasured, which fits any machine.",
+        "What is known: the distributions of a shipped vary file, or of a YAML file. Default: "
+        "unmeasured, which fits any machine.",
         "NAME|FILE",
     )
     calibrated: Path | None = option(

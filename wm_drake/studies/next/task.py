@@ -35,7 +35,7 @@ FEW, BLOCK_BUDGET = 32, 2
 """Drawn machines and measurements of the block for another page."""
 
 UNMEASURED = "unmeasured"
-"""Shipped file of numbers that vary: what is known of any machine."""
+"""Shipped vary file: what is known of any machine."""
 
 
 class NextTask(Task):
@@ -134,7 +134,7 @@ def knowledge_of(options: NextOptions, machine: Machine) -> Knowledge:
     if options.calibrated is None:
         return of_file(machine, options.vary or UNMEASURED)
     if options.vary is None:
-        message = "needs the file of numbers that vary of the calibration; add --vary FILE"
+        message = "needs the vary file of the calibration; add --vary FILE"
         raise input_error(message, where="--calibrated")
     return of_calibration_folder(machine, options.vary, options.calibrated)
 

@@ -146,7 +146,7 @@ class ToleranceTrials:
 
     Attributes:
         chosen: What is measured of each run.
-        about: Description in the tolerance file.
+        about: Description in the vary file.
     """
 
     uncertain: UncertainMachine
