@@ -27,12 +27,13 @@ from wm_drake.parameters.recorded_sensors import RecordedSensor, RecordedTest, r
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.records import Record
+from wm_drake.studies.calibrate.blocks import calibrated
 from wm_drake.studies.calibrate.recorded import RecordedLoad, without_edges
-from wm_drake.studies.calibrate.records import GAIN_SD, TILT_SD, RecordModel, calibrated
+from wm_drake.studies.calibrate.records import GAIN_SD, TILT_SD, RecordModel
 from wm_drake.studies.compare.pairs import paired, predicted_signals
 from wm_drake.studies.compare.recordings import TestRecording
 from wm_drake.studies.experiment import Experiment, record_here
-from wm_drake.studies.fitting.sought import SoughtNumbers, sought_of
+from wm_drake.studies.fitting.sought import SoughtNumbers, sought_in
 from wm_drake.studies.tolerance.shares import share_of
 
 UNKNOWNS = ("damper_types.friction.friction_force", "loads.middle.unbalances.0.mass")
@@ -89,7 +90,7 @@ def _line(name: str, rows: pd.DataFrame) -> str:
 def _found(machine: Machine, seed: int, by: Any) -> FloatArray:
     """Return for each unknown whether its interval holds the planted value, error, half-width."""
     parameters, generator = machine.parameters, np.random.default_rng(seed)
-    sought = tuple(sought_of(parameters, [name]) for name in UNKNOWNS)
+    sought = sought_in(parameters, UNKNOWNS)
     truth = np.array([s.guess for s in sought]) * np.exp(generator.uniform(-SPAN, SPAN, 2))
     planted = with_values(parameters, dict(zip(UNKNOWNS, truth.tolist(), strict=True)))
     sensors = {name: recorded_test_of(parameters).sensors[name] for name in SENSORS}
@@ -101,7 +102,7 @@ def _found(machine: Machine, seed: int, by: Any) -> FloatArray:
     pairs = tuple(without_edges(paired(r, run, predicted, test)) for r in recordings)
     load = RecordedLoad("middle", lambda changed: changed.loads["middle"], pairs)
     free = SoughtNumbers(parameters, sought, "calibrated")
-    model = RecordModel(Experiment(machine, ()), free, (load,), sensors, places, by)
+    model = RecordModel(Experiment(machine, ()), free, sensors, (load,), places, by)
     fit, _ = calibrated(model, seed, starts=1)
     return np.array(
         [

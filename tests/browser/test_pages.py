@@ -59,7 +59,7 @@ def screening(machine):
         more = {name: 1.2 * values for name, values in one.items()}
         return runs_of({"middle": one, "counter": more}, quantities)
 
-    names = tuple(factors.names)
+    names = factors.names
     design = make_design("d-optimal", names, trials=200, model="main+2fi", seed=1)
     return run_screening(design, evaluate), trials
 

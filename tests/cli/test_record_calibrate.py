@@ -232,7 +232,7 @@ def test_options_that_do_not_fit_records_are_refused(calibrate, words, message):
     ("words", "message"),
     [
         (("--vary", "free.yaml", "--by", "order"), "--by: is about records"),
-        ((), "--free: is missing"),
+        ((), "--vary: is missing"),
     ],
 )
 def test_options_that_do_not_fit_targets_are_refused(wm_drake, words, message):

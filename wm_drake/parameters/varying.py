@@ -211,9 +211,9 @@ class Varying:
     sums: tuple[Sum, ...] = ()
 
     @property
-    def names(self) -> list[str]:
+    def names(self) -> tuple[str, ...]:
         """Names of the numbers that vary."""
-        return [varied.name for varied in self.every]
+        return tuple(varied.name for varied in self.every)
 
     @property
     def keys(self) -> list[str]:

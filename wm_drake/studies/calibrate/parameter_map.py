@@ -77,7 +77,7 @@ class ParameterMap:
     @property
     def names(self) -> list[str]:
         """Names of the numbers."""
-        return self.varying.names
+        return list(self.varying.names)
 
     @property
     def lower(self) -> FloatArray:

@@ -23,6 +23,9 @@ from wm_drake.studies.doe.design import Design
 from wm_drake.studies.experiment import Experiment, Simulate, responses
 from wm_drake.studies.gasket.screening import VALUE, runs_of
 
+DEFAULT_LEVELS = "50 %..150 %"
+"""Levels of a factor that is named without any: those of [B]."""
+
 LOADS = ("middle", "counter")
 """Loads of [B] section 4."""
 
@@ -66,6 +69,15 @@ class GasketTrials:
     def measures(self) -> tuple[str, ...]:
         """Measures of each run, as for `simulate_many`."""
         return measures_of(self.parameters, self.chosen)
+
+    def experiment(self, simulate: Simulate) -> Experiment:
+        """Return the runs of the machine with the loads.
+
+        Args:
+            simulate: Function that runs cases.
+        """
+        machine = build_machine(self.parameters)
+        return Experiment(machine, self.measures, simulate, tuple(self.loads))
 
     def responses(self, design: Design, experiment: Experiment) -> xr.Dataset:
         """Run all trials and return their responses, as of `screening.runs_of`.

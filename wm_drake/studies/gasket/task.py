@@ -8,7 +8,6 @@ from typing import Any
 import xarray as xr
 
 from wm_drake.errors import check_known, input_error, nearest_names, problems_at
-from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import PublishedResults, published_results
 from wm_drake.parameters.vary import entries_of_texts
@@ -34,7 +33,7 @@ from wm_drake.studies.gasket.screening import (
     published_for,
     run_screening,
 )
-from wm_drake.studies.gasket.study import GasketTrials, run_level_zero
+from wm_drake.studies.gasket.study import DEFAULT_LEVELS, GasketTrials, run_level_zero
 from wm_drake.studies.gasket.surface import Setting, models_of, run_settings
 from wm_drake.studies.gasket.words import Words
 from wm_drake.studies.inputs import existing_file, pairs_of, selected_cases
@@ -53,7 +52,7 @@ class GasketTask(Task):
         factors = _factors(machine, options)
         self.parameters = factors.machine
         self.settings = [_setting(factors, text) for text in options.check]
-        self.design = _design(options, tuple(factors.names))
+        self.design = _design(options, factors.names)
         check_degrees_of_freedom(self.design)
         self.cases = selected_cases(self.parameters, options.load, True, options.profile)
         with problems_at("--response", ""):
@@ -99,8 +98,7 @@ class GasketTask(Task):
 
     def run(self, executor: Executor) -> Answer:
         """Run the trials, level 0 with each treatment of tables, and the settings to check."""
-        trials, machine = self.trials, build_machine(self.trials.parameters)
-        experiment = Experiment(machine, trials.measures, executor.simulate, tuple(self.cases))
+        trials, experiment = self.trials, self.trials.experiment(executor.simulate)
         with executor.progress(self.design.trials * len(self.cases)):
             screening = run_screening(self.design, lambda d: trials.responses(d, experiment))
         models = models_of(screening)
@@ -197,7 +195,7 @@ def _factors(machine: Machine, options: GasketOptions) -> Varying:
         with in_vary_file(path, file):
             factors = varying_of(machine, known, file.known, tables=treatment)
             return factors.with_levels("a factor")
-    entries = entries_of_texts(named, known, "--factor", "50 %..150 %")
+    entries = entries_of_texts(named, known, "--factor", DEFAULT_LEVELS)
     with problems_at("--factor"):
         return varying_of(machine, entries, tables=treatment).with_levels("a factor")
 

@@ -68,7 +68,7 @@ def of_file(machine: Machine, name: str) -> Knowledge:
         varying = varying_of(machine, entries, file.known)
         joint = joint_of(varying, file.correlations)
     built = build_machine(varying.machine)
-    return Knowledge(built, tuple(varying.names), joint.values, varying.machine_at, path.stem)
+    return Knowledge(built, varying.names, joint.values, varying.machine_at, path.stem)
 
 
 def of_calibration(

@@ -232,7 +232,7 @@ def distribution_text(varied: Varied) -> str:
     return f"{kind}, {varied.reading('mean')} ± {varied.reading('deviation')}{truncated}"
 
 
-def _correlation_factor(given: Correlations | None, names: list[str]) -> FloatArray | None:
+def _correlation_factor(given: Correlations | None, names: Sequence[str]) -> FloatArray | None:
     """Return the Cholesky factor of the correlations of all numbers; None without any."""
     if given is None:
         return None
