@@ -178,7 +178,7 @@ def test_number_of_the_sdf_varies_around_its_value(machine):
     (varied,) = varying_of(
         machine, entries_of_texts(["bodies.motor.mass"], {}, "", "90 %..110 %")
     ).every
-    body = machine.plant.GetBodyByName("motor").default_mass()
+    body = machine.drawn.plant.GetBodyByName("motor").default_mass()
     assert varied.first_levels == pytest.approx([0.9 * body, body, 1.1 * body])
 
 

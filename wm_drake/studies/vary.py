@@ -74,7 +74,7 @@ def varying_of(
     for name, entry in entries.items():
         keys = tuple(dict.fromkeys(k for key in entry.keys for k in keys_like(machine, key)))
         try:
-            changed = with_sdf_values(machine.plant, changed, [*keys, *entry.sets])
+            changed = with_sdf_values(machine.drawn.plant, changed, [*keys, *entry.sets])
             changed, draws = _draws(changed, name, entry, keys)
             for draw, of_draw in draws.items():
                 if entry.sets or (of_draw := _that_vary(changed, draw, of_draw, entry)):
@@ -85,7 +85,7 @@ def varying_of(
         raise InputError(problems)
     fixed = dict(known or {})
     named = [key for number in fixed.values() for key in number.sets]
-    return varying(with_sdf_values(machine.plant, changed, named), full, fixed, tables)
+    return varying(with_sdf_values(machine.drawn.plant, changed, named), full, fixed, tables)
 
 
 def _draws(

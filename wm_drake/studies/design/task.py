@@ -45,17 +45,15 @@ class DesignTask(Task):
     def _designs(self, machine: Machine) -> tuple[Machine, MachineDesigns]:
         """Return the built machine and its designs."""
         file, options = self.file, self.options
-        full = with_sdf_values(machine.plant, machine.parameters, _other_keys(file))
+        full = with_sdf_values(machine.drawn.plant, machine.parameters, _other_keys(file))
         varying = varying_of(machine, file.entries(), file.known, parameters=full)
         if file.robust is None:
             check_loads(file, full)
             cases = selected_cases(full, list(file.loads), True, options.profile)
             return build_machine(varying.machine), machine_designs(varying, file, cases)
-        path, tolerances = (
-            VARY_FILES.path(file.robust.tolerances),
-            load_vary(file.robust.tolerances),
-        )
-        with in_vary_file(path, tolerances):
+        name = file.robust.tolerances
+        tolerances = load_vary(name)
+        with in_vary_file(VARY_FILES.path(name), tolerances):
             case = sampled_case(full, tolerances, profile_of(full, options.profile))
             scattered = _scattered(machine, tolerances, case)
             uncertain = scattered(varying.machine)
