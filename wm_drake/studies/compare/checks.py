@@ -30,6 +30,9 @@ CONTRADICTION = 0.05
 RATIOS = (1.0, 1 / 4, 1 / 3, 1 / 2, 2 / 3, 3 / 2, 2.0, 3.0, 4.0)
 """Ratios of the true drum speed to the recorded one that are tried."""
 
+UPSIDE_DOWN = 1.5
+"""Difference of a mean, by gravity, above which gravity has the other sign: 2, not 1 or 0."""
+
 LARGER = 2.0
 """Smallest ratio of the amplitude of another order to that of order 1 that tells another ratio."""
 
@@ -175,7 +178,8 @@ def judged(diagnosis: Diagnosis, pair: Pair) -> str:
     if not (diagnosis.unlike or diagnosis.shifted):
         return ""
     path = pair.recording.path
-    if diagnosis.unlike and diagnosis.explanations:
+    is_upside_down = max(diagnosis.means.values(), default=0.0) > UPSIDE_DOWN
+    if (diagnosis.unlike or is_upside_down) and diagnosis.explanations:
         raise input_error(diagnosis.text, where=str(path))
     if float(np.abs(order_one(pair).correlation.values).max(initial=0.0)) < LEAST_CORRELATION:
         raise input_error(f"no signal is like its prediction; it {diagnosis.text}", where=str(path))
