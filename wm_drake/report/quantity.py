@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import PureNumber, Unit
-from wm_drake.report.formatting import MISSING, number, significant
+from wm_drake.parameters.units import PureNumber, Share, Unit
+from wm_drake.report.formatting import MISSING, number, signed, significant
 
 if TYPE_CHECKING:  # slow to import, and not needed for declarations
     import xarray as xr
@@ -75,9 +75,10 @@ class Quantity:
         text = self.reading.shown.replace("*", "").replace("/", "_per_").replace("%", "percent")
         return f"_{text.replace('^', '')}" if text else ""
 
-    def named(self, words: str) -> "Quantity":
-        """Return the same quantity with other words."""
-        return replace(self, words=words)
+    def named(self, words: str, **digits: Any) -> "Quantity":
+        """Return the same quantity with other words, and with other `decimals` or `form`."""
+        plain = {"decimals": None, "form": None} if digits else {}
+        return replace(self, words=words, **{**plain, **digits})
 
     def values(self, array: Any) -> FloatArray:
         """Return SI values in the unit for reading."""
@@ -228,3 +229,6 @@ def text_of(array: "xr.DataArray") -> str:
 SPEED = Quantity("drum speed", Unit("rad/s", "rpm"), 0)
 TIME = Quantity("time", Unit("s", "s"), 2)
 STEP = Quantity("step", Unit("s", "ms"), form="{:g}".format)
+MASS = Quantity("mass", Unit("kg", "kg"))
+SHARE = Quantity("share", Share(), 0)
+CHANGE = Quantity("change", Share(), form=signed)

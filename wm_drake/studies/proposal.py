@@ -20,9 +20,8 @@ import numpy as np
 import xarray as xr
 
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Share
-from wm_drake.report.formatting import signed, three_digits
-from wm_drake.report.quantity import Quantity
+from wm_drake.report.formatting import three_digits
+from wm_drake.report.quantity import CHANGE, Quantity
 from wm_drake.simulation.measures.kind import Better
 from wm_drake.simulation.measures.responses import GAP
 
@@ -138,9 +137,6 @@ class Aim:
 
 BEFORE, AFTER = "before", "after"
 """Labels of runs of the machine as it is, and with the proposed change."""
-
-CHANGE = Quantity("change", Share(), form=signed)
-SHARE = Quantity("share", Share(), 0)
 
 
 def compared(values: xr.DataArray, goals: Mapping[str, Better]) -> xr.Dataset:

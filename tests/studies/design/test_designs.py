@@ -26,7 +26,7 @@ from wm_drake.studies.design.study import (
     summary_of,
 )
 from wm_drake.studies.experiment import Experiment
-from wm_drake.studies.study import Facts
+from wm_drake.studies.facts import Facts
 from wm_drake.studies.tolerance.distributions import base_samples
 from wm_drake.studies.tolerance.variables import uncertain_machine
 

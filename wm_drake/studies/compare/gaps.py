@@ -8,8 +8,7 @@ import xarray as xr
 from wm_drake.model.scene import Scene
 from wm_drake.parameters.recorded_sensors import RecordedSensor
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Unit
-from wm_drake.report.quantity import SPEED, TIME, Quantity
+from wm_drake.report.quantity import SPEED, TIME, of_measure
 from wm_drake.simulation.recorded_signal import sensor_axis
 from wm_drake.simulation.vibration import tub_motion_of
 from wm_drake.studies.compare.pairs import Pair
@@ -20,7 +19,7 @@ LEAST_RANK = 5
 SMALLEST_PART = 1e-2
 """Singular value of a motion, by the largest one, below which the sensors do not tell it."""
 
-GAP = Quantity("smallest gap", Unit("m", "mm"), 1)
+GAP = of_measure("smallest_gap")
 
 
 def gaps_of(

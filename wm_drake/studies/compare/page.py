@@ -8,10 +8,10 @@ import xarray as xr
 
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.recorded_sensors import RecordedSensor
-from wm_drake.parameters.units import Share, Unit
+from wm_drake.parameters.units import Unit
 from wm_drake.report import figure as fig
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import SPEED, TIME, Quantity, quantity_of, shown, text_of
+from wm_drake.report.quantity import SHARE, SPEED, TIME, Quantity, quantity_of, shown, text_of
 from wm_drake.simulation.displacements import band_of
 from wm_drake.simulation.netcdf import netcdf_bytes
 from wm_drake.studies.answer import Answer, Part, Plot, pictures_first
@@ -84,9 +84,6 @@ METHOD = (
     "with the same gaps. An amplitude is the smooth envelope of the filtered signal, the magnitude "
     "of its analytic signal, as in fits to records; noise hardly changes it."
 )
-
-
-SHARE = Quantity("", Share(), 0)
 
 
 def within_text(count: int) -> str:

@@ -20,7 +20,7 @@ from wm_drake.model.machine import Machine, Setup
 from wm_drake.model.scene import Scene
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
-from wm_drake.report.quantity import SPEED, TIME, Quantity
+from wm_drake.report.quantity import MASS, SPEED, TIME, Quantity, of_measure
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.feet import foot_loads
 from wm_drake.simulation.mounts import mount_wrenches
@@ -35,10 +35,10 @@ SHORTEST = 0.75
 WINDOWS_OF_PIECE = 20
 """Windows that are computed at a time: some MB of samples."""
 
-MASS = Quantity("mass of the load", Unit("kg", "kg"), 2)
+OF_LOAD = MASS.named("mass of the load", decimals=2)
 UNBALANCE = Quantity("unbalance", Unit("kg*m", "g*m"), 0)
 AMPLITUDE = Quantity("amplitude", Unit("m", "mm"), 1)
-GAP = Quantity("smallest gap", Unit("m", "mm"), 1)
+GAP = of_measure("smallest_gap")
 FOOT = Quantity("load of a foot", Unit("N", "N"), 0)
 SLIDING = Quantity("horizontal force on the floor", Unit("N", "N"), 0)
 
@@ -66,7 +66,7 @@ class WindowExtremes:
         masses = self._masses(whole)[self.rows - 1 :: self.rows]
         values = {
             "drum_speed": SPEED.variable("time", self._windows(whole.state[:, 13]).mean(axis=1)),
-            "mass": MASS.variable("time", masses.sum(axis=1)),
+            "mass": OF_LOAD.variable("time", masses.sum(axis=1)),
             "unbalance": UNBALANCE.variable("time", unbalance_of(setup, masses)),
             "amplitude": AMPLITUDE.variable(
                 ("time", "sensor"), 0.5 * np.ptp(self._windows(displacement), axis=1)
@@ -178,7 +178,7 @@ def _ahead(pieces: Iterator[Trajectory]) -> Iterator[Trajectory]:
 
 OF_PART: dict[str, tuple[Quantity, Callable[[FloatArray], float]]] = {
     "drum_speed": (SPEED.named("highest speed"), lambda values: np.abs(values).max()),
-    "mass": (MASS.named("mass at the end"), lambda values: values[-1]),
+    "mass": (OF_LOAD.named("mass at the end"), lambda values: values[-1]),
     "unbalance": (UNBALANCE.named("unbalance at the end"), lambda values: values[-1]),
     "amplitude": (AMPLITUDE.named("largest amplitude"), np.max),
     "gap": (GAP, np.min),

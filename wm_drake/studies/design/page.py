@@ -11,7 +11,7 @@ from wm_drake.parameters import machine_yaml
 from wm_drake.report.formatting import listed
 from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.page import as_json, fragment, picture
-from wm_drake.report.quantity import quantity_of, shown, text_of
+from wm_drake.report.quantity import SHARE, quantity_of, shown, text_of
 from wm_drake.simulation.measures.responses import GAP
 from wm_drake.studies.answer import Answer, Part, Plot
 from wm_drake.studies.design.figures import (
@@ -25,7 +25,7 @@ from wm_drake.studies.design.figures import (
 )
 from wm_drake.studies.design.problem import MachineDesigns
 from wm_drake.studies.design.study import FRESH, PROPOSED, design_proposal
-from wm_drake.studies.proposal import MOST_LOSS, SHARE
+from wm_drake.studies.proposal import MOST_LOSS
 from wm_drake.studies.proposal_page import proposal_part
 
 

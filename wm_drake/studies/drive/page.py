@@ -6,10 +6,9 @@ import numpy as np
 import xarray as xr
 
 from wm_drake.parameters import MachineParameters, SpinProfile
-from wm_drake.parameters.units import Unit
 from wm_drake.report import figure as fig
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import SPEED, Quantity, quantity_of, shown, text_of
+from wm_drake.report.quantity import SHARE, SPEED, quantity_of, shown, text_of
 from wm_drake.studies.answer import Answer, Part, Plot
 from wm_drake.studies.drive.study import (
     PASSES,
@@ -19,8 +18,6 @@ from wm_drake.studies.drive.study import (
     estimation_errors,
     motor_with_limit,
 )
-
-SHARE = Quantity("share", Unit("", "%"), 0)
 
 
 def drive_answer(

@@ -7,16 +7,16 @@ import xarray as xr
 
 from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import CONSEQUENCE, listed
-from wm_drake.report.quantity import Quantity, quantity_of, text_of
+from wm_drake.report.quantity import CHANGE, SHARE, Quantity, quantity_of, text_of
 from wm_drake.simulation.measures.responses import GAP
 from wm_drake.studies.doe.design import Design
 from wm_drake.studies.gasket.screening import (
+    CONTRIBUTION,
     FAR,
     LEADING_INTERACTION,
     LEADING_MAIN,
     LEAST_PREDICTED_R2,
     PREDICTED_R2,
-    SHARE,
     Label,
     at,
     compared_terms,
@@ -32,8 +32,6 @@ from wm_drake.studies.gasket.screening import (
 )
 from wm_drake.studies.gasket.study import DIFFERENCE
 from wm_drake.studies.gasket.words import Words
-from wm_drake.studies.proposal import CHANGE
-from wm_drake.studies.proposal import SHARE as WHOLE
 
 MOST_NAMED = 6
 """Largest number of results that a sentence names."""
@@ -115,7 +113,7 @@ def why_text(screening: xr.Dataset, proposal: xr.Dataset, words: Words) -> str:
     texts = []
     if large:
         texts.append(
-            f"{listed([f'{one.term.item()} has {WHOLE.text(one)}' for one in large])} {of_what}"
+            f"{listed([f'{one.term.item()} has {SHARE.text(one)}' for one in large])} {of_what}"
         )
     if small:
         verb = "helps" if len(small) == 1 else "help"
@@ -169,7 +167,7 @@ def _against_published(screening: xr.Dataset, words: Words, published: xr.Datase
         named = [f"{_of(label, words)} ({CHANGE.text(at(means, label))})" for label in ranked]
         texts.append(
             f"Means beside the published ones: {len(far)} of {len(known)} differ by more than "
-            f"{WHOLE.text(FAR)}{_listed(named)}."
+            f"{SHARE.text(FAR)}{_listed(named)}."
         )
     compared = compared_terms(published)
     return [*texts, *_against_terms(screening, words, published)] if compared.any() else texts
@@ -185,8 +183,8 @@ def _against_terms(screening: xr.Dataset, words: Words, published: xr.Dataset) -
     if of_mains.notnull().any():
         texts.append(
             "Contributions of main effects differ from the published ones by "
-            f"{SHARE.text(of_mains.mean())} of the variance in the mean and by "
-            f"{WHOLE.text(of_mains.max())} at most."
+            f"{CONTRIBUTION.text(of_mains.mean())} of the variance in the mean and by "
+            f"{SHARE.text(of_mains.max())} at most."
         )
     signs = sign_differs(screening, published)
     other = [
@@ -212,7 +210,7 @@ def _against_terms(screening: xr.Dataset, words: Words, published: xr.Dataset) -
     return [
         *texts,
         f"Contributions beside the published ones: {len(far)} differ by more than "
-        f"{WHOLE.text(FAR)} of the variance{_listed(named)}.",
+        f"{SHARE.text(FAR)} of the variance{_listed(named)}.",
     ]
 
 
@@ -286,7 +284,7 @@ def _quality(screening: xr.Dataset, words: Words) -> str:
     if design.is_complete and design.residual_df < 1:
         return f"{model} has a coefficient for each of the trials, so it meets them exactly."
     if design.is_complete:
-        left = SHARE.text(screening.unexplained.max().fillna(0.0))
+        left = CONTRIBUTION.text(screening.unexplained.max().fillna(0.0))
         return f"{model} leaves at most {left} of the variance of a response over all combinations."
     known = [label for label in labels_of(screening) if at(r2, label).notnull()]
     if not known:
@@ -386,12 +384,12 @@ def _driver_sentence(of_label: xr.Dataset, words: Words) -> str:
     terms = leading(of_label)
     if not terms:
         return (
-            f"{opening} has no leading term: no main effect exceeds {WHOLE.text(LEADING_MAIN)} and "
-            f"no interaction exceeds {WHOLE.text(LEADING_INTERACTION)}."
+            f"{opening} has no leading term: no main effect exceeds {SHARE.text(LEADING_MAIN)} and "
+            f"no interaction exceeds {SHARE.text(LEADING_INTERACTION)}."
         )
     of_factors = [_effect_text(of_label, term, words) for term in terms if ":" not in term]
     joint = [
-        f"{words.term(term)} ({WHOLE.text(of_label.share.sel(term=term))})"
+        f"{words.term(term)} ({SHARE.text(of_label.share.sel(term=term))})"
         for term in terms
         if ":" in term
     ]
@@ -401,7 +399,7 @@ def _driver_sentence(of_label: xr.Dataset, words: Words) -> str:
 
 
 def _effect_text(of_label: xr.Dataset, factor: str, words: Words) -> str:
-    share = WHOLE.text(of_label.share.sel(term=factor))
+    share = SHARE.text(of_label.share.sel(term=factor))
     effect = of_label.effect.sel(term=factor, other_level="")
     (low, middle, high), text = effect.values, quantity_of(effect).text
     name = words.factor(factor)

@@ -14,7 +14,7 @@ from wm_drake.report.formatting import listed
 from wm_drake.report.interactive import packed
 from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.page import as_json, fragment
-from wm_drake.report.quantity import shown
+from wm_drake.report.quantity import SHARE, shown
 from wm_drake.simulation.measures.responses import GAP
 from wm_drake.studies.answer import Answer, Part, Plot
 from wm_drake.studies.gasket import figures, tables
@@ -31,7 +31,6 @@ from wm_drake.studies.gasket.findings import (
 from wm_drake.studies.gasket.screening import is_main
 from wm_drake.studies.gasket.study import GasketTrials
 from wm_drake.studies.gasket.words import Words
-from wm_drake.studies.proposal import SHARE as WHOLE
 from wm_drake.studies.proposal_page import gaps_text, proposal_part
 
 LEAST_EFFICIENCY = 80.0
@@ -320,7 +319,7 @@ def _heat_maps(screening: xr.Dataset, words: Words) -> list[Plot]:
     caption = (
         "Contribution of each term to the variance of each response, in percent: main effects "
         "above, interactions below. The symbols of the responses are explained under Run details. "
-        f"Terms that contribute less than {WHOLE.text(figures.SMALLEST_SHARE)} to every response "
+        f"Terms that contribute less than {SHARE.text(figures.SMALLEST_SHARE)} to every response "
         "are not shown. The colour scale follows the square root of the percentage."
     )
     loads = screening["load"].values.tolist()

@@ -13,10 +13,9 @@ import xarray as xr
 from wm_drake.parameters import GASKET_FACTORS, FactorLevels, MachineParameters, load_factors
 from wm_drake.parameters.elements import CurveTable
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Share
 from wm_drake.parameters.variation import number_at
 from wm_drake.report.formatting import significant
-from wm_drake.report.quantity import Quantity
+from wm_drake.report.quantity import SHARE
 from wm_drake.simulation.measures.kind import Better
 from wm_drake.studies.gasket.surface import Setting, model_rows
 from wm_drake.studies.proposal import AFTER, BEFORE, Aim, worst_of
@@ -26,8 +25,6 @@ MOST_GRID = 20_000
 
 CLIMBERS = 4
 """Number of the best level combinations from which single factors are moved."""
-
-PERCENT = Quantity("", Share(), 0)
 
 
 def goals_of(screening: xr.Dataset) -> dict[str, Better]:
@@ -123,7 +120,7 @@ def text_at(machine: MachineParameters, factor: FactorLevels, place: float) -> t
     number, value = number_at(machine, key), float(np.interp(place, (-1.0, 0.0, 1.0), numbers))
     if isinstance(number.original, CurveTable):
         assert number.nominal
-        text = PERCENT.text(value / number.nominal)
+        text = SHARE.text(value / number.nominal)
     else:
         unit = number.unit.for_reader
         text = f"{significant(unit.from_si(value), 3)} {unit.shown}".replace("−", "-")

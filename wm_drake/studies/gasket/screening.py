@@ -28,9 +28,9 @@ from wm_drake.errors import input_error
 from wm_drake.parameters import PublishedResults, PublishedTerm
 from wm_drake.parameters.published import CONSTANT, INTERACTIONS, MAIN, RANGE
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Share, Unit
+from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import number, three_digits
-from wm_drake.report.quantity import Quantity
+from wm_drake.report.quantity import SHARE, Quantity
 from wm_drake.simulation.measures.kind import Better
 from wm_drake.studies.doe.anova import AnovaTable, Term, anova
 from wm_drake.studies.doe.coding import LEVELS, efficiency
@@ -67,7 +67,7 @@ def r2_text(r2: float) -> str:
 
 VALUE = Quantity("run", form=three_digits)
 MEAN = Quantity("mean", form=three_digits)
-SHARE = Quantity("contribution", Share(), 1)
+CONTRIBUTION = SHARE.named("contribution", decimals=1)
 PREDICTED_R2 = Quantity("predicted R²", form=r2_text)
 ADJUSTED_R2 = Quantity("adjusted R²", form=r2_text)
 OVERLAP = Quantity("gap", Unit("m", "mm"), form=three_digits)
@@ -224,18 +224,19 @@ def _of_tables(
 
     return {
         "mean": of(MEAN, lambda t: t.constant, is_response=True),
-        "main": of(SHARE.named("main effects"), lambda t: t.main),
-        "interaction": of(SHARE.named("interactions"), lambda t: t.interaction),
-        "unexplained": of(SHARE.named("residual"), lambda t: t.unexplained),
+        "main": of(CONTRIBUTION.named("main effects"), lambda t: t.main),
+        "interaction": of(CONTRIBUTION.named("interactions"), lambda t: t.interaction),
+        "unexplained": of(CONTRIBUTION.named("residual"), lambda t: t.unexplained),
         "residual_deviation": of(
             MEAN.named("residual standard deviation"), _residual_deviation, is_response=True
         ),
         "residual_df": of(COUNT, lambda t: t.residual_df),
         "adjusted_r2": of(ADJUSTED_R2, lambda t: t.adjusted_r2),
         "predicted_r2": of(PREDICTED_R2, lambda t: t.predicted_r2),
-        "share": of_terms(SHARE, lambda _, term: term.share),
+        "share": of_terms(CONTRIBUTION, lambda _, term: term.share),
         "sum_sq_share": of_terms(
-            SHARE.named("sum of squares"), lambda t, term: term.sum_sq / (t.total_sum_sq or np.nan)
+            CONTRIBUTION.named("sum of squares"),
+            lambda t, term: term.sum_sq / (t.total_sum_sq or np.nan),
         ),
         "df": of_terms(COUNT, lambda _, term: term.df),
         "f": of_terms(Quantity("F"), lambda _, term: term.f),
@@ -362,14 +363,14 @@ def _fill(published: xr.Dataset, label: Label, terms: Mapping[str, PublishedTerm
             write(variable, quantity.to_si(terms[term].effects[place_of_effect]))
     for variable, term in (("main", MAIN), ("interaction", INTERACTIONS)):
         if term in terms:
-            write(variable, SHARE.to_si(terms[term].percent))
+            write(variable, CONTRIBUTION.to_si(terms[term].percent))
     for term in published.term.values.tolist():
         straight, turned = terms.get(term), terms.get(":".join(reversed(term.split(":"))))
         known = straight or turned
         if known is None:
             continue
         if known.percent is not None:
-            write("share", SHARE.to_si(known.percent), term=term)
+            write("share", CONTRIBUTION.to_si(known.percent), term=term)
         if known.effects:
             shape = (len(LEVELS),) * (term.count(":") + 1)
             effects = quantity.to_si(known.effects).reshape(shape)

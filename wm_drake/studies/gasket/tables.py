@@ -5,17 +5,17 @@ import xarray as xr
 
 from wm_drake.report.formatting import MISSING
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import HIDDEN, Quantity, named, quantity_of
+from wm_drake.report.quantity import CHANGE, HIDDEN, SHARE, Quantity, named, quantity_of
 from wm_drake.report.terminal import Console
 from wm_drake.studies.doe.coding import LEVELS, MODELS
 from wm_drake.studies.doe.design import Design
 from wm_drake.studies.gasket.findings import EFFICIENCY
 from wm_drake.studies.gasket.screening import (
+    CONTRIBUTION,
     FAR,
     LEADING_INTERACTION,
     LEADING_MAIN,
     OTHER_LEVELS,
-    SHARE,
     VALUE,
     at,
     compared_terms,
@@ -26,8 +26,6 @@ from wm_drake.studies.gasket.screening import (
 )
 from wm_drake.studies.gasket.study import GasketTrials
 from wm_drake.studies.gasket.words import Words
-from wm_drake.studies.proposal import CHANGE
-from wm_drake.studies.proposal import SHARE as WHOLE
 
 WIDE = 100
 """Width of a terminal from which on its table has the leading terms. [characters]"""
@@ -49,7 +47,7 @@ def variance_table(screening: xr.Dataset, published: xr.Dataset, words: Words) -
     if published:
         caption += (
             f" Published: from {published.source}. Difference: of the mean from the published one, "
-            f"as a share of that; rows in which it is above {WHOLE.text(FAR)} are marked."
+            f"as a share of that; rows in which it is above {SHARE.text(FAR)} are marked."
         )
     data, design = _variance(screening, published), screening.design
     terms = _terms_of(screening, published)
@@ -118,10 +116,10 @@ def _leading_text(of_label: xr.Dataset) -> str:
     texts = []
     for term in leading(of_label):
         one = of_label.sel(term=term)
-        text = f"{term.replace(':', ' × ')} {WHOLE.number(one.share)}"
+        text = f"{term.replace(':', ' × ')} {SHARE.number(one.share)}"
         if "published_share" in one and one.published_share.notnull():
             mark = SIGN_MARK if one.sign_differs else ""
-            text += f" ({WHOLE.number(one.published_share)}{mark})"
+            text += f" ({SHARE.number(one.published_share)}{mark})"
         texts.append(text)
     return ", ".join(texts)
 
@@ -149,8 +147,8 @@ def leading_table(screening: xr.Dataset, published: xr.Dataset, words: Words) ->
     dims = ("load", "response", "term", "other_level")
     rows = {dim: xr.DataArray(list(c), dims="row") for dim, c in zip(dims, columns, strict=True)}
     caption = (
-        f"Main effects above {WHOLE.text(LEADING_MAIN)} and interactions above "
-        f"{WHOLE.text(LEADING_INTERACTION)}, largest first. An effect is the deviation from the "
+        f"Main effects above {SHARE.text(LEADING_MAIN)} and interactions above "
+        f"{SHARE.text(LEADING_INTERACTION)}, largest first. An effect is the deviation from the "
         "mean at a level of the factor; those of a factor sum to zero. For an interaction, each "
         "line is a level of its second factor, and each column a level of its first factor, whose "
         "values are in the line."
@@ -205,7 +203,7 @@ def contribution_tables(screening: xr.Dataset, words: Words) -> tuple[LabelledTa
     return (
         LabelledTable(
             "contributions",
-            xr.Dataset({"contribution": shares.assign_attrs(SHARE.attributes())}),
+            xr.Dataset({"contribution": shares.assign_attrs(CONTRIBUTION.attributes())}),
             "All terms",
             "Contribution of every term to each response, in percent of the variance.",
             across="response",

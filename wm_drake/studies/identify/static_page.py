@@ -6,10 +6,9 @@ from dataclasses import replace
 import xarray as xr
 
 from wm_drake.parameters import MeasuredLoop
-from wm_drake.parameters.units import Share
 from wm_drake.report.figure import MEASURED, QUIET, Figure, Line, Mark, Panel, in_grid
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import HIDDEN, Quantity, quantity_of, shown, text_of
+from wm_drake.report.quantity import HIDDEN, SHARE, quantity_of, shown, text_of
 from wm_drake.rigs import AXES
 from wm_drake.studies.answer import Answer, Part, Plot
 from wm_drake.studies.identify.fragment import Destination, table_entry, written_fragment
@@ -30,7 +29,6 @@ METHOD = (
 PREFIXES = {False: "", True: "rotational_"}
 """Beginning of the names of tables, by whether their curves are about an axis."""
 
-SHARE = Quantity("", Share(), 0)
 
 NOTICED = 0.02
 """Part of the largest force above which a fall of the mean is told."""

@@ -25,8 +25,7 @@ from wm_drake.model.machine import Machine
 from wm_drake.model.scene import Scene
 from wm_drake.parameters import MachineParameters, Sensor
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Unit
-from wm_drake.report.quantity import SPEED, STEP, TIME, Quantity
+from wm_drake.report.quantity import SPEED, STEP, TIME, of_measure
 from wm_drake.simulation.cases import Case, is_as_measured, notice_jumping_friction
 from wm_drake.simulation.displacements import band_of, largest_motion
 from wm_drake.simulation.measures import MEASURES, Measures, measure
@@ -84,7 +83,7 @@ class CaseResult:
         return float(np.interp(time, self.record.time.values, self.record.drum_speed.values))
 
 
-GAP = Quantity("smallest gap", Unit("m", "mm"), 1)
+GAP = of_measure("smallest_gap")
 
 
 def gap_size(distance: float) -> str:

@@ -5,6 +5,7 @@ from typing import Any
 
 from wm_drake.errors import check_known
 from wm_drake.model.machine import Machine
+from wm_drake.studies.answer import Answer
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import runnable_profile
 from wm_drake.studies.spin_cycle.measured import DIMS, RMS
@@ -17,7 +18,7 @@ from wm_drake.studies.spin_cycle.study import (
     measures_of,
     run_spin_cycle,
 )
-from wm_drake.studies.study import Result, Task
+from wm_drake.studies.study import Task
 
 ENGINES = ("compiled", "drake")
 
@@ -41,7 +42,7 @@ class SpinCycleTask(Task):
         """Return what determines the runs."""
         return {"profile": self.profile, "engine": self.engine}
 
-    def run(self, executor: Executor) -> Result:
+    def run(self, executor: Executor) -> Answer:
         """Run all cases."""
         parameters = self.machine.parameters
         if self.engine == "drake":

@@ -9,7 +9,7 @@ from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import MISSING, listed
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import Quantity, quantity_of, text_of
+from wm_drake.report.quantity import SHARE, Quantity, quantity_of, text_of
 from wm_drake.studies.answer import Answer, Part, Plot
 from wm_drake.studies.tolerance.figures import distributions_figure, gap_figure, sobol_figure
 from wm_drake.studies.tolerance.study import (
@@ -17,7 +17,6 @@ from wm_drake.studies.tolerance.study import (
     GAP_SIZE,
     SMALLEST_GAP,
     SUBSET,
-    WHOLE_SHARE,
     ToleranceTrials,
     laundry_masses,
     name_of,
@@ -137,7 +136,7 @@ def _where(contact: xr.Dataset) -> list[str]:
     if not share.any():
         return []
     at = int(share.argmax("pair"))
-    return [f"{WHOLE_SHARE.text(share[at])} {begin} at {pair_words(contact.isel(pair=at))}."]
+    return [f"{SHARE.text(share[at])} {begin} at {pair_words(contact.isel(pair=at))}."]
 
 
 def pair_words(pair: xr.Dataset) -> str:
@@ -204,7 +203,7 @@ def _named(trials: ToleranceTrials, of: xr.Dataset) -> str:
     words = {v.name: v.quantity.words for v in trials.uncertain.variables}
     of = of.isel(quantity=of.total.values >= LEAST_TOTAL).isel(quantity=slice(MOST_NAMED))
     pairs = zip(of["quantity"].values.tolist(), of.total.values, strict=True)
-    return ", ".join(f"{words[name]} ({WHOLE_SHARE.text(total)})" for name, total in pairs)
+    return ", ".join(f"{words[name]} ({SHARE.text(total)})" for name, total in pairs)
 
 
 def _title(trials: ToleranceTrials, of: xr.Dataset) -> str:

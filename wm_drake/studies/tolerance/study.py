@@ -10,9 +10,8 @@ import xarray as xr
 from wm_drake.errors import InputError, Problem, input_error
 from wm_drake.parameters.tolerances import LAUNDRY, Limit, fraction
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Share, Unit
 from wm_drake.report.formatting import shape_name, significant
-from wm_drake.report.quantity import Quantity
+from wm_drake.report.quantity import SHARE, Quantity, of_measure
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures.responses import GAP, Response
 from wm_drake.studies.experiment import Experiment, responses
@@ -94,14 +93,12 @@ SMALLEST_GAP = "smallest_gap"
 PLACES = ("nearest_pair", "contact_gap")
 """Variables of the table of runs that tell where the tub touches."""
 
-PERCENT = Share()
-SHARE = Quantity("share", PERCENT, form=lambda value: significant(value, 3 if value >= 10.0 else 2))
+OF_RUNS = SHARE.named("share", form=lambda value: significant(value, 3 if value >= 10.0 else 2))
 """Share of runs, with two significant digits, three from 10 % on."""
-LIMIT_SHARE = Quantity("share", PERCENT, form=lambda value: significant(value, 3))
-WHOLE_SHARE = Quantity("share", PERCENT, 0)
+OF_LIMIT = SHARE.named("share", form=lambda value: significant(value, 3))
 COUNT = Quantity("runs", decimals=0)
 INDEX = Quantity("index", decimals=2)
-GAP_SIZE = Quantity("smallest gap", Unit("m", "mm"), 1)
+GAP_SIZE = of_measure("smallest_gap")
 
 
 def name_of(response: Response) -> str:
@@ -266,7 +263,7 @@ class ToleranceTrials:
         }
         pairs = xr.Dataset(
             {
-                **{name: SHARE.named(w).variable((), v) for name, (w, v) in named.items()},
+                **{name: OF_RUNS.named(w).variable((), v) for name, (w, v) in named.items()},
                 "method": ((), method),
                 "touching": COUNT.named("samples that touch").variable((), crude.count),
                 **pairs_of(samples),
@@ -307,10 +304,8 @@ class ToleranceTrials:
                 (), rare.evaluations
             ),
             "rare_smallest": GAP_SIZE.variable((), rare.smallest),
-            "rare_deviation": WHOLE_SHARE.named("coefficient of variation").variable(
-                (), rare.deviation
-            ),
-            "rare_touches": WHOLE_SHARE.named(words).variable("pair", touches),
+            "rare_deviation": SHARE.named("coefficient of variation").variable((), rare.deviation),
+            "rare_touches": SHARE.named(words).variable("pair", touches),
         }
 
 
@@ -356,7 +351,9 @@ def pairs_of(samples: xr.Dataset) -> dict[str, xr.Variable]:
             name: xr.Variable("pair", list(map(shape_name, of)), Quantity(words).attributes())
             for name, (words, of) in texts.items()
         },
-        **{name: SHARE.named(w).variable("pair", values) for name, (w, values) in numbers.items()},
+        **{
+            name: OF_RUNS.named(w).variable("pair", values) for name, (w, values) in numbers.items()
+        },
     }
 
 
@@ -417,7 +414,7 @@ def judged(measures: xr.Dataset, limits: Sequence[tuple[Limit, Response, float]]
     return xr.Dataset(
         {
             **{name: ("row", list(columns[name])) for name in ("quantity", "limit")},
-            **{n: LIMIT_SHARE.named(w).variable("row", columns[n]) for n, w in heads.items()},
+            **{n: OF_LIMIT.named(w).variable("row", columns[n]) for n, w in heads.items()},
             "verdict": ("row", list(columns["verdict"])),
         },
         attrs={"numbers": numbers},

@@ -15,26 +15,25 @@ from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.elements import CurveTable
 from wm_drake.parameters.keys import quantities
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Share, Unit
+from wm_drake.parameters.units import Share
 from wm_drake.parameters.variation import value_at
 from wm_drake.report.formatting import shape_name, three_digits
-from wm_drake.report.quantity import Quantity
+from wm_drake.report.quantity import CHANGE, Quantity, of_measure
 from wm_drake.simulation.measures.kind import Better
 from wm_drake.simulation.measures.responses import Response
 from wm_drake.studies.experiment import Experiment, quantity_of, responses
 from wm_drake.studies.proposal import (
     AFTER,
     BEFORE,
-    CHANGE,
     Aim,
     compared,
     proposal_of,
     worst_of,
 )
 from wm_drake.studies.tolerance.shares import share_of
-from wm_drake.studies.tolerance.study import COUNT, SHARE, crude_ends
+from wm_drake.studies.tolerance.study import COUNT, OF_RUNS, crude_ends
 
-SMALLEST_GAP = Quantity("smallest gap", Unit("m", "mm"), 1)
+SMALLEST_GAP = of_measure("smallest_gap")
 FACTOR = Quantity("factor", Share())
 
 PARTS = ("spring_types", "damper_types", "bushing_types", "gasket")
@@ -254,9 +253,9 @@ def laundry_of(samples: Sequence[xr.Dataset], clearance: float) -> xr.Dataset:
     numbers = {
         "smallest_gap": (SMALLEST_GAP, gaps.min(axis=1)),
         "count": (COUNT.named("runs with too small a gap"), [share.count for share in shares]),
-        "probability": (SHARE.named("probability"), probability),
-        "lower": (SHARE.named("95 % from"), lower),
-        "upper": (SHARE.named("to"), upper),
+        "probability": (OF_RUNS.named("probability"), probability),
+        "lower": (OF_RUNS.named("95 % from"), lower),
+        "upper": (OF_RUNS.named("to"), upper),
     }
     data = xr.Dataset({name: q.variable("state", values) for name, (q, values) in numbers.items()})
     states = list(STATES[: len(samples)])
