@@ -141,6 +141,10 @@ class Quantity:
         variable.attrs |= {ALONG: along, EACH: each}
         return variable
 
+    def on(self, array: "xr.DataArray") -> "xr.DataArray":
+        """Return an array that carries this quantity."""
+        return array.assign_attrs(self.attributes())
+
     def attributes(self) -> dict[Hashable, Any]:
         """Return the attributes of a variable that carries this quantity.
 
@@ -192,10 +196,20 @@ def _of_measure(name: str) -> Quantity | None:
     return None if known is None else Quantity(known.kind, known.unit, known.studio)
 
 
+def each_of(array: "xr.DataArray") -> "Mapping[str, Quantity]":
+    """Return the quantity of each label of a variable, as of `Quantity.of_each`."""
+    each: Mapping[str, Quantity] = array.attrs[EACH]
+    return each
+
+
 def named(array: "xr.DataArray", words: str) -> "xr.DataArray":
     """Return a variable with other words."""
-    quantity: Quantity = array.attrs["quantity"]
-    return array.assign_attrs(quantity.named(words).attributes())
+    return quantity_of(array).named(words).on(array)
+
+
+def hidden(data: "xr.Dataset", *names: str) -> "xr.Dataset":
+    """Return data in which page and terminal leave out some variables; files have them."""
+    return data.assign({name: data[name].assign_attrs({HIDDEN: True}) for name in names})
 
 
 def shown(array: "xr.DataArray") -> FloatArray:

@@ -158,8 +158,8 @@ def compared(values: xr.DataArray, goals: Mapping[str, Better]) -> xr.Dataset:
         values = values.isel(load=(signs * values).fillna(np.inf).argmax("load"))
     for setting in values.setting.values.tolist():
         one = values.sel(setting=setting, drop=True)
-        responses[setting] = one.drop_vars("load", errors="ignore")
-        responses[setting].attrs |= Quantity(f"{setting}, by a run", form=three_digits).attributes()
+        quantity = Quantity(f"{setting}, by a run", form=three_digits)
+        responses[setting] = quantity.on(one.drop_vars("load", errors="ignore"))
         if "load" in one.coords:
             responses[f"load_{setting}"] = ("response", one["load"].values)
     if AFTER in responses:

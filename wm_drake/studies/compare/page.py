@@ -246,7 +246,7 @@ def _amplitudes(amplitudes: xr.Dataset, count: int) -> Plot:
 
 def _residuals(amplitudes: xr.Dataset, tolerance: str) -> Plot:
     shares = amplitudes.assign(allowed=amplitudes.tolerance / amplitudes.measured.max("place"))
-    shares.allowed.attrs.update(amplitudes.difference.attrs)
+    shares["allowed"] = quantity_of(amplitudes.difference).on(shares.allowed)
 
     def marks(of: xr.Dataset) -> list[fig.Mark]:
         x, allowed = shown(of.place), shown(of.allowed)

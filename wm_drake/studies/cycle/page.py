@@ -6,9 +6,10 @@ import xarray as xr
 from wm_drake.parameters import MachineParameters
 from wm_drake.report import figure as fig
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import STEP, TIME, Quantity, quantity_of, shown, text_of
+from wm_drake.report.quantity import TIME, Quantity, quantity_of, shown, text_of
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.answer import Answer, Part, Plot
+from wm_drake.studies.cycle.study import Cycle
 
 HOW = (
     "Each point stands for {window}: mean speed, extremes of the rest. Amplitude: half of the "
@@ -20,13 +21,14 @@ HOW = (
 
 
 def cycle_answer(
-    parameters: MachineParameters, case: Case, course: xr.Dataset, parts: xr.Dataset
+    parameters: MachineParameters, case: Case, cycle: Cycle, parts: xr.Dataset
 ) -> Answer:
     """Return the answer of the study.
 
     Args:
-        course, parts: As of `course_of` and `parts_of` in `wm_drake.studies.cycle.study`.
+        parts: As of `parts_of` in `wm_drake.studies.cycle.study`.
     """
+    course = cycle.course
     table = LabelledTable(
         "parts",
         parts.assign(touches=parts.gap.drop_attrs() <= 0.0),
@@ -35,7 +37,6 @@ def cycle_answer(
         marked=("touches", "alarm"),
         is_in_terminal=True,
     )
-    diverged = (f"{case.name}: {course.attrs['diverged']}",) if course.attrs["diverged"] else ()
     return Answer(
         f"Cycle of machine {parameters.name}",
         summary(case, course),
@@ -47,17 +48,10 @@ def cycle_answer(
         (
             ("Load", case.name),
             ("Duration of the cycle", TIME.text(case.profile.duration)),
-            ("Integration", _integration(course)),
+            ("Integration", cycle.integration),
         ),
-        diverged=diverged,
+        diverged=(f"{case.name}: {cycle.diverged}",) if cycle.diverged else (),
     )
-
-
-def _integration(course: xr.Dataset) -> str:
-    """Return how the cycle was integrated."""
-    how = course.attrs
-    step, period = STEP.text(how["step"]), STEP.text(how["period"])
-    return f"{how['integrator']}, steps of {step}, samples every {period}"
 
 
 def _course_table(course: xr.Dataset) -> LabelledTable:

@@ -7,6 +7,7 @@ piece, and each piece is measured while the next one is integrated.
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -20,7 +21,7 @@ from wm_drake.model.machine import Machine, Setup
 from wm_drake.model.scene import Scene
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
-from wm_drake.report.quantity import MASS, SPEED, TIME, Quantity, of_measure
+from wm_drake.report.quantity import MASS, SPEED, STEP, TIME, Quantity, of_measure
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.feet import foot_loads
 from wm_drake.simulation.mounts import mount_wrenches
@@ -133,21 +134,31 @@ def unbalance_of(setup: Setup, masses: FloatArray) -> FloatArray:
     return np.asarray(np.hypot(moment[:, 0], moment[:, 2]))
 
 
-def course_of(machine: Machine, case: Case, scene: Scene | None = None) -> xr.Dataset:
-    """Run a cycle and return its course.
+class Cycle(NamedTuple):
+    """A cycle that was run.
+
+    Attributes:
+        course: Over `time`, the middles of windows [s]: mean `drum_speed`, `mass` of the load and
+            its static `unbalance` at the end of the window, `amplitude` of each sensor, half of
+            the distance from the smallest to the largest displacement, smallest `gap`; with a
+            fixed cabinet smallest and largest load of a foot, `foot_smallest` and `foot_largest`,
+            and largest force along the floor, `sideways`.
+        diverged: Why it stopped early; "" if it did not.
+        integration: How it was integrated, in words.
+    """
+
+    course: xr.Dataset
+    diverged: str
+    integration: str
+
+
+def run_cycle(machine: Machine, case: Case, scene: Scene | None = None) -> Cycle:
+    """Run a cycle.
 
     Args:
         machine: Built machine.
         case: Load and profile.
         scene: Shapes of the machine; made here if None.
-
-    Returns:
-        Over `time`, the middles of windows [s]: mean `drum_speed`, `mass` of the load and its
-        static `unbalance` at the end of the window, `amplitude` of each sensor, half of the
-        distance from the smallest to the largest displacement, smallest `gap`; with a fixed
-        cabinet smallest and largest load of a foot, `foot_smallest` and `foot_largest`, and largest
-        force along the floor, `sideways`. Attributes `diverged`: why it stopped early, "" if it did
-        not; `integrator`; `step` and `period`, time between samples [s].
     """
     profile, parameters = case.profile, machine.parameters
     empty = machine.set_up(gasket=case.gasket)
@@ -163,8 +174,9 @@ def course_of(machine: Machine, case: Case, scene: Scene | None = None) -> xr.Da
             courses.append(extremes(piece))
         diverged = piece.divergence.reason if piece.divergence else ""
     course = xr.concat(courses, "time", combine_attrs="override")
-    how = {"integrator": stepping.integrator, "step": stepping.step, "period": period}
-    return course.assign_attrs(diverged=diverged, **how)
+    step, every = STEP.text(stepping.step), STEP.text(period)
+    how = f"{stepping.integrator}, steps of {step}, samples every {every}"
+    return Cycle(course, diverged, how)
 
 
 def _ahead(pieces: Iterator[Trajectory]) -> Iterator[Trajectory]:

@@ -9,7 +9,7 @@ import xarray as xr
 from wm_drake.report import figure as fig
 from wm_drake.report.quantity import TIME, quantity_of, shown
 from wm_drake.studies.design.problem import MachineDesigns
-from wm_drake.studies.design.study import EVALUATIONS, HYPERVOLUME, PROPOSED
+from wm_drake.studies.design.study import EVALUATIONS, HYPERVOLUME, PROPOSED, chosen_designs
 
 PICKED = "picked design"
 """Label of what belongs to the picked design."""
@@ -24,9 +24,9 @@ COLUMNS = 3
 """Number of panels of envelopes in a row."""
 
 
-def first_picked(front: xr.Dataset) -> int:
+def first_picked(designs: MachineDesigns, front: xr.Dataset) -> int:
     """Return the number of the design that is picked first: the proposed one, if there is one."""
-    chosen: dict[str, int] = front.attrs["chosen"]
+    chosen = chosen_designs(designs, front)
     return chosen.get(PROPOSED, next(iter(chosen.values())))
 
 
@@ -42,7 +42,8 @@ def front_figure(designs: MachineDesigns, front: xr.Dataset) -> fig.Figure:
     Args:
         front: Front with at least one design and two objectives.
     """
-    numbers, picked = sorted(set(front.attrs["chosen"].values())), first_picked(front)
+    numbers = sorted(set(chosen_designs(designs, front).values()))
+    picked = first_picked(designs, front)
     of_chosen, of_picked = front.sel(design=numbers), front.sel(design=[picked])
     panels = []
     for pair in pairs_of(designs):

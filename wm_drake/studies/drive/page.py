@@ -26,12 +26,14 @@ def drive_answer(
     thresholds: xr.Dataset,
     grid: xr.Dataset,
     estimation: xr.Dataset | None,
+    speed: float,
 ) -> Answer:
     """Return the answer of the study.
 
     Args:
         thresholds, grid, estimation: As of `find_thresholds`, `torque_map` and
             `estimate_unbalance` in `wm_drake.studies.drive.study`.
+        speed: Speed of the estimation. [rad/s]
     """
     ratio = motor_with_limit(parameters)[0].belt_ratio
     passed = grid.end.values >= PASSES * profile.speed[-1]
@@ -55,7 +57,7 @@ def drive_answer(
     errors = None if estimation is None else estimation_errors(estimation)
     parts = [torque_map, Part("Smallest torque limit", (limits,))]
     if estimation is not None and errors is not None:
-        table = LabelledTable("errors", errors, "Errors of the estimation", _about(estimation))
+        table = LabelledTable("errors", errors, "Errors of the estimation", _about(speed))
         parts[1:1] = [
             Part(
                 "Unbalance seen by the drive",
@@ -94,9 +96,9 @@ def summary(thresholds: xr.Dataset, errors: xr.Dataset | None) -> str:
     return " ".join(sentences)
 
 
-def _about(estimation: xr.Dataset) -> str:
+def _about(speed: float) -> str:
     return (
-        f"Error of the unbalance estimated at a constant {SPEED.text(estimation.attrs['speed'])}, "
+        f"Error of the unbalance estimated at a constant {SPEED.text(speed)}, "
         "over loads of two masses at random places. Estimate: parts of motor torque and speed "
         "that go round with the drum, m r = |T - J dw/dt| / g, with the inertia of the empty drum. "
         "What remains: inertia of the load, and a tub that moves."

@@ -57,10 +57,10 @@ class DriveTask(Task):
         torques = (top * np.linspace(0.25, 2.0, options.torques)).tolist()
         factors = np.linspace(0.25, 1.5, options.unbalances).tolist()
         grid = torque_map(experiment, self.cases[worst], torques, factors)
-        estimation = None
+        estimation, speed = None, SPEED.to_si(options.speed).item()
         if options.loads:
             inertia = drum_inertia(self.machine.set_up())
             drawn = random_loads(options.loads, options.seed, self.cases[0].load)
-            speed = SPEED.to_si(options.speed).item()
             estimation = estimate_unbalance(experiment, speed, drawn, inertia)
-        return drive_answer(parameters, self.cases[0].profile, thresholds, grid, estimation)
+        profile = self.cases[0].profile
+        return drive_answer(parameters, profile, thresholds, grid, estimation, speed)

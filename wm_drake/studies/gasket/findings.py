@@ -1,6 +1,7 @@
 """Findings of a screening study as sentences, made from its numbers."""
 
 from collections import Counter
+from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
@@ -87,7 +88,9 @@ def contact_text(screening: xr.Dataset) -> str:
     )
 
 
-def why_text(screening: xr.Dataset, proposal: xr.Dataset, words: Words) -> str:
+def why_text(
+    screening: xr.Dataset, proposal: xr.Dataset, factors: Sequence[str], words: Words
+) -> str:
     """Return why factors are changed, in a sentence: their shares, where it matters most.
 
     This is the gap with the load with which it is smallest as it is, or without a gap the response
@@ -96,9 +99,10 @@ def why_text(screening: xr.Dataset, proposal: xr.Dataset, words: Words) -> str:
     Args:
         screening: As of `screening.run_screening`.
         proposal: As of `page.Comparisons`.
+        factors: Names of those that it changes.
         words: Words of the study.
     """
-    factors, label = proposal.factors, nearest(screening)
+    label = nearest(screening)
     if not factors:
         return ""
     of_factors = screening.share.sel(term=factors)
@@ -130,13 +134,12 @@ def summary(
     screening: xr.Dataset,
     words: Words,
     published: xr.Dataset,
-    level_zero: xr.Dataset,
     check: xr.Dataset,
 ) -> list[str]:
     """Return sentences on the study and its results.
 
     They are about the design, contact, the most influential factors, the quality of the model,
-    published results, level 0 and runs beside the model.
+    published results and runs beside the model.
     """
     design, loads = screening.design, [f"load {load}" for load in screening["load"].values]
     sentences = [
@@ -149,8 +152,6 @@ def summary(
     sentences.append(_quality(screening, words))
     if published:
         sentences += _against_published(screening, words, published)
-    if level_zero:
-        sentences.append(level_zero_text(level_zero, words))
     if check:
         sentences.append(about_check(check))
     return sentences
@@ -226,16 +227,17 @@ def _listed(named: list[str]) -> str:
     return f": {listed(shown)}" if shown else ""
 
 
-def level_zero_text(zero: xr.Dataset, words: Words) -> str:
+def level_zero_text(zero: xr.Dataset, words: Words, tables: str) -> str:
     """Return a sentence on level 0 and the machine.
 
     Args:
-        zero: As of `study.run_level_zero`, with the attribute `tables`, their treatment.
+        zero: As of `study.run_level_zero`.
         words: Words of the study.
+        tables: Treatment of stiffness tables.
     """
     linear, label = _largest(zero.linear_difference)
     size = f"up to {DIFFERENCE.text(linear)} ({_of(label, words)})"
-    if zero.tables == "linear":
+    if tables == "linear":
         return (
             "Level 0 of this study is not the machine: its stiffness tables are replaced by the "
             f"slopes of their first 20 %, as in [B], so responses at level 0 differ by {size}. "

@@ -30,7 +30,7 @@ from wm_drake.parameters.published import CONSTANT, INTERACTIONS, MAIN, RANGE
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import number, three_digits
-from wm_drake.report.quantity import SHARE, Quantity
+from wm_drake.report.quantity import SHARE, Quantity, each_of
 from wm_drake.simulation.measures.kind import Better
 from wm_drake.studies.doe.anova import AnovaTable, Term, anova
 from wm_drake.studies.doe.coding import LEVELS, efficiency
@@ -167,7 +167,7 @@ def analyse(design: Design, runs: xr.Dataset) -> xr.Dataset:
         by_response = anova(levels[good], frame, interactions=design.model != "main")
         tables.append([by_response[name] for name in names])
         trials.append(good)
-    screening = runs.assign(_of_runs(runs.value) | _of_tables(tables, runs.value.attrs["each"]))
+    screening = runs.assign(_of_runs(runs.value) | _of_tables(tables, each_of(runs.value)))
     for name in ("fitted", "residual"):
         array = np.full(runs.value.shape, np.nan)
         for of_load, good, rows in zip(tables, trials, array, strict=True):
@@ -194,10 +194,8 @@ def _of_runs(values: xr.DataArray) -> dict[str, xr.DataArray]:
         "largest": values.max("trial", keep_attrs=True),
         "deviation": values.std("trial", ddof=1, keep_attrs=True),
     }
-    for name, array in numbers.items():
-        words = "standard deviation" if name == "deviation" else name
-        array.attrs |= VALUE.named(words).attributes()
-    return numbers
+    words = {"deviation": "standard deviation"}
+    return {name: VALUE.named(words.get(name, name)).on(array) for name, array in numbers.items()}
 
 
 def _of_tables(
@@ -348,7 +346,7 @@ def published_for(results: PublishedResults, screening: xr.Dataset, source: str 
 def _fill(published: xr.Dataset, label: Label, terms: Mapping[str, PublishedTerm]) -> None:
     """Write the published numbers of a response into arrays of NaN."""
     load, name = label
-    quantity = published["mean"].attrs["each"][name]
+    quantity = each_of(published["mean"])[name]
     place = {"load": load, "response": name}
 
     def write(variable: str, value: Any, **where: Any) -> None:

@@ -5,7 +5,7 @@ import xarray as xr
 
 from wm_drake.report.formatting import MISSING
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import CHANGE, HIDDEN, SHARE, Quantity, named, quantity_of
+from wm_drake.report.quantity import CHANGE, SHARE, Quantity, hidden, named, quantity_of
 from wm_drake.report.terminal import Console
 from wm_drake.studies.doe.coding import LEVELS, MODELS
 from wm_drake.studies.doe.design import Design
@@ -92,9 +92,8 @@ def _variance(screening: xr.Dataset, published: xr.Dataset) -> xr.Dataset:
                 ("load", "response"), difference
             )
             data["is_far"] = np.abs(difference) > FAR
-    for name in ("deviation", "residual_deviation", "residual_df"):
-        data[name] = screening[name].assign_attrs({HIDDEN: True})
-    return data
+    more = screening[["deviation", "residual_deviation", "residual_df"]]
+    return data.assign(hidden(more, *more).data_vars)
 
 
 def _terms_of(screening: xr.Dataset, published: xr.Dataset) -> xr.Dataset:
@@ -203,7 +202,7 @@ def contribution_tables(screening: xr.Dataset, words: Words) -> tuple[LabelledTa
     return (
         LabelledTable(
             "contributions",
-            xr.Dataset({"contribution": shares.assign_attrs(CONTRIBUTION.attributes())}),
+            xr.Dataset({"contribution": CONTRIBUTION.on(shares)}),
             "All terms",
             "Contribution of every term to each response, in percent of the variance.",
             across="response",

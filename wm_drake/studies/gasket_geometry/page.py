@@ -33,16 +33,19 @@ def geometry_answer(
     surfaces: xr.Dataset,
     conditions: xr.Dataset,
     best: GasketDrawing,
+    name: str,
+    loads: Sequence[str],
 ) -> Answer:
     """Return the answer of the study.
 
     Args:
         drawings, surfaces, conditions: As of `drawings_data`, `surfaces_data` and `conditions_data`
-            in `wm_drake.studies.gasket_geometry.study`; the last one has the attributes `gasket`,
-            name or file of the drawing, and `loads`, names in one text.
+            in `wm_drake.studies.gasket_geometry.study`.
         best: Best drawing that was run.
+        name: Name or file of the drawing.
+        loads: Names of the loads.
     """
-    name, counts = conditions.attrs["gasket"], drawings.kind.values.tolist()
+    counts = drawings.kind.values.tolist()
     too_large = "no drawing that was run keeps all limits; the best one exceeds them the least"
     return Answer(
         f"Drawings of gasket {name}",
@@ -64,7 +67,7 @@ def geometry_answer(
         (
             ("Drawing", name),
             ("Drawings", f"{counts.count('design')} of the design, {counts.count('fresh')} fresh"),
-            ("Loads", conditions.attrs["loads"]),
+            ("Loads", ", ".join(loads)),
             ("Limits", _limits_text(conditions)),
         ),
         METHOD,

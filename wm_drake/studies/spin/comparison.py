@@ -168,7 +168,7 @@ def _numbers(runs: SpinRuns) -> dict[tuple[str, str, str, str], float]:
         shown = {name.replace("_", " "): table[name] for name in names if name in table}
         if window := steady_window(case.case.profile):
             steady = steady_amplitudes(case.record, window)
-            shown[STEADY] = steady.assign_attrs(of_measure("amplitude").attributes())
+            shown[STEADY] = of_measure("amplitude").on(steady)
         for words, array in shown.items():
             quantity = quantity_of(array)
             labels = itertools.product(*(map(str, array[dim].values) for dim in array.dims))
@@ -257,7 +257,7 @@ def summary(variants: Variants, data: xr.Dataset) -> str:
 
 
 def _of_variant(name: str, runs: SpinRuns) -> str:
-    ended = [case for case in runs.results if not case.record.attrs["diverged"]]
+    ended = [case for case in runs.results if not case.diverged]
     if not ended:
         return f"Every run of {name} diverged."
     amplitude = max(float(case.measures.amplitude.fillna(0.0).max()) for case in ended)

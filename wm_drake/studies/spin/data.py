@@ -48,7 +48,7 @@ def amplitudes_of(runs: SpinRuns) -> xr.Dataset:
     measured = measured_amplitudes(runs.parameters)
     labels, bands, sizes = list[tuple[str, str, str]](), list[str](), list[FloatArray]()
     for case in runs.results:
-        name, gasket = case.case.name, case.record.attrs["gasket"]
+        name, gasket = case.case.name, case.gasket
         of_case = measured[(measured["load"] == name) & (measured["gasket"] == gasket)]
         for row in of_case.to_dict("records") if runs.is_compared(case) else ():
             labels.append((name, gasket, row["source"]))
@@ -66,7 +66,7 @@ def amplitudes_of(runs: SpinRuns) -> xr.Dataset:
 
 def row_of(data: xr.Dataset, case: CaseResult, source: str) -> xr.Dataset | None:
     """Return the row of a case and source of `amplitudes_of` or `differences_of`; None without."""
-    labels = {"load": case.case.name, "gasket": case.record.attrs["gasket"], "source": source}
+    labels = {"load": case.case.name, "gasket": case.gasket, "source": source}
     rows = np.logical_and.reduce([data[name].values == label for name, label in labels.items()])
     if not rows.any():
         return None
@@ -225,10 +225,10 @@ def about_runs(runs: SpinRuns) -> xr.Dataset:
     seconds = Quantity("computing time", TIME.unit, 2)
     return xr.Dataset(
         {
-            "gasket": ("load", [case.record.attrs["gasket"] for case in cases]),
+            "gasket": ("load", [case.gasket for case in cases]),
             "engine": ("load", [runs.engine] * len(cases)),
             "band": ("load", [band_text(case).replace("–", " to ") for case in cases]),
-            "diverged": ("load", [case.record.attrs["diverged"] for case in cases]),
+            "diverged": ("load", [case.diverged for case in cases]),
             "wall": seconds.variable("load", [case.wall_s for case in cases]),
         },
         {"load": runs.labels},

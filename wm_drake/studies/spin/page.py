@@ -251,7 +251,7 @@ def _inputs_part(runs: SpinRuns) -> Part:
 
 def summary(runs: SpinRuns, amplitudes: xr.Dataset) -> str:
     """Return one paragraph about the cases that reached their end."""
-    ended = [case for case in runs.results if not case.record.attrs["diverged"]]
+    ended = [case for case in runs.results if not case.diverged]
     count, diverged = len(runs.results), len(runs.results) - len(ended)
     cases = "1 case was" if count == 1 else f"{count} cases were"
     speed = SPEED.text(max(case.case.profile.highest_speed for case in runs.results))

@@ -29,7 +29,7 @@ from wm_drake.report.quantity import SPEED, STEP, TIME, of_measure
 from wm_drake.simulation.cases import Case, is_as_measured, notice_jumping_friction
 from wm_drake.simulation.displacements import band_of, largest_motion
 from wm_drake.simulation.measures import MEASURES, Measures, measure
-from wm_drake.simulation.records import Record, sample_period
+from wm_drake.simulation.records import Record, sample_period, why_diverged
 from wm_drake.simulation.runs import DEFAULT_ENGINE, DivergenceWarning, simulate
 from wm_drake.simulation.steps import checked_integrator, checked_step
 
@@ -52,7 +52,17 @@ class CaseResult:
     @property
     def has_gasket(self) -> bool:
         """Whether the case was run with the gasket."""
-        return bool(self.record.attrs["gasket"] == "yes")
+        return self.gasket == "yes"
+
+    @property
+    def gasket(self) -> str:
+        """Whether it was run with the gasket: yes or no."""
+        return str(self.record.attrs["gasket"])
+
+    @property
+    def diverged(self) -> str:
+        """Time and reason if the run diverged, else ""."""
+        return why_diverged(self.record)
 
     @property
     def title(self) -> str:
@@ -156,11 +166,7 @@ class SpinRuns:
 
     def failures(self) -> tuple[str, ...]:
         """Return a line for each case that diverged."""
-        return tuple(
-            f"{case.case.name}: {case.record.attrs['diverged']}"
-            for case in self.results
-            if case.record.attrs["diverged"]
-        )
+        return tuple(f"{case.case.name}: {case.diverged}" for case in self.results if case.diverged)
 
 
 def _of_parts(case: CaseResult) -> xr.Dataset:

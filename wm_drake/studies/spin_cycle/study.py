@@ -21,6 +21,7 @@ from wm_drake.parameters.units import Share, Unit
 from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import measure
+from wm_drake.simulation.records import why_diverged
 from wm_drake.simulation.vibration import relative_error
 from wm_drake.studies.executor import RunCases
 from wm_drake.studies.experiment import placed
@@ -84,7 +85,7 @@ def run_spin_cycle(
         region_displacement="rms", region_displacement_integrated="rms_from_acceleration"
     )
     for name in ("rms", "rms_from_acceleration"):
-        data[name].attrs |= RMS.attributes()
+        data[name] = RMS.on(data[name])
     published = [case.published_error_percent for case in cases]
     errors = ERROR.to_si([np.nan if error is None else error for error in published])
     labels = {
@@ -240,7 +241,7 @@ def drake_runs(
             values = {
                 variable.name: of_run.table[variable.name].values for variable in table.variables
             }
-            diverged = str(result.record.attrs["diverged"])
+            diverged = why_diverged(result.record)
             table.put(number, result.case.name, values, diverged)
         return table.dataset()
 
