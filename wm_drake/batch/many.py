@@ -3,21 +3,24 @@
 import os
 import time
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 
 import xarray as xr
 
+from wm_drake.batch.drake_runs import drake_pool
 from wm_drake.batch.run_table import RunTable
-from wm_drake.batch.runs import Runner, RunResult
-from wm_drake.batch.work_items import Preparation
+from wm_drake.batch.runs import Advance, BatchJobs, BatchOptions, Runner, RunResult
+from wm_drake.batch.work_items import Preparation, WorkItem
+from wm_drake.engines import DEFAULT_ENGINE
 from wm_drake.engines.memory import RECORDS_OF_BATCH
+from wm_drake.errors import check_known
 from wm_drake.model.build import AnyMachine, machine_of
 from wm_drake.model.machine import Machine
 from wm_drake.simulation.cases import Case, case_of, notice_jumping_friction
 from wm_drake.simulation.feet import cabinet_of
 from wm_drake.simulation.first_call import compile_in_two_processes
 from wm_drake.simulation.measures import MEASURES, measure_named
+from wm_drake.simulation.runs import ENGINES
 from wm_drake.simulation.steps import checked_integrator, checked_step
 
 AHEAD = 3
@@ -45,13 +48,14 @@ def simulate_many(
     integrator: str | None = None,
     histories: bool = False,
     workers: int | None = None,
+    engine: str = DEFAULT_ENGINE,
     progress: Callable[[int], None] = lambda done: None,
     finished: Callable[[RunResult], None] = lambda ended: None,
 ) -> xr.Dataset:
-    """Run many cases of one machine with the compiled engine and return a table of their measures.
+    """Run many cases of one machine and return a table of their measures.
 
-    Each core runs several cases at once, one per SIMD lane. The results of a run do not depend on
-    the number of workers or on the other cases.
+    With the compiled engine, each core runs several cases at once, one per SIMD lane. The results
+    of a run do not depend on the number of workers or on the other cases.
 
     Args:
         machine: A built machine, its parameters, or its name or file.
@@ -64,7 +68,9 @@ def simulate_many(
             step size of the machine is used. [s]
         integrator: Integrator, as in `simulate`; None for that of the machine.
         histories: Whether each `RunResult` contains the record of the run, as from `simulate`.
-        workers: Number of threads; None for the number of cores.
+        workers: Number of threads, or of processes for the Drake engine; None for the number of
+            cores.
+        engine: Name of the engine, as in `simulate`.
         progress: Called with the number of finished runs; `wm_drake.progress_bar` displays it.
         finished: Called with each run when it is finished.
 
@@ -101,7 +107,7 @@ def simulate_many(
             finished(run)
         progress(done)
 
-    options = BatchOptions(chosen, step, integrator, histories, workers)
+    options = BatchOptions(chosen, step, integrator, histories, workers, engine)
     try:
         pairs = run_cases(machine, listed, options, collect)
     except KeyboardInterrupt:
@@ -109,27 +115,19 @@ def simulate_many(
     return table.dataset(pairs)
 
 
-@dataclass(frozen=True)
-class BatchOptions:
-    """How `run_cases` runs; see `simulate_many`."""
-
-    measures: tuple[str, ...]
-    step: float | None = None
-    integrator: str | None = None
-    histories: bool = False
-    workers: int | None = None
-
-
 def run_cases(
     machine: Machine,
     cases: Iterable[Case],
     options: BatchOptions,
     collect: Callable[[list[RunResult]], None],
+    advance: Advance = lambda number, fraction: None,
 ) -> list[str] | None:
     """Run cases and pass finished runs on; nothing of them is kept.
 
     Args:
         collect: Called with the runs of a batch when they have ended.
+        advance: Called with the number of a case and the fraction of its run that is done; not for
+            runs in other processes.
 
     Returns:
         Names of the pairs of shapes, if they are known.
@@ -138,21 +136,39 @@ def run_cases(
         InputError: a case or an option is wrong.
         KeyboardInterrupt: Ctrl-C was pressed; `collect` has got what had ended.
     """
+    check_known(options.engine, ENGINES, f"no engine '{options.engine}'", key="engine")
     parameters = machine.parameters
     compile_in_two_processes(parameters)
     if any("feet" in MEASURES[name].needs for name in options.measures):
         cabinet_of(parameters)
+    workers = options.workers or os.cpu_count() or 1
+    ahead = workers * (1 if options.histories else AHEAD)
+    if options.engine != DEFAULT_ENGINE:
+        with drake_pool(machine, cases, options, advance) as (pool, jobs, stop):
+            _run_all(pool, jobs, ahead, stop, collect)
+        return None
     step = checked_step(parameters, options.step)
     scheme = checked_integrator(parameters, options.integrator)
     notice_jumping_friction(parameters)
     runner = Runner(parameters, options.measures, options.histories, machine.cache.scenes)
-    threads = options.workers or os.cpu_count() or 1
-    at_once = threads * (RECORDS_OF_BATCH if options.histories else 1.0)
-    preparation = Preparation(machine, step, scheme, at_once)
-    _run_all(preparation, runner, cases, threads, collect)
+    at_once = workers * (RECORDS_OF_BATCH if options.histories else 1.0)
+    batches = Preparation(machine, step, scheme, at_once).batches(_with_pauses(cases))
+    with ThreadPoolExecutor(workers) as threads:
+        jobs = ((runner.run, *batch, _of_batch(advance, batch[1])) for batch in batches)
+        _run_all(threads, jobs, ahead, runner.stopped.set, collect)
     pairs = runner.scenes[0].pair_names() if runner.scenes else None
     machine.cache.scenes.extend(runner.scenes)
     return pairs
+
+
+def _of_batch(advance: Advance, items: list[WorkItem]) -> Callable[[float], None]:
+    """Return the function of the fraction that is done of all runs of a batch."""
+
+    def report(fraction: float) -> None:
+        for item in items:
+            advance(item.number, fraction)
+
+    return report
 
 
 def _with_pauses(cases: Iterable[Case]) -> Iterator[Case]:
@@ -166,15 +182,17 @@ def _with_pauses(cases: Iterable[Case]) -> Iterator[Case]:
 
 
 def _run_all(
-    preparation: Preparation,
-    runner: Runner,
-    cases: Iterable[Case],
-    workers: int,
+    pool: Executor,
+    jobs: BatchJobs,
+    ahead: int,
+    stop: Callable[[], None],
     collect: Callable[[list[RunResult]], None],
 ) -> None:
-    """Run all cases in threads and pass finished runs to `collect`.
+    """Run all jobs in the workers of a pool and pass finished runs to `collect`.
 
-    Only so many batches are prepared at a time that memory stays constant.
+    Args:
+        ahead: Number of jobs that run or wait, so that memory stays constant.
+        stop: Function that ends what runs.
     """
     running: set[Future[list[RunResult]]] = set()
 
@@ -184,17 +202,15 @@ def _run_all(
                 running.remove(future)
                 collect(future.result())
 
-    ahead = 1 if runner.histories else AHEAD
-    with ThreadPoolExecutor(workers) as pool:
-        try:
-            for key, work_items in preparation.batches(_with_pauses(cases)):
-                running.add(pool.submit(runner.run, key, work_items))
-                gather(workers * ahead)  # some batches wait while the others run
-            gather(0)
-        except BaseException:
-            runner.stopped.set()
-            pool.shutdown(wait=True, cancel_futures=True)
-            # collect the runs that finished in the meantime
-            good = [f for f in running if f.done() and not f.cancelled() and f.exception() is None]
-            collect([run for future in good for run in future.result()])
-            raise
+    try:
+        for job in jobs:
+            running.add(pool.submit(*job))
+            gather(ahead)  # some wait while the others run
+        gather(0)
+    except BaseException:
+        stop()
+        pool.shutdown(wait=True, cancel_futures=True)
+        # collect the runs that finished in the meantime
+        good = [f for f in running if f.done() and not f.cancelled() and f.exception() is None]
+        collect([run for future in good for run in future.result()])
+        raise

@@ -2,9 +2,9 @@
 
 import functools
 import threading
-from collections.abc import Callable, Container, Sequence
+from collections.abc import Callable, Container, Iterator, Sequence
 from dataclasses import dataclass
-from typing import cast
+from typing import Any, TypeAlias, cast
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from wm_drake.compiler.lanes import WIDTH
 from wm_drake.elements.mount import WRENCH_SIZE
 from wm_drake.elements.sensor import POINT_SIZE
 from wm_drake.elements.state_map import RATES_SIZE, WATER
+from wm_drake.engines import DEFAULT_ENGINE
 from wm_drake.engines.compiled.mechanics import DRUM_ANGLE, DRUM_RATE, STATE_SIZE
 from wm_drake.engines.compiled.run import RunLanes, integrate_runs
 from wm_drake.engines.compiled.samples import trajectory_of
@@ -94,6 +95,25 @@ class RunResult:
     record: Record | None
     gap: Gap | None = None
     motion: ShownMotion | None = None
+
+
+@dataclass(frozen=True)
+class BatchOptions:
+    """How cases are run; see `simulate_many`."""
+
+    measures: tuple[str, ...]
+    step: float | None = None
+    integrator: str | None = None
+    histories: bool = False
+    workers: int | None = None
+    engine: str = DEFAULT_ENGINE
+
+
+Advance: TypeAlias = Callable[[int, float], None]
+"""Function that is called with the number of a case and the fraction of its run that is done."""
+
+BatchJobs: TypeAlias = Iterator[tuple[Any, ...]]
+"""Functions that return lists of `RunResult`, each followed by its arguments."""
 
 
 class Runner:

@@ -44,14 +44,19 @@ def marks_of(
         drawn: Variables. A style has the fields of `fig.Line`, or of `fig.Points` if its `kind`
             is that class.
         by: Dimension, or coordinate of the places, whose labels have marks of their own.
-        key: Entry of the legend; that of the style if None.
+        key: Entry of the legend. Without one here or in a style it is the label, else the words of
+            the variable if there are several.
         style: Style of all.
     """
-    styles = drawn if isinstance(drawn, Mapping) else dict.fromkeys(drawn, {})
+    styles = drawn if isinstance(drawn, Mapping) else {name: {} for name in drawn}
     marks: list[fig.Mark] = []
     for number, part in enumerate(_parts(data, by)):
         for place, (name, own) in enumerate(styles.items()):
-            look = {"color": fig.COLOURS[(number if by else place) % len(fig.COLOURS)]}
+            look: dict[str, Any] = {
+                "color": fig.COLOURS[(number if by else place) % len(fig.COLOURS)]
+            }
+            entry = f"{by} {part[by].values.flat[0]}" if by else quantity_of(part[name]).words
+            look["key"] = entry if by or len(styles) > 1 else ""
             look |= {**style, **own, **({} if key is None else {"key": key(part, name)})}
             kind: Any = look.pop("kind", fig.Line)
             marks.append(kind(shown(part[over]), shown(part[name]), **look))

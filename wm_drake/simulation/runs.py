@@ -5,12 +5,13 @@ import warnings
 from collections.abc import Callable
 from typing import Any, TypeAlias
 
+from wm_drake.engines import DEFAULT_ENGINE
 from wm_drake.engines.compiled.packing import pack
 from wm_drake.engines.compiled.run import run_compiled
 from wm_drake.engines.compiled.stepping import choose_stepping
 from wm_drake.engines.drake import run_drake
 from wm_drake.engines.trajectory import Trajectory
-from wm_drake.errors import check_known
+from wm_drake.errors import check_known, input_error
 from wm_drake.model.build import AnyMachine, machine_of
 from wm_drake.simulation.cases import Case, case_of, notice_jumping_friction
 from wm_drake.simulation.first_call import compile_in_two_processes
@@ -21,7 +22,6 @@ Engine: TypeAlias = Callable[..., Trajectory]
 """Arguments: machine at rest, profile, step [s], progress called with the fraction done."""
 
 ENGINES: dict[str, Engine] = {"compiled": run_compiled, "drake": run_drake}
-DEFAULT_ENGINE = "compiled"
 
 
 class DivergenceWarning(UserWarning):
@@ -83,6 +83,8 @@ def simulate(
     if isinstance(case, str):
         case = case_of(machine.parameters, case)
     chosen = checked_integrator(machine.parameters, integrator)
+    if integrator is not None and engine != DEFAULT_ENGINE:
+        raise input_error(f"is of the compiled engine, not of '{engine}'", key="integrator")
     run = ENGINES[engine]
     how: dict[str, Any] = {"engine": engine, "step_s": step}
     numbers: dict[str, Any] = {"parameters": case.parameters, "gasket": case.gasket}

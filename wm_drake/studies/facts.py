@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from wm_drake.engines import DEFAULT_ENGINE
+
 PAGE = "report.html"
 """Name of the file of the main page."""
 
@@ -14,9 +16,10 @@ class Facts:
         command: Command line or Python call.
         wall_s: Duration. [s]
         warnings: Warnings of the machine, without those of the result.
-        step: Largest step of the compiled engine, as the machine has it; runs may take shorter
-            ones. 0 without a machine, or with several. [s]
+        step: Largest step, as the machine has it; runs may take shorter ones. 0 without a machine,
+            or with several. [s]
         integrator: Integrator of the compiled engine, as the machine has it.
+        engine: Name of the engine; "" without runs.
         verified: What a sample of the runs gave twice as fine; "" without runs.
         runs: Number of runs.
     """
@@ -28,6 +31,7 @@ class Facts:
     integrator: str = ""
     verified: str = ""
     runs: int = 0
+    engine: str = ""
 
     def rows(self) -> list[tuple[str, str]]:
         """Return the facts as pairs of word and text, for the end of a page."""
@@ -36,7 +40,9 @@ class Facts:
         from wm_drake.simulation.records import versions
 
         step = f"{STEP.text(self.step)}, integrator {self.integrator}"
+        step = step if self.engine in ("", DEFAULT_ENGINE) else STEP.text(self.step)
         return [
+            *([("Engine", self.engine)] if self.engine else []),
             *([("Largest step", step)] if self.step else []),
             *([("Check of the step", self.verified)] if self.verified else []),
             ("Versions", ", ".join(f"{name} {text}" for name, text in versions().items())),

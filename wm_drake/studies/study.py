@@ -33,6 +33,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from wm_drake.engines import DEFAULT_ENGINE
 from wm_drake.registry import Registry
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
@@ -91,6 +92,11 @@ MEASURED: Any = option(
     "Measured amplitudes to compare with: load, gasket, source, and a column per sensor in mm. "
     "Repeatable. Default: those of the machine file, for its own numbers, loads and profile.",
     "CSV",
+)
+ENGINE: Any = option(
+    DEFAULT_ENGINE,
+    "Engine that integrates the motion: compiled, or drake (the reference, seconds a run).",
+    "NAME",
 )
 LIVE: Any = option(
     False, "Let the page run the machine too: folded, with sliders, without a server."

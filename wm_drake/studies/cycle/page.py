@@ -1,12 +1,15 @@
 """Show a cycle: its course in panels one below the other, and a table of its parts."""
 
+from typing import Any
+
 import numpy as np
 import xarray as xr
 
 from wm_drake.parameters import MachineParameters
 from wm_drake.report import figure as fig
+from wm_drake.report.chart import panel
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import TIME, Quantity, quantity_of, shown, text_of
+from wm_drake.report.quantity import TIME, shown, text_of
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.answer import Answer, Part, Plot
 from wm_drake.studies.cycle.study import Cycle
@@ -18,6 +21,9 @@ HOW = (
     "of the empty drum. Loads of the feet: a rigid cabinet that stands fast on a rigid floor, with "
     "its weight."
 )
+
+
+FROM_ZERO = {"range": (0.0, None)}
 
 
 def cycle_answer(
@@ -92,65 +98,28 @@ def summary(case: Case, course: xr.Dataset) -> str:
     return " ".join(sentences)
 
 
+SHOWN: dict[str, dict[str, Any]] = {
+    "drum_speed": {},
+    "mass": {"y": FROM_ZERO},
+    "unbalance": {"y": FROM_ZERO},
+    "amplitude": {"y": FROM_ZERO, "by": "sensor"},
+    "gap": {"y": FROM_ZERO},
+    "foot_smallest": {"drawn": ["foot_smallest", "foot_largest"], "words": "load of a foot"},
+    "sideways": {"y": FROM_ZERO, "words": "force along the floor"},
+}
+"""How variables of a cycle are drawn over time, as far as the machine has them."""
+
+
 def course_plot(course: xr.Dataset) -> Plot:
     """Return speed, unbalance, amplitudes, gap and loads of the feet over the cycle."""
-    time = shown(course.time)
+    ends = {"range": (0.0, shown(course.time)[-1].item())}
+    known = {n: how for n, how in SHOWN.items() if n in course and course[n].notnull().any()}
     panels = [
-        _panel(course, time, ("drum_speed",)),
-        _panel(course, time, ("mass",), from_zero=True),
-        _panel(course, time, ("unbalance",), from_zero=True),
-        _amplitudes(course, time),
+        panel(course, "time", **{"drawn": [name], "x": ends, **how}) for name, how in known.items()
     ]
-    if course.gap.notnull().any():
-        panels.append(_panel(course, time, ("gap",), from_zero=True))
-    if "foot_smallest" in course:
-        panels.append(_panel(course, time, ("foot_smallest", "foot_largest"), "load of a foot"))
-        panels.append(_panel(course, time, ("sideways",), "force along the floor", from_zero=True))
-    figure = fig.Figure(panels=fig.in_grid(panels, 1, share="x"), height=150.0)
     window = TIME.text(float(np.diff(course.time.values[:2]).sum()))
     return Plot(
-        figure,
-        f"Course of the cycle: {', '.join(panel.name for panel in panels)} over time.",
+        fig.Figure(panels=fig.in_grid(panels, 1, share="x"), height=150.0),
+        f"Course of the cycle: {', '.join(one.name for one in panels)} over time.",
         HOW.format(window=window),
     )
-
-
-def _panel(
-    course: xr.Dataset,
-    time: np.ndarray,
-    names: tuple[str, ...],
-    words: str = "",
-    *,
-    from_zero: bool = False,
-) -> fig.Panel:
-    """Return a panel of variables of one unit over time."""
-    quantity: Quantity = quantity_of(course[names[0]])
-    quantity = quantity.named(words) if words else quantity
-    marks = tuple(
-        fig.Line(time, shown(course[name]), color=color, key=_key(course[name], names))
-        for name, color in zip(names, fig.COLOURS, strict=False)
-    )
-    y = fig.Axis(label=quantity.label, range=(0.0 if from_zero else None, None))
-    x = fig.Axis(label=TIME.label, range=(0.0, float(time[-1])))
-    return fig.Panel(name=quantity.words, marks=marks, x=x, y=y)
-
-
-def _key(array: xr.DataArray, names: tuple[str, ...]) -> str:
-    return quantity_of(array).words if len(names) > 1 else ""
-
-
-def _amplitudes(course: xr.Dataset, time: np.ndarray) -> fig.Panel:
-    """Return the amplitudes of all sensors over time."""
-    quantity = quantity_of(course.amplitude)
-    marks = tuple(
-        fig.Line(time, shown(course.amplitude.sel(sensor=name)), color=color, key=f"sensor {name}")
-        for name, color in zip(course.sensor.values.tolist(), _colours(course), strict=True)
-    )
-    x = fig.Axis(label=TIME.label, range=(0.0, float(time[-1])))
-    y = fig.Axis(label=quantity.label, range=(0.0, None))
-    return fig.Panel(name=quantity.words, marks=marks, x=x, y=y)
-
-
-def _colours(course: xr.Dataset) -> list[str]:
-    count = course.sizes["sensor"]
-    return [fig.COLOURS[k % len(fig.COLOURS)] for k in range(count)]
