@@ -64,13 +64,14 @@ def marks_of(
 
 
 def _parts(data: xr.Dataset, by: str) -> Iterator[xr.Dataset]:
-    """Yield the parts of data with the labels of a dimension or coordinate; all data without."""
+    """Yield the data with each label of a dimension or coordinate; all data without one."""
     if not by:
         yield data
     elif by in data.dims:
         yield from (data.isel({by: place}) for place in range(data.sizes[by]))
     else:
-        yield from (part for _, part in data.groupby(by))
+        (dim,), labels = data[by].dims, data[by].values
+        yield from (data.isel({dim: labels == label}) for label in dict.fromkeys(labels.tolist()))
 
 
 def panel(
@@ -80,6 +81,7 @@ def panel(
     *,
     words: str = "",
     title: str = "",
+    name: str = "",
     below: Iterable[fig.Mark] = (),
     above: Iterable[fig.Mark] = (),
     x: Mapping[str, Any] | None = None,
@@ -89,7 +91,8 @@ def panel(
     """Return variables of one unit over a coordinate, as of `marks_of`.
 
     Args:
-        words: Name of the panel and of its vertical axis; that of the first variable if empty.
+        words: Words of the vertical axis; those of the first variable if empty.
+        title, name: As of `fig.Panel`.
         below, above: Marks below and above those of the data.
         x, y: More fields of the axes.
         how: Arguments of `marks_of`.
@@ -97,7 +100,7 @@ def panel(
     quantity = quantity_of(data[next(iter(drawn))])
     quantity = quantity.named(words) if words else quantity
     return fig.Panel(
-        name="" if title else quantity.words,
+        name=name,
         title=title,
         marks=(*below, *marks_of(data, over, drawn, **how), *above),
         x=axis(data[over], **(x or {})),

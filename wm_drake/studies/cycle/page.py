@@ -9,7 +9,7 @@ from wm_drake.parameters import MachineParameters
 from wm_drake.report import figure as fig
 from wm_drake.report.chart import panel
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import TIME, shown, text_of
+from wm_drake.report.quantity import TIME, quantity_of, shown, text_of
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.answer import Answer, Part, Plot
 from wm_drake.studies.cycle.study import Cycle
@@ -98,14 +98,15 @@ def summary(case: Case, course: xr.Dataset) -> str:
     return " ".join(sentences)
 
 
+LOAD, FORCE = "load of a foot", "force along the floor"
 SHOWN: dict[str, dict[str, Any]] = {
     "drum_speed": {},
     "mass": {"y": FROM_ZERO},
     "unbalance": {"y": FROM_ZERO},
     "amplitude": {"y": FROM_ZERO, "by": "sensor"},
     "gap": {"y": FROM_ZERO},
-    "foot_smallest": {"drawn": ["foot_smallest", "foot_largest"], "words": "load of a foot"},
-    "sideways": {"y": FROM_ZERO, "words": "force along the floor"},
+    "foot_smallest": {"drawn": ["foot_smallest", "foot_largest"], "words": LOAD, "name": LOAD},
+    "sideways": {"y": FROM_ZERO, "words": FORCE, "name": FORCE},
 }
 """How variables of a cycle are drawn over time, as far as the machine has them."""
 
@@ -115,7 +116,10 @@ def course_plot(course: xr.Dataset) -> Plot:
     ends = {"range": (0.0, shown(course.time)[-1].item())}
     known = {n: how for n, how in SHOWN.items() if n in course and course[n].notnull().any()}
     panels = [
-        panel(course, "time", **{"drawn": [name], "x": ends, **how}) for name, how in known.items()
+        panel(
+            course, "time", **{"drawn": [n], "x": ends, "name": quantity_of(course[n]).words, **how}
+        )
+        for n, how in known.items()
     ]
     window = TIME.text(float(np.diff(course.time.values[:2]).sum()))
     return Plot(

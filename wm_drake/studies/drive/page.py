@@ -6,13 +6,13 @@ import numpy as np
 import xarray as xr
 
 from wm_drake.parameters import MachineParameters, SpinProfile
+from wm_drake.report import chart
 from wm_drake.report import figure as fig
 from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.quantity import SHARE, SPEED, quantity_of, shown, text_of
 from wm_drake.studies.answer import Answer, Part, Plot
 from wm_drake.studies.drive.study import (
     PASSES,
-    PLANTED,
     TORQUE_LIMIT,
     UNBALANCE,
     estimation_errors,
@@ -145,25 +145,20 @@ def map_plot(grid: xr.Dataset, passed: np.ndarray, ratio: float) -> Plot:
 
 def estimation_plot(estimation: xr.Dataset) -> Plot:
     """Return estimated over planted unbalance."""
-    planted = shown(estimation.planted)
-    series = {
-        "from_speed_alone": ("speed ripple alone, J dw/dt", "triangle-up", fig.QUIET),
-        "from_torque_alone": ("torque alone", "triangle-down", fig.MEASURED),
-        "estimated": ("both", "circle", fig.OURS),
+    drawn = {
+        "from_speed_alone": {"key": "speed ripple alone, J dw/dt", "symbol": "triangle-up"},
+        "from_torque_alone": {"key": "torque alone", "symbol": "triangle-down"},
+        "estimated": {"key": "both", "color": fig.OURS},
     }
-    points = [
-        fig.Points(planted, shown(estimation[name]), symbol=symbol, color=color, key=key)
-        for name, (key, symbol, color) in series.items()
-    ]
-    ends = [0.0, 1.02 * planted.max()]
-    panel = fig.Panel(
-        marks=(*points, fig.Line(ends, ends, color=fig.MARK, key="planted")),
-        x=fig.Axis(label=PLANTED.label),
-        y=fig.Axis(label=quantity_of(estimation.estimated).label),
-    )
+    drawn["from_speed_alone"]["color"] = fig.QUIET
+    drawn["from_torque_alone"]["color"] = fig.MEASURED
+    ends = [0.0, 1.02 * shown(estimation.planted).max()]
+    line = fig.Line(ends, ends, color=fig.MARK, key="planted")
+    y = {"label": quantity_of(estimation.estimated).label}
+    panel = chart.panel(estimation, "planted", drawn, kind=fig.Points, above=[line], y=y)
     return Plot(
         fig.Figure(panels=(panel,), height=340.0),
-        f"{len(planted)} random loads.",
+        f"{estimation.sizes['random_load']} random loads.",
         "Estimated over planted unbalance. Torque or speed alone see only their share of it, which "
         "depends on the controller.",
     )

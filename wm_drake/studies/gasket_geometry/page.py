@@ -9,6 +9,7 @@ import xarray as xr
 from wm_drake.parameters.files import yaml_text
 from wm_drake.parameters.gasket_drawing import GasketDrawing
 from wm_drake.parameters.units import Unit
+from wm_drake.report.chart import panel
 from wm_drake.report.figure import MEASURED, OURS, Axis, Figure, Line, Panel, Points, in_grid
 from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.quantity import shown, text_of
@@ -156,18 +157,9 @@ def _over_factors(
     for factor in factors:
         x = factor.quantity.values(factor.value(surfaces["level"].values))
         surface = shown(surfaces.section.sel(factor=factor.name))
-        marks = (
-            Line(x, surface, key="surface, others in the middle"),
-            Points(
-                shown(drawings[factor.name]),
-                shown(drawings[GAP]),
-                color=MEASURED,
-                size=5.0,
-                key="drawings",
-            ),
-        )
-        x_axis, y_axis = Axis(label=factor.quantity.label), Axis(label=RESPONSES[GAP].label)
-        panels.append(Panel(marks=marks, x=x_axis, y=y_axis))
+        line = Line(x, surface, key="surface, others in the middle")
+        style = {"kind": Points, "color": MEASURED, "size": 5.0, "key": "drawings"}
+        panels.append(panel(drawings, factor.name, {GAP: style}, below=[line]))
     return Plot(
         Figure(panels=in_grid(panels, 2, share="y"), height=220.0),
         "Four panels: the smallest gap over each factor.",
