@@ -42,7 +42,7 @@ from wm_drake.simulation.displacements import band_pass
 from wm_drake.simulation.mounts import mount_names, sums_size
 
 
-class Candidate(NamedTuple):
+class MovedNumber(NamedTuple):
     """Value of a number that may enter the compiled functions, and the ends of its range. [SI]"""
 
     value: float
@@ -55,7 +55,7 @@ class Candidate(NamedTuple):
         return self.low, self.high
 
 
-Candidates = Mapping[str, Candidate]
+Candidates = Mapping[str, MovedNumber]
 """Value, smallest and largest value of each number that might change, by key path. [SI]"""
 MOST_UNBALANCES = 8
 """Largest number of point masses of a load in a page."""
@@ -116,7 +116,7 @@ class _Chosen:
             self.slopes[GASKET] = contents.start - without
         self._leave_out_mixed()
 
-    def _add(self, key: str, candidate: Candidate) -> None:
+    def _add(self, key: str, candidate: MovedNumber) -> None:
         table, name, *_ = [*key.split("."), ""]
         if key.startswith(RESIDUAL):
             return

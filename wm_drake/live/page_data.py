@@ -16,8 +16,8 @@ from wm_drake.export.page_contents import Contents
 from wm_drake.export.page_kernel import AFTERWARDS, FIRST, MEANWHILE, page_code
 from wm_drake.export.page_model import (
     UNBALANCE_FIELDS,
-    Candidate,
     Candidates,
+    MovedNumber,
     PageModel,
     page_model,
     without_wrong,
@@ -231,7 +231,7 @@ def _candidates(opened: OpenMachine) -> Candidates:
             continue
         si = 1.0 / slider.unit.from_si(1.0)
         value = float(slider.number.nominal or 0.0)
-        candidates[key] = Candidate(value, slider.low * si, slider.high * si)
+        candidates[key] = MovedNumber(value, slider.low * si, slider.high * si)
     return candidates
 
 

@@ -7,6 +7,7 @@ with marks of their own are declared mark by mark (`report/figure.py`).
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -51,13 +52,13 @@ def marks_of(
     styles = drawn if isinstance(drawn, Mapping) else {name: {} for name in drawn}
     marks: list[fig.Mark] = []
     for number, part in enumerate(_parts(data, by)):
-        for place, (name, own) in enumerate(styles.items()):
+        for place, (name, of_variable) in enumerate(styles.items()):
             look: dict[str, Any] = {
                 "color": fig.COLOURS[(number if by else place) % len(fig.COLOURS)]
             }
             entry = f"{by} {part[by].values.flat[0]}" if by else quantity_of(part[name]).words
             look["key"] = entry if by or len(styles) > 1 else ""
-            look |= {**style, **own, **({} if key is None else {"key": key(part, name)})}
+            look |= {**style, **of_variable, **({} if key is None else {"key": key(part, name)})}
             kind: Any = look.pop("kind", fig.Line)
             marks.append(kind(shown(part[over]), shown(part[name]), **look))
     return tuple(marks)
@@ -79,33 +80,28 @@ def panel(
     over: str,
     drawn: Drawn,
     *,
-    words: str = "",
-    title: str = "",
-    name: str = "",
-    below: Iterable[fig.Mark] = (),
-    above: Iterable[fig.Mark] = (),
     x: Mapping[str, Any] | None = None,
     y: Mapping[str, Any] | None = None,
     **how: Any,
 ) -> fig.Panel:
     """Return variables of one unit over a coordinate, as of `marks_of`.
 
+    The axes have the quantities of the coordinate and of the first variable.
+
     Args:
-        words: Words of the vertical axis; those of the first variable if empty.
-        title, name: As of `fig.Panel`.
-        below, above: Marks below and above those of the data.
-        x, y: More fields of the axes.
+        x, y: Other fields of the axes.
         how: Arguments of `marks_of`.
     """
-    quantity = quantity_of(data[next(iter(drawn))])
-    quantity = quantity.named(words) if words else quantity
     return fig.Panel(
-        name=name,
-        title=title,
-        marks=(*below, *marks_of(data, over, drawn, **how), *above),
+        marks=marks_of(data, over, drawn, **how),
         x=axis(data[over], **(x or {})),
-        y=axis(quantity, **(y or {})),
+        y=axis(data[next(iter(drawn))], **(y or {})),
     )
+
+
+def between(below: Iterable[fig.Mark], panel: fig.Panel, *above: fig.Mark) -> fig.Panel:
+    """Return a panel with more marks below and above its own."""
+    return replace(panel, marks=(*below, *panel.marks, *above))
 
 
 def band(data: xr.Dataset, over: str, low: str, high: str, **style: Any) -> fig.Area:

@@ -328,7 +328,7 @@ def curve_plot(base: xr.Dataset) -> Plot:
         at, key = shown(base.pays_from).item(), "free balls pay from here"
         pays.append(fig.Rule(at, "y", dash="dotted", color=fig.QUIET, key=key))
     x, y = {"label": SPEED.label}, {"label": AMPLITUDE.label, "is_log": True}
-    panel = chart.panel(base, "from", styles, above=pays, x=x, y=y)
+    panel = chart.between((), chart.panel(base, "from", styles, x=x, y=y), *pays)
     peaks = [
         f"{_size(base[f'peak_{name}'])} at {SPEED.text(_speed_of_peak(base[name]))}"
         for name in ("free", "locked")

@@ -1,5 +1,6 @@
 """Show a cycle: its course in panels one below the other, and a table of its parts."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -98,29 +99,31 @@ def summary(case: Case, course: xr.Dataset) -> str:
     return " ".join(sentences)
 
 
-LOAD, FORCE = "load of a foot", "force along the floor"
 SHOWN: dict[str, dict[str, Any]] = {
     "drum_speed": {},
     "mass": {"y": FROM_ZERO},
     "unbalance": {"y": FROM_ZERO},
     "amplitude": {"y": FROM_ZERO, "by": "sensor"},
     "gap": {"y": FROM_ZERO},
-    "foot_smallest": {"drawn": ["foot_smallest", "foot_largest"], "words": LOAD, "name": LOAD},
-    "sideways": {"y": FROM_ZERO, "words": FORCE, "name": FORCE},
+    "foot_smallest": {"drawn": ["foot_smallest", "foot_largest"]},
+    "sideways": {"y": FROM_ZERO},
 }
 """How variables of a cycle are drawn over time, as far as the machine has them."""
+
+WORDS = {"foot_smallest": "load of a foot", "sideways": "force along the floor"}
+"""Words of panels, where those of their first variable do not do."""
 
 
 def course_plot(course: xr.Dataset) -> Plot:
     """Return speed, unbalance, amplitudes, gap and loads of the feet over the cycle."""
-    ends = {"range": (0.0, shown(course.time)[-1].item())}
-    known = {n: how for n, how in SHOWN.items() if n in course and course[n].notnull().any()}
-    panels = [
-        panel(
-            course, "time", **{"drawn": [n], "x": ends, "name": quantity_of(course[n]).words, **how}
-        )
-        for n, how in known.items()
-    ]
+    ends, panels = {"range": (0.0, shown(course.time)[-1].item())}, []
+    for name, how in SHOWN.items():
+        if name in course and course[name].notnull().any():
+            quantity = quantity_of(course[name])
+            quantity = quantity.named(WORDS.get(name, quantity.words))
+            how = {"drawn": [name], "x": ends, **how}
+            how["y"] = {"label": quantity.label, **how.get("y", {})}
+            panels.append(replace(panel(course, "time", **how), name=quantity.words))
     window = TIME.text(float(np.diff(course.time.values[:2]).sum()))
     return Plot(
         fig.Figure(panels=fig.in_grid(panels, 1, share="x"), height=150.0),

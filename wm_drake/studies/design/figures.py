@@ -3,6 +3,8 @@
 `pick.js` moves what has the label `PICKED` when a reader picks another design.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import xarray as xr
 
@@ -91,16 +93,18 @@ def envelopes_figure(envelopes: xr.Dataset, picked: int) -> fig.Figure:
     time = shown(envelopes["time"])
     of_picked = envelopes.sel(design=picked)
     panels = [
-        chart.panel(
-            of_picked.sel(sensor=sensor),
-            "time",
-            {
-                "nominal": {"color": fig.QUIET, "key": "the machine itself"},
-                "envelope": {"color": fig.MEASURED, "width": 2.2, "key": PICKED},
-            },
+        replace(
+            chart.panel(
+                of_picked.sel(sensor=sensor),
+                "time",
+                {
+                    "nominal": {"color": fig.QUIET, "key": "the machine itself"},
+                    "envelope": {"color": fig.MEASURED, "width": 2.2, "key": PICKED},
+                },
+                x={"label": TIME.label, "range": (0.0, float(time[0] + time[-1]))},
+                y={"label": "", "range": (0.0, 1.05 * largest or 1.0)},
+            ),
             title=quantity_of(envelopes.envelope).named(sensor).label,
-            x={"label": TIME.label, "range": (0.0, float(time[0] + time[-1]))},
-            y={"label": "", "range": (0.0, 1.05 * largest or 1.0)},
         )
         for sensor in envelopes["sensor"].values.tolist()
     ]
@@ -112,5 +116,5 @@ def history_figure(front: xr.Dataset) -> fig.Figure:
     """Return the hypervolume over the number of evaluated designs."""
     last = {"color": fig.MEASURED, "size": 8.0, "kind": fig.Points}
     end = chart.marks_of(front.isel(generation=[-1]), "evaluations", {"hypervolume": last})
-    panel = chart.panel(front, "evaluations", ["hypervolume"], above=end, width=2.2)
-    return fig.Figure(panels=(panel,), height=240.0)
+    panel = chart.panel(front, "evaluations", ["hypervolume"], width=2.2)
+    return fig.Figure(panels=(chart.between((), panel, *end),), height=240.0)

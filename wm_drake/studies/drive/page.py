@@ -1,5 +1,6 @@
 """Show the drive study: smallest torque limits, map, estimated unbalance."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -23,18 +24,17 @@ from wm_drake.studies.drive.study import (
 def drive_answer(
     parameters: MachineParameters,
     profile: SpinProfile,
-    thresholds: xr.Dataset,
-    grid: xr.Dataset,
-    estimation: xr.Dataset | None,
+    data: Mapping[str, xr.Dataset],
     speed: float,
 ) -> Answer:
     """Return the answer of the study.
 
     Args:
-        thresholds, grid, estimation: As of `find_thresholds`, `torque_map` and
-            `estimate_unbalance` in `wm_drake.studies.drive.study`.
+        data: `thresholds`, `map` and, if there is one, `estimation`, as of `find_thresholds`,
+            `torque_map` and `estimate_unbalance` in `wm_drake.studies.drive.study`.
         speed: Speed of the estimation. [rad/s]
     """
+    thresholds, grid, estimation = data["thresholds"], data["map"], data.get("estimation")
     ratio = motor_with_limit(parameters)[0].belt_ratio
     passed = grid.end.values >= PASSES * profile.speed[-1]
     torque_map = Part(
@@ -155,9 +155,9 @@ def estimation_plot(estimation: xr.Dataset) -> Plot:
     ends = [0.0, 1.02 * shown(estimation.planted).max()]
     line = fig.Line(ends, ends, color=fig.MARK, key="planted")
     y = {"label": quantity_of(estimation.estimated).label}
-    panel = chart.panel(estimation, "planted", drawn, kind=fig.Points, above=[line], y=y)
+    panel = chart.panel(estimation, "planted", drawn, kind=fig.Points, y=y)
     return Plot(
-        fig.Figure(panels=(panel,), height=340.0),
+        fig.Figure(panels=(chart.between((), panel, line),), height=340.0),
         f"{estimation.sizes['random_load']} random loads.",
         "Estimated over planted unbalance. Torque or speed alone see only their share of it, which "
         "depends on the controller.",

@@ -3,7 +3,7 @@
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import xarray as xr
@@ -184,12 +184,11 @@ def amplitude_figure(result: MachineModes) -> fig.Figure:
     damping = data.damping_ratio.copy(data=without_rounding(data.damping_ratio.values))
     data = data.assign(damping_ratio=damping)
     at = fig.Rule(float(AMPLITUDE.values(result.amplitude)), "y", color=fig.MARK, dash="dotted")
-    how: dict[str, Any] = {"by": "mode", "key": _mode_of, "above": [at]}
-    how |= {"x": {"is_log": True}, "y": {"range": (0.0, None)}}
-    panels = [
-        chart.panel(data, "amplitude", [name], name=quantity_of(data[name]).words, **how)
-        for name in ("frequency", "damping_ratio")
-    ]
+    panels = []
+    for name in ("frequency", "damping_ratio"):
+        x, y = {"is_log": True}, {"range": (0.0, None)}
+        curves = chart.panel(data, "amplitude", [name], x=x, y=y, by="mode", key=_mode_of)
+        panels.append(replace(chart.between((), curves, at), name=quantity_of(data[name]).words))
     return fig.Figure(panels=fig.in_grid(panels, 2), height=310.0)
 
 

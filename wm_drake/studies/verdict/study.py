@@ -76,7 +76,7 @@ class VerdictQuestion:
     changes: Mapping[str, str]
 
 
-class Candidate(NamedTuple):
+class ChangedRuns(NamedTuple):
     """Runs over `load` with a change of the machine: its values, as text by key path."""
 
     runs: xr.Dataset
@@ -124,7 +124,7 @@ def influences(experiment: Experiment, keys: Iterable[str], change: float) -> xr
 
 def proposed(
     experiment: Experiment, base: xr.Dataset, tried: xr.Dataset, chosen: Sequence[Response]
-) -> Candidate | None:
+) -> ChangedRuns | None:
     """Return the proposed change, as of `wm_drake.studies.proposal`.
 
     The candidates are the single changes, and the best one with the best additions to it.
@@ -147,7 +147,7 @@ def proposed(
     value = aim.value(worst.reshape(-1, len(goals))).reshape(worst.shape[:2])
     ranked = np.argsort(-value.max(axis=1), kind="stable")[:MOST_TRIED]
     singles = [tried.isel(key=k, side=value[k].argmax()) for k in ranked.tolist()]
-    single = [Candidate(one, {one["key"].item(): one.text.item()}) for one in singles]
+    single = [ChangedRuns(one, {one["key"].item(): one.text.item()}) for one in singles]
     candidates = [*single, *_combined(experiment, aim, single, chosen)]
     values = np.array([worst_of(values_of(one.runs, chosen), goals) for one in candidates])
     number = aim.proposed(values, [len(one.changes) for one in candidates])
@@ -155,8 +155,8 @@ def proposed(
 
 
 def _combined(
-    experiment: Experiment, aim: Aim, singles: Sequence[Candidate], chosen: Sequence[Response]
-) -> list[Candidate]:
+    experiment: Experiment, aim: Aim, singles: Sequence[ChangedRuns], chosen: Sequence[Response]
+) -> list[ChangedRuns]:
     """Return the best single change with each addition, then of the best pair, ...
 
     They end where no addition is better.
@@ -167,7 +167,7 @@ def _combined(
         singles: Single changes, the best one first.
         chosen: Responses.
     """
-    best, combined = singles[0], list[Candidate]()
+    best, combined = singles[0], list[ChangedRuns]()
     useful = {key: text for one in singles for key, text in one.changes.items()}
     for _ in range(MOST_COMBINED - 1):
         made = best.changes
@@ -177,7 +177,7 @@ def _combined(
         if not machines:
             break
         data = experiment.at(list(machines), machines.values(), "combinations")
-        added = [Candidate(data.sel(point=name), named[name]) for name in machines]
+        added = [ChangedRuns(data.sel(point=name), named[name]) for name in machines]
         values = [worst_of(values_of(one.runs, chosen), aim.goals) for one in (best, *added)]
         first, *others = aim.value(np.array(values)).tolist()
         combined += added
@@ -227,7 +227,7 @@ def proposal(question: VerdictQuestion, states: xr.Dataset, tried: xr.Dataset) -
     return proposal_of(runs, texts, is_confirmed=bool(changes), command=command)
 
 
-def states_of(base: xr.Dataset, changed: Candidate | None) -> xr.Dataset:
+def states_of(base: xr.Dataset, changed: ChangedRuns | None) -> xr.Dataset:
     """Return the runs of the machine as it is, and with the proposed change, over `state`.
 
     Args:
