@@ -205,7 +205,7 @@ def parts_of(course: xr.Dataset, case: Case) -> xr.Dataset:
     """Return the extremes in each region of the profile, over `part`; the whole cycle without any.
 
     Args:
-        course: As of `course_of`.
+        course: `course` of a `Cycle`.
     """
     regions = [(r.name, r.begin, r.end) for r in case.profile.regions]
     regions = regions or [("whole cycle", 0.0, case.profile.duration)]

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from wm_drake.parameters import MachineParameters
-from wm_drake.parameters.tolerances import Limit
+from wm_drake.parameters.limits import Limit
 from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import MISSING, listed
 from wm_drake.report.labelled import LabelledTable
