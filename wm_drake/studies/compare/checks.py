@@ -6,8 +6,7 @@ from scipy.stats import beta
 
 from wm_drake.errors import input_error
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Share
-from wm_drake.report.quantity import SPEED, Quantity
+from wm_drake.report.quantity import SHARE, SPEED
 from wm_drake.simulation.band import HIGHEST_PART
 from wm_drake.simulation.orders import REVOLUTIONS, order_vectors
 from wm_drake.simulation.records import profile_of
@@ -22,7 +21,6 @@ which finds the place where noise is most like the prediction (120 drawn records
 NEIGHBOURS = (1.0 - 3.0 / REVOLUTIONS, 1.0 + 3.0 / REVOLUTIONS)
 """Orders on both sides of 1 that a Blackman window of `REVOLUTIONS` just separates from it."""
 
-SHARE = Quantity("", Share(), 0)
 
 CONTRADICTION = 0.05
 """Largest misfit of a recorded drum speed, by the highest speed of the profile."""

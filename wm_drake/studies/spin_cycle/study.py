@@ -32,7 +32,7 @@ RECORDED, RECORDED_REGIONS = "region_displacement_recorded", "recorded regions"
 """What accelerometers would tell of a run, which is compared with those of a measurement; and the
 measure that has it."""
 
-MASS = Quantity("mass", Unit("kg", "g"), 0)
+GRAMS = Quantity("mass", Unit("kg", "g"), 0)
 PHASE = Quantity("phase", Unit("rad", "deg"), 0)
 ERROR = Quantity("average error", Share(), 1)
 INTEGRATED = Quantity("direct vs. integrated", Share(), 2)
@@ -83,17 +83,15 @@ def run_spin_cycle(
     data = placed(table, {"case": [case.name for case in cases]}).rename(
         region_displacement="rms", region_displacement_integrated="rms_from_acceleration"
     )
-    if RECORDED in data:
-        data = data.rename({RECORDED: "rms_recorded"})
+    data = data.rename({RECORDED: "rms_recorded"} if RECORDED in data else {})
     for name in ("rms", "rms_from_acceleration", "rms_recorded"):
-        if name not in data:
-            continue
-        data[name].attrs |= RMS.attributes()
+        if name in data:
+            data[name] = RMS.on(data[name])
     published = [case.published_error_percent for case in cases]
     errors = ERROR.to_si([np.nan if error is None else error for error in published])
     labels = {
-        "front": MASS.named("front mass").variable("case", [case.front for case in cases]),
-        "rear": MASS.named("rear mass").variable("case", [case.rear for case in cases]),
+        "front": GRAMS.named("front mass").variable("case", [case.front for case in cases]),
+        "rear": GRAMS.named("rear mass").variable("case", [case.rear for case in cases]),
         "phase": PHASE.variable("case", [case.phase for case in cases]),
     }
     data["published_error"] = ERROR.named("average error, [A] Table 9").variable("case", errors)
