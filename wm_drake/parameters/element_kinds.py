@@ -31,6 +31,11 @@ class DrumElement(OfKind):
 
     y: u.Length = 0.0
 
+    @property
+    def mass_on_drum(self) -> float:
+        """Return the mass of the element that moves with the axis of the drum. [kg]"""
+        return 0.0
+
 
 class Element(OfKind):
     """An element in its place; the parameters of an element kind extend this type.
@@ -73,11 +78,7 @@ class HasParameters(Protocol):
 ELEMENT_KINDS: Registry[HasParameters] = Registry(
     "element kind",
     "wm_drake.elements",
-    [
-        "wm_drake.elements.ball_ring:BALL_RING",
-        "wm_drake.elements.liquid_ring:LIQUID_RING",
-        "wm_drake.elements.stop:STOP",
-    ],
+    ["wm_drake.elements.stop:STOP"],
 )
 """Registered element kinds, `wm_drake.elements.kind.ElementKind`, by name."""
 

@@ -25,6 +25,7 @@ it calls as often as it needs: once for a plain study, many times for an adaptiv
 of libraries and bisections are written as plain functions, and tests make up the runs.
 """
 
+import functools
 import pkgutil
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -33,11 +34,12 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from wm_drake.engines import DEFAULT_ENGINE
 from wm_drake.errors import check_known
 from wm_drake.registry import Registry
+from wm_drake.studies.blocks import blocks_of
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     import pandas as pd
@@ -103,9 +105,6 @@ ENGINE: Any = option(
     DEFAULT_ENGINE,
     "Engine that integrates the motion: compiled, or drake (the reference, seconds a run).",
     "NAME",
-)
-LIVE: Any = option(
-    False, "Let the page run the machine too: folded, with sliders, without a server."
 )
 SEED: Any = option(0, "Seed of all random numbers.", "N", ge=0, le=2**32 - 1)
 
@@ -323,6 +322,14 @@ class Study:
     has_machine: bool = True
     folder: str = ""
 
+    @functools.cached_property
+    def all_options(self) -> type[OptionModel]:
+        """Return the options with those of the blocks that packages add to the page."""
+        added = {k: v for block in blocks_of(self.command) for k, v in block.options.items()}
+        if not added:
+            return self.options
+        return create_model(self.options.__name__, __base__=self.options, **added)
+
     @property
     def command(self) -> str:
         """Words of the command after the program's name."""
@@ -335,17 +342,12 @@ class Study:
 
 
 SHIPPED = (
-    "balancer.options:BALANCER",
     "calibrate.options:CALIBRATE",
     "cycle.options:CYCLE",
-    "design.options:DESIGN",
     "drive.options:DRIVE",
     "gasket.options:GASKET",
-    "gasket_curves.options:GASKET_CURVES",
     "gasket_damping.options:GASKET_DAMPING",
-    "gasket_geometry.options:GASKET_GEOMETRY",
     "modes.options:MODES",
-    "next.options:NEXT",
     "response.options:RESPONSE",
     "spin.options:SPIN",
     "spin_cycle.options:SPIN_CYCLE",
@@ -353,7 +355,7 @@ SHIPPED = (
     "tolerance.options:TOLERANCE",
     "verdict.options:VERDICT",
 )
-"""Studies of this package: module below `wm_drake.studies`, and name."""
+"""Studies of the core: module below `wm_drake.studies`, and name."""
 
 STUDIES: Registry[Study] = Registry(
     "study", "wm_drake.studies", [f"wm_drake.studies.{place}" for place in SHIPPED]
