@@ -81,8 +81,8 @@ class Registry(Mapping[str, Declaration], Generic[Declaration]):
         if not self._is_loaded:
             self._is_loaded = True
             pairs = [*((place, place) for place in self._shipped), *edge(self._group).items()]
-            own = (importlib.metadata.EntryPoint(*pair, self._group) for pair in pairs)
-            for entry in (*own, *importlib.metadata.entry_points(group=self._group)):
+            shipped = (importlib.metadata.EntryPoint(*pair, self._group) for pair in pairs)
+            for entry in (*shipped, *importlib.metadata.entry_points(group=self._group)):
                 self._register_entry_point(entry)
         return self._declarations
 

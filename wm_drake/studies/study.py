@@ -325,7 +325,9 @@ class Study:
     @functools.cached_property
     def all_options(self) -> type[OptionModel]:
         """Return the options with those of the blocks that packages add to the page."""
-        added = {k: v for block in blocks_of(self.command) for k, v in block.options.items()}
+        added: dict[str, Any] = {
+            k: v for block in blocks_of(self.command) for k, v in block.options.items()
+        }
         if not added:
             return self.options
         return create_model(self.options.__name__, __base__=self.options, **added)
