@@ -22,9 +22,10 @@ def _of_verdict(task: "VerdictTask") -> Extend:
     command = " ".join(["wm-drake study next", options.machine, *sets, *profile])
 
     def known() -> "Knowledge":
-        from wm_drake.studies.next.task import UNMEASURED, tolerances_of
+        from wm_drake.studies.next.knowledge import of_file
+        from wm_drake.studies.next.task import UNMEASURED
 
-        return tolerances_of(UNMEASURED, task.machine, options.profile)
+        return of_file(task.machine, UNMEASURED)
 
     return lambda executor, answer: _with_block(
         executor, answer, known, command, task.cases[0].profile
@@ -37,7 +38,7 @@ def _of_calibrate(task: Any) -> Extend | None:
 
     if not isinstance(task, CalibrateTask):
         return None
-    words = ["wm-drake study next", task.options.machine, f"--free {task.options.free}"]
+    words = ["wm-drake study next", task.options.machine, f"--vary {task.options.vary}"]
 
     def known() -> "Knowledge":
         from wm_drake.studies.next.knowledge import of_calibration

@@ -93,15 +93,16 @@ class VerdictTask(Task):
         tried = influences(experiment, changeable(parameters), change)
         changed = proposed(experiment, base, tried, self.responses)
         if changed is not None:
-            better = build_machine(with_values(parameters, changed.attrs["changes"]))
+            better = build_machine(with_values(parameters, changed.changes))
             samples.append(self._laundry(better).trials(executor).samples())
         question = VerdictQuestion(
             parameters,
             self.clearance,
             change,
             self.responses,
-            self.laundry.tolerances.about,
+            self.laundry.file.about,
             self._command,
+            {} if changed is None else changed.changes,
         )
         return verdict_answer(
             question,
