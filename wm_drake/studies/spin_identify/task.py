@@ -119,6 +119,7 @@ class SpinIdentifyTask(Task):
             list(self.tests.values()),
             loads,
             self.options.by,
+            executor.ledger,
         )
         title = f"Parameters of machine {parameters.name} identified from records of a spin cycle"
         words, tests = (title, "identified"), list(self.tests.values())
