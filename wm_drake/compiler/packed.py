@@ -230,8 +230,8 @@ class PackedLayout:
             else:
                 layout, begin = kind.inside(packed, at)
                 before = "" if field == "law" else f"{field}."
-                for name, *place in layout.places(packed, begin):
-                    yield f"{before}{name}", *place
+                for name, place, of_part, unit in layout.places(packed, begin):
+                    yield f"{before}{name}", place, of_part, unit
             at += generic(kind.size)(packed, at) if kind.size else 0
 
     def replaced(self, packed: _FloatArray, **values: Any) -> _FloatArray:

@@ -12,7 +12,7 @@ from wm_drake.errors import input_error
 from wm_drake.laws.table import CURVE, scale_to, slope_at_zero
 
 
-class Number(NamedTuple):
+class NumberWithUnit(NamedTuple):
     """A number of an element in SI; of a table its slope at 0."""
 
     value: Any
@@ -55,9 +55,9 @@ class NamedNumber(NamedTuple):
 
 def named_numbers(kind: ElementKind, packed: Any) -> dict[str, NamedNumber]:
     """Return where the numbers of a machine file are in the packed numbers of an element."""
-    own = units_of(kind.parameters)
+    units = units_of(kind.parameters)
     return {
-        name: NamedNumber(at, unit or own[name], field is CURVE)
+        name: NamedNumber(at, unit or units[name], field is CURVE)
         for name, at, field, unit in kind.layout.places(packed)
-        if field in (SCALAR, CURVE) and (unit or name in own)
+        if field in (SCALAR, CURVE) and (unit or name in units)
     }

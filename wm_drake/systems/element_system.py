@@ -10,17 +10,22 @@ from pydrake.systems.framework import BasicVector_, LeafSystem_
 
 from wm_drake.elements.kind import ElementKind
 from wm_drake.elements.motion import GENERALIZED_FORCE_SIZE, PLANT_STATE_SIZE
-from wm_drake.elements.named_numbers import NamedNumber, Number, named_numbers
+from wm_drake.elements.named_numbers import NamedNumber, NumberWithUnit, named_numbers
 from wm_drake.errors import input_error
 from wm_drake.parameters.types import FloatArray
 from wm_drake.systems.callbacks import NO_SLOTS, callback
 from wm_drake.systems.scalars import Packed, define_system, empty, evaluator
 
+if typing.TYPE_CHECKING:  # the class of a kind is a LeafSystem of its scalar type
+    from pydrake.systems.framework import LeafSystem as System
+else:
+    System = object
+
 _NONE = np.empty(0)
 """State and rates of an element without states."""
 
 
-class ElementSystem(Packed):
+class ElementSystem(Packed, System):
     """An element that puts a force on the plant, of any `ElementKind`.
 
         plant_state ──▶ [ element ] ──▶ generalized_force   moment about To, force (W), drum torque
@@ -43,23 +48,22 @@ class ElementSystem(Packed):
         self, scalar: type, packed: FloatArray, initial: Sequence[float] | FloatArray
     ) -> None:
         """Declare ports, numbers and state; `self` is a LeafSystem of the scalar type."""
-        system: Any = self
         kind, self.initial, self.state_size = self.kind, initial, len(initial)
         self._scalar, self._evaluate = scalar, evaluator(kind.on_plant, scalar)
         self._force_size = kind.trees * GENERALIZED_FORCE_SIZE
         size = kind.trees * PLANT_STATE_SIZE
-        self._plant_state = system.DeclareVectorInputPort("plant_state", size)
+        self._plant_state = self.DeclareVectorInputPort("plant_state", size)
         needs = {self._plant_state.ticket(), self.declare_numbers(scalar, packed)}
         if self.state_size:
-            state = system.DeclareContinuousState(BasicVector_[scalar](initial))
-            needs.add(system.xc_ticket())
+            state = self.DeclareContinuousState(BasicVector_[scalar](initial))
+            needs.add(self.xc_ticket())
         force = callback(self._calc_force)
-        system.DeclareVectorOutputPort("generalized_force", self._force_size, force, needs)
+        self.DeclareVectorOutputPort("generalized_force", self._force_size, force, needs)
         for name, part in kind.output_parts.items():
-            calc = callback(self._calc_own, part)
-            system.DeclareVectorOutputPort(name, part.stop - part.start, calc, needs)
+            calc = callback(self._calc_output, part)
+            self.DeclareVectorOutputPort(name, part.stop - part.start, calc, needs)
         if self.state_size:
-            system.DeclareStateOutputPort("state", state)
+            self.DeclareStateOutputPort("state", state)
 
     def DoCalcTimeDerivatives(self, context: Any, derivatives: Any) -> None:
         """Write the time derivative of the element's state."""
@@ -78,7 +82,7 @@ class ElementSystem(Packed):
         Raises:
             InputError: there is no such number; the message lists those that exist.
         """
-        packed = self.packed_numbers(self._own(context))
+        packed = self.packed_numbers(self.GetMyContextFromRoot(context))
         return self._named(packed, name).read(packed)
 
     def set_number(self, context: Any, name: str, value: Any) -> None:
@@ -95,26 +99,22 @@ class ElementSystem(Packed):
         Raises:
             InputError: there is no such number, or a table has no slope at 0.
         """
-        own = self._own(context)
-        packed = self.packed_numbers(own)
+        part = self.GetMyContextFromRoot(context)
+        packed = self.packed_numbers(part)
         self._named(packed, name).write(packed, value)
-        self.set_parameters(own, packed)
+        self.set_parameters(part, packed)
 
-    def numbers(self, context: Any) -> dict[str, Number]:
+    def numbers(self, context: Any) -> dict[str, NumberWithUnit]:
         """Return value and unit of all numbers of the machine file in a root Context, by name."""
-        packed = self.packed_numbers(self._own(context))
+        packed = self.packed_numbers(self.GetMyContextFromRoot(context))
         named = named_numbers(self.kind, packed)
-        return {name: Number(one.read(packed), one.unit) for name, one in named.items()}
-
-    def _own(self, context: Any) -> Any:
-        system: Any = self
-        return system.GetMyContextFromRoot(context)
+        return {name: NumberWithUnit(one.read(packed), one.unit) for name, one in named.items()}
 
     def _named(self, packed: Any, name: str) -> NamedNumber:
-        named, system = named_numbers(self.kind, packed), typing.cast(Any, self)
+        named = named_numbers(self.kind, packed)
         if name not in named:
             raise input_error(
-                f"no number '{name}' of {system.get_name()}; the numbers are {', '.join(named)}"
+                f"no number '{name}' of {self.get_name()}; the numbers are {', '.join(named)}"
             )
         return named[name]
 
@@ -126,7 +126,7 @@ class ElementSystem(Packed):
             self._evaluated(context, force)
             output.SetFromVector(force)
 
-    def _calc_own(self, context: Any, output: Any, part: slice) -> None:
+    def _calc_output(self, context: Any, output: Any, part: slice) -> None:
         force = empty(self._force_size, self._scalar)
         output.SetFromVector(self._evaluated(context, force)[0][part])
 
@@ -136,10 +136,10 @@ class ElementSystem(Packed):
         if self.state_size:
             state = context.get_continuous_state_vector().CopyToVector()
             rates = empty(self.state_size, self._scalar)
-        own = empty(self.kind.output_size, self._scalar)
+        written = empty(self.kind.output_size, self._scalar)
         plant_state, numbers = self._plant_state.Eval(context), self.packed_numbers(context)
-        self._evaluate(plant_state, state, numbers, force, own, rates)
-        return own, rates
+        self._evaluate(plant_state, state, numbers, force, written, rates)
+        return written, rates
 
 
 def element_system(
