@@ -7,6 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pytest
 from both_engines import check_alike, difference
@@ -29,6 +30,7 @@ from wm_drake.parameters.files import machine_yaml
 from wm_drake.parameters.keys import quantities
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.runs import simulate
+from wm_drake.studies.machine_show.description import description_schema
 from wm_drake.studies.modes.linearisation import Linearisation
 from wm_drake.systems.element_system import element_system
 
@@ -122,8 +124,17 @@ def test_schema_and_manual_have_the_keys():
 
 
 def test_description_of_the_machine_has_the_elements(with_kind):
-    description = wm.describe(with_kind)
+    description, schema = wm.describe(with_kind), description_schema()
+    jsonschema.validate(description, schema)
     assert set(description["elements"]) == set(with_kind.parameters.elements)
+    for name, element in with_kind.parameters.elements.items():
+        described = description["elements"][name]
+        assert described["kind"] == element.kind
+        ends = np.subtract(described["tub_point_T"], described["housing_point_W"])
+        assert described["length_at_rest"] == pytest.approx(np.linalg.norm(ends), rel=0.05)
+    coefficient = schema["$defs"]["drag_damper"]["properties"]["coefficient"]
+    assert coefficient["unit"] == "N s^2/m^2"
+    assert coefficient["description"].startswith("Tension over the square")
 
 
 def test_both_engines_agree_at_random_states(with_kind):
