@@ -19,7 +19,7 @@ from wm_drake.parameters import MachineParameters, SpinProfile, load_machine
 from wm_drake.parameters.elements import ForceTable
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.runs import simulate
-from wm_drake.systems.element_system import ElementSystem
+from wm_drake.systems.element_system import element_system
 
 PROGRESSIVE = ForceTable(displacement=(0.0, 0.004, 0.008), force=(0.0, 200.0, 900.0))
 FRAMES = {"tub_frame": "damper_left_tub", "housing_frame": "damper_left_housing"}
@@ -106,7 +106,7 @@ def test_face_is_at_the_gap_and_pushes_the_point_away():
     point, foot = np.array([-0.1, 0.02, -0.2]), np.array([-0.25, 0.03, -0.5])
     ends = Ends(point, np.eye(3), foot, np.eye(3))
     placed = STOP.place(ends, Stop.model_validate({**BUFFER, "gap": 0.03, "friction": 0.0}))
-    system = ElementSystem(STOP, placed.packed())
+    system = element_system(STOP, placed.packed())
     context = system.CreateDefaultContext()
     axis = (point - foot) / np.linalg.norm(point - foot)
 
@@ -125,7 +125,7 @@ def test_face_is_at_the_gap_and_pushes_the_point_away():
 def test_derivatives_are_those_of_differences():
     point, foot = np.array([-0.1, 0.02, -0.2]), np.array([-0.25, 0.03, -0.5])
     placed = STOP.place(Ends(point, np.eye(3), foot, np.eye(3)), Stop.model_validate(BUFFER))
-    system = ElementSystem(STOP, placed.packed())
+    system = element_system(STOP, placed.packed())
     state = np.array([0.01, -0.02, 0.03, 0.02, 0.0, 0.03, 0.4, 0.1, -0.2, 0.1, -0.3, 0.2, 0.4, 7.0])
     state[3:6] -= 0.2 * (point - foot)  # deep in the buffer
     context = system.CreateDefaultContext()

@@ -31,7 +31,7 @@ from wm_drake.simulation.cases import Case
 from wm_drake.simulation.runs import simulate
 from wm_drake.studies.machine_show.description import description_schema
 from wm_drake.studies.modes.linearisation import Linearisation
-from wm_drake.systems.element_system import ElementSystem
+from wm_drake.systems.element_system import element_system
 
 FRAMES = {"tub_frame": "damper_left_tub", "housing_frame": "damper_left_housing"}
 DRAG = {"kind": "drag_damper", **FRAMES, "coefficient": 4000.0}  # N s^2/m^2
@@ -168,7 +168,7 @@ def test_derivatives_of_the_system_are_those_of_differences(kind, numbers):
     point, ground = np.array([-0.1, 0.02, -0.2]), np.array([-0.25, 0.03, -0.5])
     ends = Ends(point, np.eye(3), ground, np.eye(3))
     placed = kind.place(ends, kind.parameters.model_validate(numbers))
-    system = ElementSystem(kind, placed.packed(), np.zeros(placed.state_size))
+    system = element_system(kind, placed.packed(), np.zeros(placed.state_size))
     rng = np.random.default_rng(1)
     state = rng.uniform(-0.2, 0.2, 14 + placed.state_size)
     check_derivatives(system, state, step=1e-6, part=1e-6)

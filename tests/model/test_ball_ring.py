@@ -11,7 +11,7 @@ from wm_drake.elements.ball_ring import BALL_RING, DAMPING_RATIO, FULL_CONTACT, 
 from wm_drake.elements.kind import DrumPlace
 from wm_drake.errors import InputError
 from wm_drake.parameters import Load, MachineParameters, SpinProfile, load_machine
-from wm_drake.systems.element_system import ElementSystem
+from wm_drake.systems.element_system import element_system
 
 RING = {
     "kind": "ball_ring",
@@ -68,7 +68,7 @@ def test_both_engines_agree_at_random_states(name):
 def law_at(state, motion, ring):
     """Return generalized force and rates of a ring alone from the state of tub and drum (14)."""
     placed = BALL_RING.place(PLACE, BallRing.model_validate(ring))
-    system = ElementSystem(placed.kind, placed.packed(), np.zeros(placed.state_size))
+    system = element_system(placed.kind, placed.packed(), np.zeros(placed.state_size))
     context = system.CreateDefaultContext()
     system.GetInputPort("plant_state").FixValue(context, motion)
     context.SetContinuousState(state)
@@ -130,7 +130,7 @@ def test_power_and_momentum_balance(balls):
 def test_derivatives_of_the_system_are_those_of_differences():
     placed = BALL_RING.place(PLACE, BallRing.model_validate({**RING, "balls": 2}))
     system, rng = (
-        ElementSystem(placed.kind, placed.packed(), np.zeros(14)),
+        element_system(placed.kind, placed.packed(), np.zeros(14)),
         np.random.default_rng(1),
     )
     sizes = np.array([0.2] * 3 + [0.05] * 3 + [2.0] + [0.5] * 6 + [20.0])

@@ -19,7 +19,7 @@ from wm_drake.elements.liquid_ring import (
 )
 from wm_drake.laws.table import stiffness_force
 from wm_drake.parameters import load_machine
-from wm_drake.systems.element_system import ElementSystem
+from wm_drake.systems.element_system import element_system
 
 RING = {
     "kind": "liquid_ring",
@@ -116,7 +116,7 @@ def test_both_engines_agree_at_random_states(name):
 def system_of(ring, place=PLACE):
     """Return the system of a ring alone, and its context."""
     placed = LIQUID_RING.place(place, ring)
-    system = ElementSystem(placed.kind, placed.packed(), np.zeros(placed.state_size))
+    system = element_system(placed.kind, placed.packed(), np.zeros(placed.state_size))
     return system, system.CreateDefaultContext(), placed
 
 

@@ -38,7 +38,7 @@ from wm_drake.rigs import (
 )
 from wm_drake.rigs.loops import steady_deformations
 from wm_drake.rigs.run import stroke_points
-from wm_drake.systems.element_system import ElementSystem
+from wm_drake.systems.element_system import element_system
 
 MSTV = damper_of("mstv", friction_damping=0.0)  # fit of [C]; f_max assumed
 SPONGE = ForceTable(  # assumed
@@ -293,7 +293,7 @@ def test_the_dampers_system_under_drakes_integrator_gives_the_loop_of_the_bench(
     )
     state = builder.AddSystem(Multiplexer([7, 7]))
     system = builder.AddSystem(
-        ElementSystem(parameters.kind, parameters.packed(), np.zeros(parameters.state_size))
+        element_system(parameters.kind, parameters.packed(), np.zeros(parameters.state_size))
     )
     builder.Connect(sine.get_output_port(0), state.get_input_port(0))
     builder.Connect(sine.get_output_port(1), state.get_input_port(1))
