@@ -93,6 +93,7 @@ def simulate_remembered(
     step: float | None = None,
     workers: int | None = None,
     engine: str = DEFAULT_ENGINE,
+    run: Callable[..., list[str] | None] = run_cases,
     progress: Callable[[int], None] = lambda done: None,
 ) -> xr.Dataset:
     """Run the cases whose results are not in a ledger and return the table of all cases.
@@ -107,6 +108,7 @@ def simulate_remembered(
         measures: Names of measures, keys of `wm_drake.simulation.measures.MEASURES`.
         step: Step size; None for that of the machine. [s]
         workers, engine: As for `simulate_many`.
+        run: Function that runs cases, with the first arguments of `run_cases`.
         progress: Called with the number of cases that have a result.
 
     Raises:
@@ -133,7 +135,7 @@ def simulate_remembered(
 
     def store(runs: list[RunResult]) -> None:
         nonlocal done
-        places = [running.pop(run.number) for run in runs]
+        places = [running.pop(ended.number) for ended in runs]
         # runs that end together are stored together
         ledger.put_all(
             {
@@ -141,13 +143,13 @@ def simulate_remembered(
                 for (_, key), r in zip(places, runs, strict=True)
             }
         )
-        for (number, _), run in zip(places, runs, strict=True):
-            table.put(number, run.case.name, run.values, run.diverged)
+        for (number, _), ended in zip(places, runs, strict=True):
+            table.put(number, ended.case.name, ended.values, ended.diverged)
             done += 1
             progress(done)
 
     try:
-        pairs = run_cases(machine, missing(), options, store)
+        pairs = run(machine, missing(), options, store)
     except KeyboardInterrupt:
         raise SimulationInterrupted(table.dataset()) from None
     return table.dataset(pairs)

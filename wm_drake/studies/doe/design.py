@@ -66,12 +66,6 @@ class Design:
         """Return the D-efficiency for a model; for the design's own model if None. [%]"""
         return efficiency(self.levels, model or self.model)
 
-    def frame(self) -> pd.DataFrame:
-        """Return the design as a table: number of the trial, then one column per factor."""
-        table = pd.DataFrame(self.levels, columns=list(self.factors))
-        table.insert(0, TRIAL, np.arange(1, self.trials + 1))
-        return table
-
 
 def make_design(
     kind: str,
