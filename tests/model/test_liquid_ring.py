@@ -116,7 +116,7 @@ def test_both_engines_agree_at_random_states(name):
 def system_of(ring, place=PLACE):
     """Return the system of a ring alone, and its context."""
     placed = LIQUID_RING.place(place, ring)
-    system = ElementSystem(placed.kind, placed.packed(), placed.state_size)
+    system = ElementSystem(placed.kind, placed.packed(), np.zeros(placed.state_size))
     return system, system.CreateDefaultContext(), placed
 
 

@@ -209,6 +209,11 @@ def axis_pose(plant: MultibodyPlant) -> RigidTransform:
     return pose
 
 
+def share_axis_pose(plant: MultibodyPlant, copy: MultibodyPlant) -> None:
+    """Make the `axis_pose` of a plant that of its copy, which by default is not as drawn."""
+    _AXIS_POSES[copy] = axis_pose(plant)
+
+
 def _axis_pose(plant: MultibodyPlant) -> RigidTransform:
     joint = plant.get_joint_actuator(plant.GetJointActuatorIndices()[0]).joint()
     if not isinstance(joint, RevoluteJoint):
