@@ -157,7 +157,8 @@ class Preparation:
 
     def _bodies(self, parameters: MachineParameters, load: Load | None) -> FloatArray:
         """Return the packed bodies, which cases with the same bodies, drive and load share."""
-        drawn = parameters.bodies, parameters.frames, parameters.drive  # which has the rotor
+        rotor, masses = parameters.drive, parameters.masses_on_drum
+        drawn = parameters.bodies, parameters.frames, rotor, masses
         if not self._drawn or self._drawn[0][0] != drawn:
             machine = self.machine.drawn
             context = machine.bodies(None, parameters)

@@ -444,6 +444,8 @@ def set_bodies(plant: MultibodyPlant, context: Any, parameters: MachineParameter
         frame.SetPoseInParentFrame(context, RigidTransform(rotation, frame_override.position))
     if drive := motor_of(parameters.drive):
         set_rotor(plant, context, drive)
+    if masses := parameters.masses_on_drum:
+        add_load(plant, context, Load(unbalances=masses))
 
 
 def add_load(plant: MultibodyPlant, context: Any, load: Load) -> None:

@@ -58,7 +58,8 @@ class SetUpCache:
 
     def weight(self, parameters: MachineParameters, compute: Callable[[], Weight]) -> Weight:
         """Return the weight on the springs; that of the last set-up if its bodies were the same."""
-        bodies, last = (parameters.bodies, parameters.frames), self._weight
+        bodies = parameters.bodies, parameters.frames, parameters.masses_on_drum
+        last = self._weight
         if last is None or last[0] != bodies:
             last = self._weight = bodies, compute()
         return last[1]
