@@ -152,7 +152,7 @@ def effects_of(calibration: Calibration) -> xr.DataArray:
 
 
 def relations_of(calibration: Calibration) -> xr.Dataset:
-    """Return the relations of the free file: `known` ratio, `deviation`, and the ratio `found`."""
+    """Return the relations of the vary file: `known` ratio, `deviation`, and the ratio `found`."""
     point, relations = calibration.solutions[0].point, calibration.parameter_map.relations
     ratio = Quantity("ratio", form="{:.3g}".format)
     numbers = {

@@ -41,7 +41,7 @@ def design_answer(
     Args:
         front, robust, envelopes: As of `run_designs`, `promises` and `front_envelopes` in
             `wm_drake.studies.design.study`; no envelopes without a front.
-        about: Description in the design file.
+        about: Description in the vary file.
     """
     names = [*(goal.name for goal in designs.goals), *(d.name for d in designs.dimensions)]
     nominal = front[[f"nominal_{goal.name}" for goal in designs.objectives]]

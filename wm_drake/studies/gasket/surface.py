@@ -26,7 +26,6 @@ import pandas as pd
 import xarray as xr
 from scipy.special import stdtrit
 
-from wm_drake.parameters import at_places
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report.formatting import three_digits
 from wm_drake.report.quantity import Quantity
@@ -203,9 +202,7 @@ def run_settings(
         with a load that the models do not have; `run`, `difference` of both, and `is_inside`,
         whether the run lies in the interval.
     """
-    machines = (
-        at_places(trials.parameters, trials.factors, setting.places) for setting in settings
-    )
+    machines = (trials.varying.at_levels(setting.places) for setting in settings)
     names = [f"check {number}" for number in range(1, len(settings) + 1)]
     data = experiment.at(names, machines, "settings")
     runs = responses_of(data, trials.chosen).value.rename(trial="setting")

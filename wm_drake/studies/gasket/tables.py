@@ -3,6 +3,7 @@
 import numpy as np
 import xarray as xr
 
+from wm_drake.parameters.variation import Number
 from wm_drake.report.formatting import MISSING
 from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.quantity import HIDDEN, Quantity, named, quantity_of
@@ -246,10 +247,12 @@ def physical_values(design: Design, trials: GasketTrials) -> dict[str, xr.Variab
     values = {}
     for factor in trials.factors:
         places = design.levels[:, design.factors.index(factor.name)] + 1
-        is_same = len(set(factor.numbers.values())) == 1
-        for key in list(factor.numbers)[: 1 if is_same else None]:
-            quantity = Quantity(factor.name, factor.units[key])
-            numbers = np.asarray(factor.numbers[key])[places]
+        each = {n.key: (n.unit, factor.levels_of(n)) for n in factor.numbers}
+        each = each or {"": (factor.unit, factor.first_levels)}
+        is_same = len({levels for _, levels in each.values()}) == 1
+        for key, (unit, levels) in list(each.items())[: 1 if is_same else None]:
+            quantity = Quantity(factor.name, unit)
+            numbers = np.asarray(levels)[places]
             name = factor.name if is_same else f"{factor.name}_{key}"
             values[f"{name}{quantity.suffix or '_value'}"] = quantity.variable("trial", numbers)
     return values
@@ -322,16 +325,16 @@ def design_table(design: Design) -> LabelledTable:
 
 def factors_table(trials: GasketTrials, words: Words) -> LabelledTable:
     """Return the values of the machine file that belong to the levels of each factor."""
-    keys = [(factor, key) for factor in trials.factors for key in factor.numbers]
-    each = {key: Quantity(key, factor.units[key]) for factor, key in keys}
-    values = [factor.numbers[key] for factor, key in keys]
+    keys = [(factor, number) for factor in trials.factors for number in factor.numbers]
+    each = {number.key: Quantity(number.key, number.unit) for _, number in keys}
+    values = [factor.levels_of(number) for factor, number in keys]
     data = xr.Dataset(
         {
             "factor": ("key", [words.factor(factor.name) for factor, _ in keys]),
-            "in_machine": ("key", [factor.nominal[key] or MISSING for factor, key in keys]),
+            "in_machine": ("key", [_nominal_text(number) for _, number in keys]),
             "level_value": VALUE.named("value").of_each("key", each, ("key", "level"), values),
         },
-        {"key": [key for _, key in keys], "level": list(LEVELS)},
+        {"key": [number.key for _, number in keys], "level": list(LEVELS)},
     )
     return LabelledTable(
         "factors",
@@ -342,3 +345,7 @@ def factors_table(trials: GasketTrials, words: Words) -> LabelledTable:
         across="level",
         words=LEVEL_WORDS,
     )
+
+
+def _nominal_text(number: Number) -> str:
+    return MISSING if number.nominal is None else number.unit.reading(number.nominal)

@@ -23,6 +23,7 @@ from wm_drake.studies.tolerance.study import (
     name_of,
     statistics_of,
 )
+from wm_drake.studies.tolerance.variables import distribution_text
 
 MOST_PANELS = 9
 """Largest number of distributions in one figure."""
@@ -201,7 +202,7 @@ def _sensitivity_sentences(trials: ToleranceTrials, indices: xr.Dataset) -> list
 
 def _named(trials: ToleranceTrials, of: xr.Dataset) -> str:
     """Return the quantities with the largest total indices, and these; "" if all are small."""
-    words = {v.name: v.quantity.words for v in trials.uncertain.variables}
+    words = trials.uncertain.words
     of = of.isel(quantity=of.total.values >= LEAST_TOTAL).isel(quantity=slice(MOST_NAMED))
     pairs = zip(of["quantity"].values.tolist(), of.total.values, strict=True)
     return ", ".join(f"{words[name]} ({WHOLE_SHARE.text(total)})" for name, total in pairs)
@@ -355,7 +356,7 @@ def _causes(trials: ToleranceTrials, indices: xr.Dataset) -> Part:
             "intervals. A total index above the first-order index is an effect together with "
             "other quantities."
         )
-        words = {v.name: v.quantity.words for v in trials.uncertain.variables}
+        words = trials.uncertain.words
         names = [words[name] for name in of["quantity"].values.tolist()]
         each = zip(names, of.total, strict=True)
         texts = ", ".join(f"{name} {text_of(total)}" for name, total in each)
@@ -435,7 +436,7 @@ def _indices(trials: ToleranceTrials, indices: xr.Dataset) -> tuple[LabelledTabl
     """Return the Sobol indices; on the page the total ones, a column for each quantity."""
     if not indices:
         return ()
-    words = {v.name: v.quantity.words for v in trials.uncertain.variables} | _titles(trials)
+    words = trials.uncertain.words | _titles(trials)
     caption = (
         "Total Sobol indices of all measures. First-order indices and 95 % intervals are in "
         "sobol.csv."
@@ -451,10 +452,10 @@ def _quantities(trials: ToleranceTrials) -> LabelledTable:
     """Return what scatters."""
     variables = trials.uncertain.variables
     texts = {
-        "what": [v.quantity.words for v in variables],
-        "keys": [", ".join(v.variation.keys) or "load" for v in variables],
-        "distribution": [v.text for v in variables],
-        "source": [v.source or MISSING for v in variables],
+        "what": list(trials.uncertain.words.values()),
+        "keys": [", ".join(v.keys) or v.name for v in variables],
+        "distribution": [distribution_text(v) for v in variables],
+        "source": [v.entry.source or MISSING for v in variables],
     }
     return LabelledTable(
         "quantities",

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from wm_drake.errors import InputError, Problem, input_error
-from wm_drake.parameters.tolerances import LAUNDRY, Limit, fraction
+from wm_drake.parameters.limits import Limit, fraction
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Share, Unit
 from wm_drake.report.formatting import shape_name, significant
@@ -26,7 +26,7 @@ from wm_drake.studies.tolerance.shares import (
     percentile_of,
     share_of,
 )
-from wm_drake.studies.tolerance.variables import UncertainMachine
+from wm_drake.studies.tolerance.variables import UncertainMachine, quantity_of
 
 RARE = 1e-3
 """Share of runs with contact below which it is estimated by subset simulation."""
@@ -146,7 +146,7 @@ class ToleranceTrials:
 
     Attributes:
         chosen: What is measured of each run.
-        about: Description in the tolerance file.
+        about: Description in the vary file.
     """
 
     uncertain: UncertainMachine
@@ -181,7 +181,7 @@ class ToleranceTrials:
         data = self.runs(self.scores[0], "samples")
         values = self.uncertain.joint.values(self.scores[0])
         pairs = zip(self.uncertain.variables, values.T, strict=True)
-        drawn = {v.name: v.quantity.variable("sample", column) for v, column in pairs}
+        drawn = {v.name: quantity_of(v).variable("sample", column) for v, column in pairs}
         places = data[[name for name in PLACES if name in data]]
         return places.assign(drawn).assign(self.measures(data)).assign(failed=data.diverged)
 
@@ -426,7 +426,7 @@ def judged(measures: xr.Dataset, limits: Sequence[tuple[Limit, Response, float]]
 
 def laundry_masses(samples: xr.Dataset) -> tuple[float, float] | None:
     """Return the smallest and largest mass of the laundry of samples [kg]; None without it."""
-    if f"{LAUNDRY}.mass" not in samples:
+    if "laundry.mass" not in samples:
         return None
-    masses = samples[f"{LAUNDRY}.mass"]
+    masses = samples["laundry.mass"]
     return float(masses.min()), float(masses.max())
