@@ -103,7 +103,7 @@ class VerdictTask(Task):
         tried = influences(experiment, changeable(parameters), change)
         changed = proposed(experiment, base, tried, self.responses)
         if changed is not None:
-            better = build_machine(with_values(parameters, changed.attrs["changes"]))
+            better = build_machine(with_values(parameters, changed.changes))
             samples.append(self._laundry(better).trials(executor).samples())
         question = VerdictQuestion(
             parameters,
@@ -112,6 +112,7 @@ class VerdictTask(Task):
             self.responses,
             self.laundry.file.about,
             self._command,
+            {} if changed is None else changed.changes,
         )
         answer = verdict_answer(
             question,
