@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 
 from wm_drake.errors import InputNotice, Problem, check_known, input_error, shortened
 from wm_drake.parameters.recorded.text import TextRow, table_rows
@@ -69,12 +68,6 @@ class Design:
     def efficiency(self, model: str | None = None) -> float:
         """Return the D-efficiency for a model; for the design's own model if None. [%]"""
         return efficiency(self.levels, model or self.model)
-
-    def frame(self) -> pd.DataFrame:
-        """Return the design as a table: number of the trial, then one column per factor."""
-        table = pd.DataFrame(self.levels, columns=list(self.factors))
-        table.insert(0, TRIAL, np.arange(1, self.trials + 1))
-        return table
 
 
 def make_design(
