@@ -28,6 +28,7 @@ SPRING = PackedLayout(
 )
 """Tub hook (T) and housing hook (W) [m], rest length [m], preload [N], tension from which it is
 taut [N], stiffness [N/m or a table]."""
+SPRING.units.update(preload="N", stiffness="N/m")
 read_spring = SPRING.read
 
 SLACK_TRANSITION = 1e-3

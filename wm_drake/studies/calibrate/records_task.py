@@ -6,7 +6,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from wm_drake.batch.ledger import Ledger
 from wm_drake.errors import input_error
 from wm_drake.model.machine import Machine
 from wm_drake.parameters.vary_file import VARY_FILES, load_vary
@@ -87,9 +86,7 @@ class CalibrateRecordsTask(Task):
             recorded_load(test, executor, partial(load_of, test.case, self.machine.parameters))
             for test in self.tests
         ]
-        experiment = records_here(self.machine, executor)
-        by, ledger = self.options.by, executor.ledger
-        model = record_model(experiment, self.free, self.tests, loads, by, ledger)
+        model = record_model(executor, self.free, self.tests, loads, self.options.by)
         title = f"Machine {self.machine.parameters.name} calibrated to records"
         return fitted_answer(executor, model, self.options.seed, (title, "calibrated"), self.tests)
 
@@ -133,11 +130,6 @@ def fitted_answer(
     return replace(answer, files={**answer.files, name: text}, warned=(*warnings, *answer.warned))
 
 
-def records_here(machine: Machine, executor: Executor) -> Experiment:
-    """Return runs of a machine whose records are used at once."""
-    return Experiment(machine, (), record=partial(record_here, workers=executor.workers))
-
-
 def recorded_load(test: CompareTask, executor: Executor, load_at: Any) -> RecordedLoad:
     """Return the recordings of a test on the times of runs, without their ends.
 
@@ -149,14 +141,13 @@ def recorded_load(test: CompareTask, executor: Executor, load_at: Any) -> Record
 
 
 def record_model(
-    experiment: Experiment,
+    executor: Executor,
     free: FreeNumbers,
     tests: Sequence[CompareTask],
     loads: Sequence[RecordedLoad],
     by: Any,
-    ledger: Ledger | None,
 ) -> RecordModel:
-    """Return the model of the sensors of all loads, whose values a ledger keeps.
+    """Return the model of the sensors of all loads, whose values the ledger keeps.
 
     Raises:
         InputError: the records of the loads have other sensors.
@@ -169,7 +160,9 @@ def record_model(
                 f"{', '.join(test.sensors)}, those of load {tests[0].case.name} {', '.join(names)}",
                 where="RECORD",
             )
-    first, deviation = tests[0], tests[0].test.load_deviation
+    record = partial(record_here, workers=executor.workers)  # records are used at once
+    first, ledger = tests[0], executor.ledger
+    experiment, deviation = Experiment(first.machine, (), record=record), first.test.load_deviation
     return RecordModel(
         experiment, free, first.sensors, tuple(loads), first.points, by, ledger, deviation
     )
