@@ -13,7 +13,7 @@ from lab_writers import write_mdf
 
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import load_machine, load_profile, with_values
-from wm_drake.parameters.recorded_sensors import RecordedSensor
+from wm_drake.parameters.recorded_sensors import RecordedSensor, load_recorded_test
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.recorded_signal import recorded_signal
 from wm_drake.simulation.runs import simulate
@@ -91,6 +91,10 @@ def test_a_planted_friction_is_found(calibrate, by):
     assert (verdict["verdict"], verdict["structure"]) == ("good", "not refuted")
     text = Path("out/calibrated.yaml").read_text()
     assert "calibrated to run_0.mf4" in text
+    test = load_recorded_test(Path("out/calibrated_test.yaml"))
+    for name, sensor in test.sensors.items():  # gains and tilts that were planted, as found
+        assert sensor.gain == pytest.approx(1.0, abs=4.0 * GAIN)
+        assert np.abs(sensor.tilt).max() < 4.0 * TILT, name
 
 
 SOON = ("springs", "envelope")
