@@ -17,13 +17,13 @@ from wm_drake.report.page import picture, render
 from wm_drake.report.quantity import Quantity, shown
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.doe.design import make_design
+from wm_drake.studies.facts import Facts
 from wm_drake.studies.gasket.page import gasket_answer
 from wm_drake.studies.gasket.screening import at, run_screening, runs_of
 from wm_drake.studies.gasket.study import GasketTrials
 from wm_drake.studies.gasket.surface import models_of, predicted
 from wm_drake.studies.machine_show.page import machine_answer
 from wm_drake.studies.spin.page import spin_answer
-from wm_drake.studies.study import Facts
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 

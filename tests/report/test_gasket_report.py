@@ -15,6 +15,7 @@ from wm_drake.report.formatting import three_digits
 from wm_drake.report.quantity import Quantity, shown
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.doe.design import make_design
+from wm_drake.studies.facts import Facts
 from wm_drake.studies.gasket import figures
 from wm_drake.studies.gasket.findings import load_findings, warnings
 from wm_drake.studies.gasket.page import gasket_answer
@@ -23,7 +24,6 @@ from wm_drake.studies.gasket.study import GasketTrials
 from wm_drake.studies.gasket.surface import models_of
 from wm_drake.studies.gasket.tables import factors_table
 from wm_drake.studies.gasket.words import Words
-from wm_drake.studies.study import Facts
 
 NAMES = ("C_L", "C_T", "K_Lx", "K_Ly")
 RESPONSES = [letter + axis for letter in "DFM" for axis in "xyz"]

@@ -19,6 +19,7 @@ from wm_drake.studies.design.problem import machine_designs
 from wm_drake.studies.design.search import SearchSettings
 from wm_drake.studies.design.study import (
     _is_kept,
+    chosen_designs,
     front_envelopes,
     promises,
     run_designs,
@@ -26,7 +27,7 @@ from wm_drake.studies.design.study import (
 )
 from wm_drake.studies.design.task import check_goals
 from wm_drake.studies.experiment import Experiment
-from wm_drake.studies.study import Facts
+from wm_drake.studies.facts import Facts
 from wm_drake.studies.tolerance.distributions import base_samples
 from wm_drake.studies.tolerance.variables import uncertain_machine
 
@@ -124,7 +125,7 @@ def test_front_under_a_constraint_is_found(machine, tmp_path):
         "design", "Dx_mm", "Fx_N", "constrained_Dx_mm", "k_percent",
     ]  # fmt: skip
     answer.write(tmp_path)
-    for name, number in front.attrs["chosen"].items():
+    for name, number in chosen_designs(designs, front).items():
         loaded = load_machine(tmp_path / f"machine_{name.replace(' ', '_')}.yaml")
         assert loaded.name == f"reference, {name}"
         part = front.k.sel(design=number).item()
@@ -219,7 +220,7 @@ def test_robust_front_keeps_its_promise_on_fresh_samples(machine):
     assert kept["chosen"].values.tolist() == ["best Fx", "best Dx"]  # no design gains in both
     assert set(np.concatenate([kept.Fx_kept, kept.Dx_kept])) == {"yes"}
     assert not (kept.Fx_is_broken | kept.Dx_is_broken).any()
-    number = front.attrs["chosen"]["best Fx"]
+    number = chosen_designs(robust, front)["best Fx"]
     best = kept.sel(chosen="best Fx")
     assert best.Fx.sel(samples="promised") == pytest.approx(front.Fx.sel(design=number).item())
     # the quantile of the normal distribution lies in both intervals

@@ -14,7 +14,7 @@ from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.measures.responses import Response
 from wm_drake.studies.tolerance.page import leading
 from wm_drake.studies.tolerance.study import (
-    SHARE,
+    OF_RUNS,
     ToleranceSettings,
     ToleranceTrials,
     judged,
@@ -213,5 +213,5 @@ def test_limits_that_cannot_be_judged_are_refused(tmp_path):
 
 
 def test_shares_in_percent():
-    shown = [SHARE.text(x) for x in (0.0, 1.25e-6, 7.31e-4, 1.2345e-2, 0.5)]
+    shown = [OF_RUNS.text(x) for x in (0.0, 1.25e-6, 7.31e-4, 1.2345e-2, 0.5)]
     assert shown == ["0 %", "0.00013 %", "0.073 %", "1.2 %", "50 %"]

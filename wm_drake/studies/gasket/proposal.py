@@ -12,12 +12,11 @@ import xarray as xr
 
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Share
 from wm_drake.parameters.variation import number_at
 from wm_drake.parameters.vary_file import gasket_entries
 from wm_drake.parameters.varying import Varied
 from wm_drake.report.formatting import significant
-from wm_drake.report.quantity import Quantity
+from wm_drake.report.quantity import SHARE
 from wm_drake.simulation.measures.kind import Better
 from wm_drake.studies.gasket.surface import Setting, model_rows
 from wm_drake.studies.proposal import AFTER, BEFORE, Aim, worst_of
@@ -27,8 +26,6 @@ MOST_GRID = 20_000
 
 CLIMBERS = 4
 """Number of the best level combinations from which single factors are moved."""
-
-PERCENT = Quantity("", Share(), 0)
 
 
 def goals_of(screening: xr.Dataset) -> dict[str, Better]:
@@ -126,7 +123,7 @@ def text_at(machine: MachineParameters, factor: Varied, place: float) -> tuple[s
         number = number_at(machine, factor.numbers[0].key)
     if factor.numbers and number.is_table:
         assert number.nominal
-        text = PERCENT.text(value / number.nominal)
+        text = SHARE.text(value / number.nominal)
     else:
         unit = factor.first_unit.for_reader
         text = f"{significant(unit.from_si(value), 3)} {unit.shown}".replace("−", "-")

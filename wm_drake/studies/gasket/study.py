@@ -167,7 +167,7 @@ def run_level_zero(
     for number, name in enumerate(variants):
         zero[name] = values.isel(trial=number)
         words = name if name == MACHINE else f"level 0, tables {name}"
-        zero[name].attrs |= VALUE.named(words).attributes()
+        zero[name] = VALUE.named(words).on(zero[name])
     for name in TABLES:
         difference = (zero[name] - zero[MACHINE]) / zero[MACHINE].where(zero[MACHINE] != 0.0)
         words = f"difference, tables {name}"

@@ -109,8 +109,11 @@ class GasketTask(Task):
             published = published_for(self.published, screening, self.source)
         zero = self._level_zero(executor)
         every_load = replace(experiment, loads=tuple(self._every_load()))
-        proposed, proposal = self._proposal(screening, models, every_load)
-        comparisons = Comparisons(published, zero, check, proposed, proposal)
+        proposed, proposal, changed = self._proposal(screening, models, every_load)
+        comparisons = Comparisons(
+            published, zero, check, proposed, proposal, self.options.tables, changed,
+            is_level_zero(self.parameters, self.trials.factors),
+        )  # fmt: skip
         return gasket_answer(screening, models, trials, comparisons)
 
     def _level_zero(self, executor: Executor) -> xr.Dataset:
@@ -120,16 +123,15 @@ class GasketTask(Task):
             name: _factors(self.machine, options.model_copy(update={"tables": name}))
             for name in TABLES
         }
-        zero = run_level_zero(self.parameters, every, self.trials, executor.simulate)
-        return zero.assign_attrs(tables=options.tables)
+        return run_level_zero(self.parameters, every, self.trials, executor.simulate)
 
     def _proposal(
         self, screening: xr.Dataset, models: xr.Dataset, experiment: Experiment
-    ) -> tuple[xr.Dataset, xr.Dataset]:
+    ) -> tuple[xr.Dataset, xr.Dataset, dict[str, float]]:
         """Choose a setting on the fitted models, and run it and level 0 with all loads.
 
         Returns:
-            The runs and the proposal, as of `page.Comparisons`.
+            The runs, the proposal and the changed places, as of `page.Comparisons`.
         """
         factors, parameters = self.trials.factors, self.parameters
         candidates = Candidates(screening, models)
@@ -150,11 +152,7 @@ class GasketTask(Task):
             responses = responses.assign(_predicted(runs, responses))
         command = self._command([sets_of(factor, text) for factor, text, _ in chosen])
         proposal = proposal_of(responses, changes, is_confirmed=confirmed, command=command)
-        about = {
-            "factors": [f.name for f, *_ in chosen],
-            "is_machine": is_level_zero(parameters, factors),
-        }
-        return runs.assign_attrs(places=settings[-1].places), proposal.assign_attrs(about)
+        return runs, proposal, {factor.name: place for factor, _, place in chosen}
 
     def _command(self, sets: Sequence[Mapping[str, str]]) -> str:
         """Return the command that runs changes, each the values of `--set`; "" if there is none."""

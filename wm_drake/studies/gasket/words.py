@@ -1,11 +1,11 @@
 """Names and values of factors, terms and responses for reading."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import xarray as xr
 
 from wm_drake.parameters.varying import Varied
-from wm_drake.report.quantity import Quantity
+from wm_drake.report.quantity import Quantity, each_of
 from wm_drake.studies.doe.coding import LEVELS
 
 
@@ -20,7 +20,7 @@ class Words:
             screening: As of `screening.run_screening`.
         """
         self._factors = {factor.name: factor for factor in factors}
-        self._responses: Mapping[str, Quantity] = screening.value.attrs["each"]
+        self._responses = each_of(screening.value)
         self._terms = screening.term.values.tolist()
 
     def factor(self, name: str) -> str:

@@ -27,7 +27,6 @@ from wm_drake.studies.tolerance.study import (
     DEFAULT,
     ToleranceSettings,
     ToleranceTrials,
-    judged,
     limits_of,
 )
 from wm_drake.studies.tolerance.variables import UncertainMachine, uncertain_machine
@@ -92,8 +91,7 @@ class ToleranceTask(Task):
         indices, contact = trials.indices(samples), trials.contact(samples)
         if contact:
             contact = contact.assign(gap_of_load=trials.gaps_of_loads())
-        limits = judged(samples, self.limits)
-        return tolerance_answer(trials, samples, indices, contact, limits)
+        return tolerance_answer(trials, samples, indices, contact, self.limits)
 
 
 def sampled_case(parameters: MachineParameters, file: VaryFile, profile: SpinProfile) -> Case:
