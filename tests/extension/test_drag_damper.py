@@ -2,7 +2,6 @@
 
 import json
 import os
-import re
 import subprocess
 import sys
 from pathlib import Path
@@ -13,11 +12,11 @@ import pytest
 from both_engines import check_alike, difference
 from drag_damper import DRAG_DAMPER
 from drake_spectrum import drake_spectrum
+from element_ports import check_derivatives
 from energy_book import EnergyBook, dense_record
 from maxwell_strut import MAXWELL_STRUT
 from moving_cabinet import with_moving_cabinet
-from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, InitializeAutoDiff
-from side_by_side import check_runs_alone
+from side_by_side import cases_with, check_runs_alone
 
 import wm_drake as wm
 from wm_drake.elements.kind import Ends
@@ -93,13 +92,8 @@ def test_a_kind_is_registered_once():
         ("damper_left_tub", "damper_left_housing", "is not fixed to the tub"),
     ],
 )
-def test_errors_of_a_machine_file_name_line_and_key(old, new, message, tmp_path, wm_drake):
-    path = tmp_path / "mine.yaml"
-    path.write_text(FILE.replace(old, new), encoding="utf-8")
-    result = wm_drake("machine", "check", path)
-    assert result.code == 2
-    assert len(result.messages) <= 2
-    assert re.search(message, result.err), result.err
+def test_errors_of_a_machine_file_name_line_and_key(old, new, message, check_refused):
+    check_refused(FILE.replace(old, new), message)
 
 
 def test_numbers_are_found_changed_and_written(tmp_path):
@@ -162,16 +156,8 @@ def test_both_engines_move_alike(integrator, sponges):
 
 def test_eight_runs_side_by_side_are_single_runs():
     machine = build_machine(with_elements())
-    parameters = machine.parameters
-    cases = [
-        Case(
-            f"{number}",
-            parameters.loads["middle"],
-            PROFILE,
-            parameters=wm.with_value(parameters, "elements.first.coefficient", 250.0 * number),
-        )
-        for number in range(1, 10)
-    ]
+    values = 250.0 * np.arange(1, 10)
+    cases = cases_with(machine, "elements.first.coefficient", values, PROFILE)
     table = check_runs_alone(machine, cases)
     assert len(set(table.gasket_force.sel(axis="x").values)) == 9
 
@@ -185,18 +171,7 @@ def test_derivatives_of_the_system_are_those_of_differences(kind, numbers):
     system = element_system(kind, placed.packed(), np.zeros(placed.state_size))
     rng = np.random.default_rng(1)
     state = rng.uniform(-0.2, 0.2, 14 + placed.state_size)
-
-    def force(system, values):
-        context = system.CreateDefaultContext()
-        system.GetInputPort("plant_state").FixValue(context, values[:14])
-        if placed.state_size:
-            context.SetContinuousState(values[14:])
-        return system.GetOutputPort("generalized_force").Eval(context)
-
-    slopes = ExtractGradient(force(system.ToScalarType[AutoDiffXd](), InitializeAutoDiff(state)))
-    steps = 1e-6 * np.eye(len(state))
-    differences = [(force(system, state + h) - force(system, state - h)) / 2e-6 for h in steps]
-    np.testing.assert_allclose(slopes, np.transpose(differences), rtol=1e-6, atol=1e-4)
+    check_derivatives(system, state, step=1e-6, part=1e-6)
 
 
 def test_modes_are_those_of_drakes_linearize(with_kind):

@@ -100,25 +100,12 @@ class Executor:
 
         Records are too large for a ledger.
         """
-        from wm_drake.batch import RunResult, simulate_many
+        from wm_drake.studies.experiment import record_here
 
         cases = list(self._sampled(machine, cases))
-
-        def collect(run: RunResult) -> None:
-            assert run.record is not None
-            keep(run.number, run.record)
-
+        how: dict[str, Any] = {"workers": self.workers, "engine": self.engine}
         with progress_bar(len(cases), what) as report:
-            simulate_many(
-                machine,
-                cases,
-                measures=("extremes",),
-                histories=True,
-                workers=self.workers,
-                engine=self.engine,
-                progress=report,
-                finished=collect,
-            )
+            record_here(machine, cases, keep, what, progress=report, **how)
 
     @contextmanager
     def progress(self, total: int, what: str = "runs") -> Iterator[Callable[..., None]]:
@@ -166,15 +153,14 @@ class Executor:
         report: Callable[[int], None],
     ) -> "xr.Dataset":
         from wm_drake.batch import simulate_remembered
-        from wm_drake.batch.cluster import simulate_on_cluster
+        from wm_drake.batch.cluster import run_on_cluster
 
         assert self.ledger is not None, "a study that runs cases is declared with has_runs=True"
-        run: Callable[..., xr.Dataset] = partial(simulate_remembered, workers=self.workers)
+        how: dict[str, Any] = {"workers": self.workers, "engine": self.engine, "progress": report}
         if self.client is not None:
-            run = partial(simulate_on_cluster, client=self.client)
+            how["run"] = partial(run_on_cluster, client=self.client)
         sampled = self._sampled(machine, cases)
-        how: dict[str, Any] = {"measures": measures, "engine": self.engine, "progress": report}
-        table = run(machine, sampled, self.ledger, **how)
+        table = simulate_remembered(machine, sampled, self.ledger, measures=measures, **how)
         self.runs += table.sizes["run"]
         return table
 

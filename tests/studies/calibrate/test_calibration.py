@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from analysis_tools.ledgers import kept_in
 from linear_fits import fit_at
 
 from wm_drake.batch.ledger import open_ledger
@@ -22,7 +23,7 @@ from wm_drake.studies.calibrate.results import amplitudes_of, predictions_of, qu
 from wm_drake.studies.calibrate.solutions import Solution, distinct, solved_machine
 from wm_drake.studies.calibrate.study import SearchPlan, calibrate, identity_of
 from wm_drake.studies.calibrate.targets import Targets, targets_of
-from wm_drake.studies.experiment import Experiment, kept_in
+from wm_drake.studies.experiment import Experiment
 
 FREE = """
 vary:
@@ -306,15 +307,6 @@ def test_excess_is_the_logarithm_beyond_the_limit_on_both_sides():
     everything = limited_pair().limited({"amplitudes": 1.5})
     tiny = everything.excesses(np.full((2, 2), 1e-9), np.empty(0), spread)
     assert tiny.tolist() == [0.0, 0.0, 0.0]  # more than 100 % is no limit below
-
-
-@pytest.mark.parametrize(
-    ("limits", "message"),
-    [({"Q": 0.2}, "'Q' is no load, sensor"), ({"X": 0.0}, "limit of 'X': 0 is not allowed")],
-)
-def test_wrong_limits_are_refused(limits, message):
-    with pytest.raises(InputError, match=message):
-        limited_pair().limited(limits)
 
 
 def test_values_beyond_their_limits_are_named():
