@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from wm_drake.errors import InputNotice, Problem, check_known, input_error, shortened
-from wm_drake.parameters.recorded.text import Row, table_rows
+from wm_drake.parameters.recorded.text import TextRow, table_rows
 from wm_drake.parameters.units import plain_number
 from wm_drake.studies.doe.coding import LEVELS, MODELS, Levels, columns, efficiency, level_matrix
 from wm_drake.studies.doe.exchange import d_optimal_levels
@@ -167,7 +167,7 @@ def read_design(path: Path, factors: tuple[str, ...], model: str = "main+2fi") -
         InputError: the file has other columns or other levels, or the trials do not determine the
             model.
     """
-    head, *rows = table_rows(path) or [Row(1, [])]
+    head, *rows = table_rows(path) or [TextRow(1, [])]
     places = _factor_columns(path, head.cells, rows, factors)
     levels = np.zeros((len(rows), len(factors)), dtype=np.int8)
     for number, row in enumerate(rows):
@@ -204,7 +204,7 @@ def _level(cell: str) -> float:
 
 
 def _factor_columns(
-    path: Path, head: Sequence[str], rows: Sequence[Row], factors: Sequence[str]
+    path: Path, head: Sequence[str], rows: Sequence[TextRow], factors: Sequence[str]
 ) -> list[int]:
     """Return the column of each factor.
 
