@@ -163,14 +163,16 @@ def run_on_cluster(
 
     notice_jumping_friction(machine.parameters)
     numbered, running = enumerate(cases), dict[int, Case]()
-    alone = replace(options, step=checked_step(machine.parameters, options.step), workers=1)
+    worker_options = replace(
+        options, step=checked_step(machine.parameters, options.step), workers=1
+    )
 
     def sent(count: int) -> list[Any]:
         futures = []
         for work_item in itertools.islice(work_items, count):
             running.update(work_item)
             sending = functools.partial(client.submit, pure=False, retries=RETRY_LIMIT)
-            futures.append(sending(run_work_item, machine.parameters, work_item, alone))
+            futures.append(sending(run_work_item, machine.parameters, work_item, worker_options))
         return futures
 
     work_items: Iterator[tuple[tuple[int, Case], ...]] = iter(

@@ -17,7 +17,6 @@ from wm_drake.studies.calibrate.options import CalibrateOptions
 from wm_drake.studies.calibrate.parameter_map import read_parameter_map
 from wm_drake.studies.calibrate.recorded import RecordedLoad, without_edges
 from wm_drake.studies.calibrate.records import RecordModel
-from wm_drake.studies.calibrate.solutions import FreeQuantities
 from wm_drake.studies.calibrate.test_file import calibrated_test, clock_remarks, test_text
 from wm_drake.studies.compare.pairs import QUANTITIES
 from wm_drake.studies.compare.recordings import check_distinct
@@ -194,4 +193,4 @@ def _free_numbers(options: CalibrateOptions, machine: Machine) -> FreeNumbers:
             "spring_preload and spring_elongation are about targets; leave them out for records",
             where=str(path),
         )
-    return FreeQuantities(read_parameter_map(machine, path, file))
+    return read_parameter_map(machine, path, file)
