@@ -310,7 +310,7 @@ def run_work_item(
         step=step,
         workers=1,
         finished=lambda run: results.update(
-            {work_item[run.number][0]: LedgerEntry(run.values, run.diverged)}
+            {work_item[run.number][0]: LedgerEntry(run.stored_values, run.diverged)}
         ),
     )
     return results

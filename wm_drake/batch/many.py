@@ -10,7 +10,8 @@ import xarray as xr
 
 from wm_drake.batch.run_table import RunTable
 from wm_drake.batch.runs import Runner, RunResult
-from wm_drake.batch.work_items import Preparation
+from wm_drake.batch.work_items import BatchKey, Preparation, WorkItem
+from wm_drake.compiler.lanes import WIDTH
 from wm_drake.engines.memory import RECORDS_OF_BATCH
 from wm_drake.model.build import AnyMachine, machine_of
 from wm_drake.model.machine import Machine
@@ -60,8 +61,8 @@ def simulate_many(
         measures: Names of measures or of their variables, in
             `wm_drake.simulation.measures.MEASURES`, such as "extremes" (D, F and M of [B]),
             "amplitudes" or "amplitude" (and critical speeds), "gap", "mounts".
-        step: Step size; the output period of 5 ms must be an integer multiple of it. If None, the
-            step size of the machine is used. [s]
+        step: Largest step; the output period of 5 ms must be an integer multiple of it. If None,
+            that of the machine. Runs that are not accurate with it have shorter ones. [s]
         integrator: Integrator, as in `simulate`; None for that of the machine.
         histories: Whether each `RunResult` contains the record of the run, as from `simulate`.
         workers: Number of threads; None for the number of cores.
@@ -71,7 +72,9 @@ def simulate_many(
     Returns:
         Table over `run`, the number of the case. The coordinate `case` holds its name. The
         variables are the measures (SI, attrs["units"]) and `diverged`: time and reason if a run
-        diverged, else "". The measures of a run that diverged cover the time until then.
+        diverged, else "". The measures of a run that diverged cover the time until then. The
+        coordinates `error`, `is_converged`, `step` [s] and `halvings` are those of
+        `wm_drake.simulation.convergence.Accuracy`.
 
     Raises:
         InputError: a case or an argument is wrong. `finished` was called for the runs that had
@@ -95,7 +98,7 @@ def simulate_many(
     def collect(runs: list[RunResult]) -> None:
         nonlocal done
         for run in runs:  # fill the table first: the callbacks may raise
-            table.put(run.number, run.case.name, run.values, run.diverged)
+            table.put(run.number, run.case.name, run.stored_values, run.diverged)
         done += len(runs)
         for run in runs:
             finished(run)
@@ -176,25 +179,61 @@ def _run_all(
 
     Only so many batches are prepared at a time that memory stays constant.
     """
-    running: set[Future[list[RunResult]]] = set()
-
-    def gather(at_most: int) -> None:
-        while len(running) > at_most:
-            for future in wait(running, return_when=FIRST_COMPLETED).done:
-                running.remove(future)
-                collect(future.result())
-
     ahead = 1 if runner.histories else AHEAD
     with ThreadPoolExecutor(workers) as pool:
+        batches = _Batches(pool, runner, collect)
         try:
             for key, work_items in preparation.batches(_with_pauses(cases)):
-                running.add(pool.submit(runner.run, key, work_items))
-                gather(workers * ahead)  # some batches wait while the others run
-            gather(0)
+                batches.begin(key, work_items)
+                batches.gather(workers * ahead)  # some batches wait while the others run
+            batches.finish()
         except BaseException:
             runner.stopped.set()
             pool.shutdown(wait=True, cancel_futures=True)
-            # collect the runs that finished in the meantime
-            good = [f for f in running if f.done() and not f.cancelled() and f.exception() is None]
-            collect([run for future in good for run in future.result()])
+            batches.collect_ended()
             raise
+
+
+class _Batches:
+    """Batches that run in threads; runs that are not accurate wait until they fill one."""
+
+    def __init__(
+        self,
+        pool: ThreadPoolExecutor,
+        runner: Runner,
+        collect: Callable[[list[RunResult]], None],
+    ) -> None:
+        """Begin without batches."""
+        self._pool, self._runner, self._collect = pool, runner, collect
+        self._running: set[Future[tuple[list[RunResult], list[WorkItem]]]] = set()
+        self._waiting: dict[BatchKey, list[WorkItem]] = {}
+
+    def begin(self, key: BatchKey, items: list[WorkItem]) -> None:
+        """Run work items side by side."""
+        self._running.add(self._pool.submit(self._runner.attempt, key, items))
+
+    def gather(self, at_most: int) -> None:
+        """Pass on the runs that end until at most some batches are running."""
+        while len(self._running) > at_most:
+            for future in wait(self._running, return_when=FIRST_COMPLETED).done:
+                self._running.remove(future)
+                ended, again = future.result()
+                self._collect(ended)
+                for item in again:
+                    items = self._waiting.setdefault(item.key, [])
+                    items.append(item)
+                    if len(items) == WIDTH:
+                        self.begin(item.key, self._waiting.pop(item.key))
+
+    def finish(self) -> None:
+        """Pass on all runs, those that wait too."""
+        self.gather(0)
+        while self._waiting:
+            for key in list(self._waiting):
+                self.begin(key, self._waiting.pop(key))
+            self.gather(0)
+
+    def collect_ended(self) -> None:
+        """Pass on the runs that have ended without an error, after the pool was shut down."""
+        ended = [f for f in self._running if f.done() and not f.cancelled() and not f.exception()]
+        self._collect([run for future in ended for run in future.result()[0]])

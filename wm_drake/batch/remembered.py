@@ -133,12 +133,12 @@ def simulate_remembered(
         # runs that end together are stored together
         ledger.put_all(
             {
-                key: LedgerEntry(r.values, r.diverged)
+                key: LedgerEntry(r.stored_values, r.diverged)
                 for (_, key), r in zip(places, runs, strict=True)
             }
         )
         for (number, _), run in zip(places, runs, strict=True):
-            table.put(number, run.case.name, run.values, run.diverged)
+            table.put(number, run.case.name, run.stored_values, run.diverged)
             done += 1
             progress(done)
 

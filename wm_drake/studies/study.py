@@ -119,7 +119,7 @@ class Facts:
         step: Largest step of the compiled engine, as the machine has it; runs may take shorter
             ones. 0 without a machine, or with several. [s]
         integrator: Integrator of the compiled engine, as the machine has it.
-        verified: What a sample of the runs gave twice as fine; "" without runs.
+        steps: Steps that the runs took and the error that remains; "" without runs.
         runs: Number of runs.
     """
 
@@ -128,7 +128,7 @@ class Facts:
     warnings: tuple[str, ...] = ()
     step: float = 0.0
     integrator: str = ""
-    verified: str = ""
+    steps: str = ""
     runs: int = 0
 
     def rows(self) -> list[tuple[str, str]]:
@@ -140,7 +140,7 @@ class Facts:
         step = f"{STEP.text(self.step)}, integrator {self.integrator}"
         return [
             *([("Largest step", step)] if self.step else []),
-            *([("Check of the step", self.verified)] if self.verified else []),
+            *([("Steps taken", self.steps)] if self.steps else []),
             ("Versions", ", ".join(f"{name} {text}" for name, text in versions().items())),
             ("Sources", sources_version()),
             ("Command", self.command),

@@ -28,6 +28,7 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.report.quantity import SPEED, STEP, TIME, Quantity
 from wm_drake.simulation.cases import Case, is_as_measured, notice_jumping_friction
+from wm_drake.simulation.convergence import Accuracy
 from wm_drake.simulation.displacements import band_of, largest_motion
 from wm_drake.simulation.measures import MEASURES, Measures, measure
 from wm_drake.simulation.records import Record, sample_period
@@ -43,12 +44,14 @@ class CaseResult:
     """Result of one case: its record, which has times of its own, and its measures.
 
     `wall_s` is the time for simulation and measures together; of runs side by side, a share. [s]
+    `accuracy` is None with an engine that controls its error.
     """
 
     case: Case
     record: Record
     measures: Measures
     wall_s: float
+    accuracy: Accuracy | None = None
 
     @property
     def has_gasket(self) -> bool:
@@ -77,6 +80,8 @@ class CaseResult:
         words = f"steps of up to {step} with controlled error"
         if "integrator" in how:
             words = f"{how['integrator']}, steps of {step}"
+        if self.accuracy is not None:
+            words += f", {self.accuracy.text}"
         return f"{words}, samples every {STEP.text(sample_period(self.record))}"
 
     def speed_at(self, time: float) -> float:
@@ -289,7 +294,9 @@ def _run_side_by_side(
 ) -> list[CaseResult]:
     """Return the results of cases, which the compiled engine runs in the lanes of a batch."""
     notice_jumping_friction(machine.parameters)
-    scene, runner = Scene(machine.parameters), Runner(machine.parameters, (), histories=True)
+    scene, shown = Scene(machine.parameters), [m for m in MEASURES.values() if m.is_in_spin]
+    compared = tuple(one.name for one in shown if one.applies(machine.parameters))
+    runner = Runner(machine.parameters, (), histories=True, compared=compared)
     integrator = checked_integrator(machine.parameters, None)
     preparation = Preparation(machine, step, integrator, RECORDS_OF_BATCH)
     results = dict[int, CaseResult]()
@@ -308,7 +315,7 @@ def _run_side_by_side(
             begin = time.perf_counter()
             measures = measure(run.record, scene)
             wall = share + time.perf_counter() - begin
-            results[run.number] = CaseResult(run.case, run.record, measures, wall)
+            results[run.number] = CaseResult(run.case, run.record, measures, wall, run.accuracy)
     return [results[number] for number in range(len(cases))]
 
 

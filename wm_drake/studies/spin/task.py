@@ -120,8 +120,10 @@ class SpinTask(Task):
                     progress=of_all,
                     comparison=comparison,
                 )
-                if self.engine == DEFAULT_ENGINE:  # the other one controls its error
-                    executor.verify(planned.machine, planned.cases)
+                for result in variants[planned.name].results:
+                    if result.accuracy is not None:
+                        name = result.case.name if is_one else f"{planned.name}: {result.case.name}"
+                        executor.steps.add(name, result.accuracy)
                 finished += len(planned.cases)
         return self._answer(variants)
 
