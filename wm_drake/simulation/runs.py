@@ -121,6 +121,7 @@ def _accurate(
             setup, case.profile, stepping.step, progress, period, stepping.integrator,
             stepping.relaxation if stepping.integrator == "midpoint" else None
         )  # fmt: skip
+        assert trajectory.estimates is not None  # the compiled engine estimates its errors
         record = as_record(setup, case, trajectory)
         attempt = Attempt(trajectory.estimates, stepping.step, halvings, record.attrs["diverged"])
         if before or not attempt.holds(parameters.accuracy):

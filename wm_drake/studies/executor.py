@@ -109,6 +109,7 @@ class Executor:
 
         def collect(run: RunResult) -> None:
             assert run.record is not None
+            assert run.accuracy is not None
             self.steps.add(run.case.name, run.accuracy)
             keep(run.number, run.record)
 
