@@ -27,8 +27,9 @@ from wm_drake.parameters.recorded_sensors import RecordedSensor, RecordedTest, r
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.records import Record
+from wm_drake.studies.calibrate.blocks import calibrated
 from wm_drake.studies.calibrate.recorded import RecordedLoad, without_edges
-from wm_drake.studies.calibrate.records import GAIN_SD, TILT_SD, RecordModel, calibrated
+from wm_drake.studies.calibrate.records import GAIN_SD, TILT_SD, RecordModel
 from wm_drake.studies.compare.pairs import paired, predicted_signals
 from wm_drake.studies.compare.recordings import TestRecording
 from wm_drake.studies.experiment import Experiment, record_here
@@ -101,7 +102,7 @@ def _found(machine: Machine, seed: int, by: Any) -> FloatArray:
     pairs = tuple(without_edges(paired(r, run, predicted, test)) for r in recordings)
     load = RecordedLoad("middle", lambda changed: changed.loads["middle"], pairs)
     free = SoughtNumbers(parameters, sought, "calibrated")
-    model = RecordModel(Experiment(machine, ()), free, (load,), sensors, places, by)
+    model = RecordModel(Experiment(machine, ()), free, sensors, (load,), places, by)
     fit, _ = calibrated(model, seed, starts=1)
     return np.array(
         [

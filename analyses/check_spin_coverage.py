@@ -22,14 +22,15 @@ from wm_drake.model.build import build_machine
 from wm_drake.parameters import load_machine, load_profile
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.unbalance_cases import load_unbalance_cases
+from wm_drake.studies.calibrate.blocks import calibrated
 from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.spin_identify.options import SpinIdentifyOptions
 from wm_drake.studies.spin_identify.study import (
     SpinModel,
-    identify_from_spin,
     planted_values,
+    spin_model,
     unknowns_of,
-    virtual_experiment,
+    with_virtual_experiment,
 )
 from wm_drake.studies.spin_identify.task import DEFAULT_CASES
 
@@ -53,12 +54,14 @@ def main() -> None:
     rows: list[FloatArray] = []
     with open_ledger(arguments.ledger, identity, resume=True) as ledger:
         for seed in range(1 if arguments.quick else arguments.seeds):
-            key = key_of(seed=seed, unknowns=[s.keys for s in model.sought], profile=model.profile)
+            key = key_of(
+                seed=seed, unknowns=[s.keys for s in model.free.sought], profile=model.profile
+            )
             if key not in ledger:
                 ledger.put_all({key: LedgerEntry({"row": _identified(model, seed)})})
                 print(f"seed {seed}", file=sys.stderr, flush=True)
             rows.append(ledger.get(key).values["row"])
-    text = _table([sought.unknown.name for sought in model.sought], np.array(rows))
+    text = _table([unknown.name for unknown in model.unknowns], np.array(rows))
     print(text)
     page.write(text, arguments.out, None)
 
@@ -71,15 +74,14 @@ def _model(faster: float, *, quick: bool) -> SpinModel:
     sought = unknowns_of(parameters, QUICK if quick else ())
     experiment = Experiment(machine, ("regions",))
     profile = faster_profile(load_profile("spin_cycle"), faster)
-    return SpinModel(experiment, parameters, profile, cases, sought)
+    return spin_model(experiment, sought, profile, cases)
 
 
 def _identified(model: SpinModel, seed: int) -> FloatArray:
     """Return planted value, estimate, and ends of its interval, NaN without one. (unknown, 4)"""
-    planted = planted_values(model.sought, seed)
+    planted = planted_values(model.free.sought, seed)
     noise = SpinIdentifyOptions.model_fields["noise"].default
-    measured = virtual_experiment(model, planted, noise, seed)
-    fit, _ = identify_from_spin(model, measured, planted=planted, seed=seed)
+    fit, _ = calibrated(with_virtual_experiment(model, planted, noise, seed), seed, starts=1)
     rows = zip(planted, fit.estimates, strict=True)
     return np.array([[true, e.value, e.lower, e.upper] for true, e in rows])
 

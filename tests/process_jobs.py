@@ -6,13 +6,17 @@ import signal
 from wm_drake.errors import input_error
 
 
-def doubled(item):
-    """Return twice a number; a string is a fault: a name of a signal, or a wrong key."""
+def begin(*chosen):
+    """Begin a worker that needs no machine."""
+
+
+def doubled(number, item):
+    """Return twice a number with its place; a string is a fault: a signal, or a wrong key."""
     if item == "SIGKILL":
         os.kill(os.getpid(), signal.SIGKILL)
     if isinstance(item, str):
         raise input_error("not a number", key=item)
-    return 2 * item
+    return [(number, 2 * item)]
 
 
 def answer_of_runs(connection):

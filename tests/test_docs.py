@@ -3,6 +3,7 @@
 import re
 import subprocess
 import sys
+import tomllib
 from xml.etree import ElementTree
 
 import pytest
@@ -189,6 +190,18 @@ def test_upper_bounds_of_the_compiler_allow_what_is_installed():
         bound = re.search(rf'"{name}>=[\d.]+,<(\d+)\.(\d+)"', text)
         installed = tuple(map(int, importlib.metadata.version(name).split(".")[:2]))
         assert installed < (int(bound[1]), int(bound[2]))
+
+
+def test_changelog_and_citation_have_the_version_of_the_package():
+    project = tomllib.loads(text_of(CHECKOUT / "pyproject.toml"))["project"]
+    citation = YAML().load(CHECKOUT / "CITATION.cff")
+    unreleased, *closed = re.findall(
+        r"^## \[(.+?)\](?: - (\S+))?$", text_of(CHECKOUT / "CHANGELOG.md"), re.MULTILINE
+    )
+    assert unreleased == ("Unreleased", "")
+    assert closed[0] == (project["version"], citation["date-released"])
+    assert citation["version"] == project["version"]
+    assert closed == sorted(closed, key=lambda release: release[1], reverse=True)
 
 
 @pytest.mark.parametrize("name", ["machine_keys.py", "sdf_elements.py"])

@@ -17,6 +17,7 @@ from wm_drake.batch.cluster import (
     simulate_on_cluster,
 )
 from wm_drake.batch.ledger import Ledger, open_ledger
+from wm_drake.batch.runs import BatchOptions
 from wm_drake.errors import InputError, WmDrakeError
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import SpinProfile, with_value
@@ -51,7 +52,8 @@ def test_worker_with_other_sources_is_refused():
 
 def test_work_item_returns_results_by_key(reference, machine):
     cases = list(cases_of(reference, 3))
-    results = run_work_item(reference, tuple(zip("abc", cases, strict=True)), ("extremes",), 2.5e-3)
+    options = BatchOptions(("extremes",), 2.5e-3)
+    results = run_work_item(reference, tuple(zip("abc", cases, strict=True)), options)
     table = simulate_many(machine, cases, measures=("extremes",))
     assert list(results) == ["a", "b", "c"]
     assert results["b"].values["gasket_force"].tolist() == table.gasket_force.values[1].tolist()

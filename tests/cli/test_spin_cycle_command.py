@@ -98,9 +98,15 @@ def test_second_time_nothing_is_run_and_its_own_table_is_a_perfect_measurement(s
 def test_drakes_engine_runs_a_case_too(study):
     shown = {}
     for engine in ("drake", "compiled"):
+        if shown:
+            refused = study("--case", "front", "--resume")
+            assert refused.code == 2
+            assert "engine is 'drake' there and 'compiled' now" in refused.err
         ended = study("--json", "--case", "front", "--engine", engine, "--overwrite")
         assert ended.code == 0
         shown[engine] = json.loads(ended.out)
+        page = Path("out/report.html").read_text(encoding="utf-8")
+        assert re.search(rf"<dt>Engine</dt>\s*<dd>{engine}</dd>", page)
     drake, compiled = shown["drake"], shown["compiled"]
     for name in ("rms", "rms_from_acceleration"):
         np.testing.assert_allclose(rms_of(drake, name), rms_of(compiled, name), rtol=5e-4)

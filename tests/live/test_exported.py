@@ -41,7 +41,7 @@ def test_errors_are_one_message_and_nothing_is_written(tmp_path, monkeypatch, op
 def test_a_folder_in_place_of_the_file_is_an_error(tmp_path, monkeypatch):
     monkeypatch.setattr(exported, "page_data", lambda parameters: SMALLEST)
     (tmp_path / "machine.html").mkdir()
-    with pytest.raises(InputError, match="cannot be written to"):
+    with pytest.raises(InputError, match="is not a regular file"):
         export_page(wm.load_machine("reference"), tmp_path / "machine.html")
     assert [path.name for path in tmp_path.iterdir()] == ["machine.html"]
 

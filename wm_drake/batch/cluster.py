@@ -17,9 +17,11 @@ from typing import Any
 import xarray as xr
 
 from wm_drake.batch.ledger import Ledger, LedgerEntry
-from wm_drake.batch.many import BatchOptions, simulate_many
+from wm_drake.batch.many import simulate_many
 from wm_drake.batch.remembered import keyed, sources_version
 from wm_drake.batch.run_table import RunTable
+from wm_drake.batch.runs import BatchOptions
+from wm_drake.engines import DEFAULT_ENGINE
 from wm_drake.errors import WmDrakeError, input_error, shortened
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
@@ -147,6 +149,7 @@ def simulate_on_cluster(
     *,
     measures: Iterable[str] = ("extremes",),
     step: float | None = None,
+    engine: str = DEFAULT_ENGINE,
     progress: Callable[[int], None] = lambda done: None,
 ) -> xr.Dataset:
     """Run the cases whose results are not in a ledger on a cluster, and return the table of all.
@@ -160,6 +163,7 @@ def simulate_on_cluster(
         client: Client of the cluster, from `cluster_client`.
         measures: Names of measures, keys of `wm_drake.simulation.measures.MEASURES`.
         step: Step size; None for that of the machine. [s]
+        engine: Name of the engine.
         progress: Called with the number of cases that have a result.
 
     Raises:
@@ -169,10 +173,9 @@ def simulate_on_cluster(
     from distributed import as_completed
 
     notice_jumping_friction(machine.parameters)
-    distinct = tuple(dict.fromkeys(measures))
     step = checked_step(machine.parameters, step)
-    options = BatchOptions(distinct, step)
-    table = RunTable(machine.parameters, distinct)
+    options = BatchOptions(tuple(dict.fromkeys(measures)), step, engine=engine)
+    table = RunTable(machine.parameters, options.measures)
     running: dict[str, list[tuple[int, str]]] = {}  # numbers and names of the cases by their keys
     done = 0
 
@@ -199,8 +202,7 @@ def simulate_on_cluster(
             run_work_item,
             machine.parameters,
             work_item,
-            distinct,
-            step,
+            options,
             pure=False,
             retries=RETRY_LIMIT,
         )
@@ -288,16 +290,14 @@ def _as_they_end(running: Any, client: Any) -> Iterator[Any]:
 def run_work_item(
     parameters: MachineParameters,
     work_item: tuple[tuple[str, Case], ...],
-    measures: tuple[str, ...],
-    step: float | None,
+    options: BatchOptions,
 ) -> dict[str, LedgerEntry]:
     """Run the cases of a work item in the process of a worker and return their results by key.
 
     Args:
         parameters: The machine.
         work_item: Pairs of the key of a run and its case.
-        measures: Names of measures, keys of `wm_drake.simulation.measures.MEASURES`.
-        step: Step size; None for that of the machine. [s]
+        options: How they are run.
     """
     cases = [case for _, case in work_item]
     results: dict[str, LedgerEntry] = {}
@@ -306,9 +306,10 @@ def run_work_item(
             _HashableParameters(parameters.model_dump_json(exclude={"sources"}), parameters)
         ),
         cases,
-        measures=measures,
-        step=step,
+        measures=options.measures,
+        step=options.step,
         workers=1,
+        engine=options.engine,
         finished=lambda run: results.update(
             {work_item[run.number][0]: LedgerEntry(run.stored_values, run.diverged)}
         ),

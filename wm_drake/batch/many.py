@@ -3,22 +3,25 @@
 import os
 import time
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 
 import xarray as xr
 
+from wm_drake.batch.drake_runs import drake_pool
 from wm_drake.batch.run_table import RunTable
-from wm_drake.batch.runs import Runner, RunResult
+from wm_drake.batch.runs import Advance, BatchJobs, BatchOptions, Runner, RunResult
 from wm_drake.batch.work_items import BatchKey, Preparation, WorkItem
 from wm_drake.compiler.lanes import WIDTH
+from wm_drake.engines import DEFAULT_ENGINE
 from wm_drake.engines.memory import RECORDS_OF_BATCH
+from wm_drake.errors import check_known
 from wm_drake.model.build import AnyMachine, machine_of
 from wm_drake.model.machine import Machine
 from wm_drake.simulation.cases import Case, case_of, notice_jumping_friction
 from wm_drake.simulation.feet import cabinet_of
 from wm_drake.simulation.first_call import compile_in_two_processes
 from wm_drake.simulation.measures import MEASURES, measure_named
+from wm_drake.simulation.runs import ENGINES
 from wm_drake.simulation.steps import checked_integrator, checked_step
 
 AHEAD = 3
@@ -46,13 +49,14 @@ def simulate_many(
     integrator: str | None = None,
     histories: bool = False,
     workers: int | None = None,
+    engine: str = DEFAULT_ENGINE,
     progress: Callable[[int], None] = lambda done: None,
     finished: Callable[[RunResult], None] = lambda ended: None,
 ) -> xr.Dataset:
-    """Run many cases of one machine with the compiled engine and return a table of their measures.
+    """Run many cases of one machine and return a table of their measures.
 
-    Each core runs several cases at once, one per SIMD lane. The results of a run do not depend on
-    the number of workers or on the other cases.
+    With the compiled engine, each core runs several cases at once, one per SIMD lane. The results
+    of a run do not depend on the number of workers or on the other cases.
 
     Args:
         machine: A built machine, its parameters, or its name or file.
@@ -65,7 +69,9 @@ def simulate_many(
             that of the machine. Runs that are not accurate with it have shorter ones. [s]
         integrator: Integrator, as in `simulate`; None for that of the machine.
         histories: Whether each `RunResult` contains the record of the run, as from `simulate`.
-        workers: Number of threads; None for the number of cores.
+        workers: Number of threads, or of processes for the Drake engine; None for the number of
+            cores.
+        engine: Name of the engine, as in `simulate`.
         progress: Called with the number of finished runs; `wm_drake.progress_bar` displays it.
         finished: Called with each run when it is finished.
 
@@ -104,7 +110,7 @@ def simulate_many(
             finished(run)
         progress(done)
 
-    options = BatchOptions(chosen, step, integrator, histories, workers)
+    options = BatchOptions(chosen, step, integrator, histories, workers, engine)
     try:
         pairs = run_cases(machine, listed, options, collect)
     except KeyboardInterrupt:
@@ -112,27 +118,19 @@ def simulate_many(
     return table.dataset(pairs)
 
 
-@dataclass(frozen=True)
-class BatchOptions:
-    """How `run_cases` runs; see `simulate_many`."""
-
-    measures: tuple[str, ...]
-    step: float | None = None
-    integrator: str | None = None
-    histories: bool = False
-    workers: int | None = None
-
-
 def run_cases(
     machine: Machine,
     cases: Iterable[Case],
     options: BatchOptions,
     collect: Callable[[list[RunResult]], None],
+    advance: Advance = lambda number, fraction: None,
 ) -> list[str] | None:
     """Run cases and pass finished runs on; nothing of them is kept.
 
     Args:
         collect: Called with the runs of a batch when they have ended.
+        advance: Called with the number of a case and the fraction of its run that is done; not for
+            runs in other processes.
 
     Returns:
         Names of the pairs of shapes, if they are known.
@@ -141,21 +139,60 @@ def run_cases(
         InputError: a case or an option is wrong.
         KeyboardInterrupt: Ctrl-C was pressed; `collect` has got what had ended.
     """
+    check_known(options.engine, ENGINES, f"no engine '{options.engine}'", key="engine")
     parameters = machine.parameters
     compile_in_two_processes(parameters)
     if any("feet" in MEASURES[name].needs for name in options.measures):
         cabinet_of(parameters)
+    workers = options.workers or os.cpu_count() or 1
+    ahead = workers * (1 if options.histories else AHEAD)
+    if options.engine != DEFAULT_ENGINE:
+        with drake_pool(machine, cases, options, advance) as (pool, jobs, stop):
+            _run_all(pool, jobs, ahead, stop, collect)
+        return None
     step = checked_step(parameters, options.step)
     scheme = checked_integrator(parameters, options.integrator)
     notice_jumping_friction(parameters)
-    runner = Runner(parameters, options.measures, options.histories, machine.cache.scenes)
-    threads = options.workers or os.cpu_count() or 1
-    at_once = threads * (RECORDS_OF_BATCH if options.histories else 1.0)
-    preparation = Preparation(machine, step, scheme, at_once)
-    _run_all(preparation, runner, cases, threads, collect)
+    runner = Runner(
+        parameters,
+        options.measures,
+        options.histories,
+        machine.cache.scenes,
+        compared=options.compared,
+    )
+    at_once = workers * (RECORDS_OF_BATCH if options.histories else 1.0)
+    batches = Preparation(machine, step, scheme, at_once).batches(_with_pauses(cases))
+    with ThreadPoolExecutor(workers) as threads:
+        jobs = _jobs(runner, batches, advance)
+        while True:
+            _run_all(threads, jobs, ahead, runner.stopped.set, collect)
+            left = list(runner.postponed(1))
+            if not left:
+                break
+            jobs = _jobs(runner, left, advance)
     pairs = runner.scenes[0].pair_names() if runner.scenes else None
     machine.cache.scenes.extend(runner.scenes)
     return pairs
+
+
+def _jobs(
+    runner: Runner, batches: Iterable[tuple[BatchKey, list[WorkItem]]], advance: Advance
+) -> BatchJobs:
+    """Yield the jobs of batches, and of full batches of runs that must be repeated meanwhile."""
+    for key, items in batches:
+        yield runner.run_or_postpone, key, items, _of_batch(advance, items)
+        for finer, again in runner.postponed(WIDTH):
+            yield runner.run_or_postpone, finer, again, _of_batch(advance, again)
+
+
+def _of_batch(advance: Advance, items: list[WorkItem]) -> Callable[[float], None]:
+    """Return the function of the fraction that is done of all runs of a batch."""
+
+    def report(fraction: float) -> None:
+        for item in items:
+            advance(item.number, fraction)
+
+    return report
 
 
 def _with_pauses(cases: Iterable[Case]) -> Iterator[Case]:
@@ -169,71 +206,35 @@ def _with_pauses(cases: Iterable[Case]) -> Iterator[Case]:
 
 
 def _run_all(
-    preparation: Preparation,
-    runner: Runner,
-    cases: Iterable[Case],
-    workers: int,
+    pool: Executor,
+    jobs: BatchJobs,
+    ahead: int,
+    stop: Callable[[], None],
     collect: Callable[[list[RunResult]], None],
 ) -> None:
-    """Run all cases in threads and pass finished runs to `collect`.
+    """Run all jobs in the workers of a pool and pass finished runs to `collect`.
 
-    Only so many batches are prepared at a time that memory stays constant.
+    Args:
+        ahead: Number of jobs that run or wait, so that memory stays constant.
+        stop: Function that ends what runs.
     """
-    ahead = 1 if runner.histories else AHEAD
-    with ThreadPoolExecutor(workers) as pool:
-        batches = _Batches(pool, runner, collect)
-        try:
-            for key, work_items in preparation.batches(_with_pauses(cases)):
-                batches.begin(key, work_items)
-                batches.gather(workers * ahead)  # some batches wait while the others run
-            batches.finish()
-        except BaseException:
-            runner.stopped.set()
-            pool.shutdown(wait=True, cancel_futures=True)
-            batches.collect_ended()
-            raise
+    running: set[Future[list[RunResult]]] = set()
 
+    def gather(at_most: int) -> None:
+        while len(running) > at_most:
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                running.remove(future)
+                collect(future.result())
 
-class _Batches:
-    """Batches that run in threads; runs that are not accurate wait until they fill one."""
-
-    def __init__(
-        self,
-        pool: ThreadPoolExecutor,
-        runner: Runner,
-        collect: Callable[[list[RunResult]], None],
-    ) -> None:
-        """Begin without batches."""
-        self._pool, self._runner, self._collect = pool, runner, collect
-        self._running: set[Future[tuple[list[RunResult], list[WorkItem]]]] = set()
-        self._waiting: dict[BatchKey, list[WorkItem]] = {}
-
-    def begin(self, key: BatchKey, items: list[WorkItem]) -> None:
-        """Run work items side by side."""
-        self._running.add(self._pool.submit(self._runner.attempt, key, items))
-
-    def gather(self, at_most: int) -> None:
-        """Pass on the runs that end until at most some batches are running."""
-        while len(self._running) > at_most:
-            for future in wait(self._running, return_when=FIRST_COMPLETED).done:
-                self._running.remove(future)
-                ended, again = future.result()
-                self._collect(ended)
-                for item in again:
-                    items = self._waiting.setdefault(item.key, [])
-                    items.append(item)
-                    if len(items) == WIDTH:
-                        self.begin(item.key, self._waiting.pop(item.key))
-
-    def finish(self) -> None:
-        """Pass on all runs, those that wait too."""
-        self.gather(0)
-        while self._waiting:
-            for key in list(self._waiting):
-                self.begin(key, self._waiting.pop(key))
-            self.gather(0)
-
-    def collect_ended(self) -> None:
-        """Pass on the runs that have ended without an error, after the pool was shut down."""
-        ended = [f for f in self._running if f.done() and not f.cancelled() and not f.exception()]
-        self._collect([run for future in ended for run in future.result()[0]])
+    try:
+        for job in jobs:
+            running.add(pool.submit(*job))
+            gather(ahead)  # some wait while the others run
+        gather(0)
+    except BaseException:
+        stop()
+        pool.shutdown(wait=True, cancel_futures=True)
+        # collect the runs that finished in the meantime
+        good = [f for f in running if f.done() and not f.cancelled() and f.exception() is None]
+        collect([run for future in good for run in future.result()])
+        raise

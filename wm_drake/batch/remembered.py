@@ -9,9 +9,10 @@ from pathlib import Path
 import xarray as xr
 
 from wm_drake.batch.ledger import Ledger, LedgerEntry, key_of
-from wm_drake.batch.many import BatchOptions, SimulationInterrupted, run_cases
+from wm_drake.batch.many import SimulationInterrupted, run_cases
 from wm_drake.batch.run_table import RunTable
-from wm_drake.batch.runs import RunResult
+from wm_drake.batch.runs import BatchOptions, RunResult
+from wm_drake.engines import DEFAULT_ENGINE
 from wm_drake.model.bodies import sdf_path
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters
@@ -49,6 +50,7 @@ def run_keys(
     *,
     measures: Iterable[str],
     step: float | None = None,
+    engine: str = DEFAULT_ENGINE,
 ) -> Iterator[str]:
     """Yield the key of each case in a ledger: a hash of all that determines the result.
 
@@ -60,6 +62,7 @@ def run_keys(
         cases: Cases.
         measures: Names of measures, keys of `wm_drake.simulation.measures.MEASURES`.
         step: Step size; None for that of the machine. [s]
+        engine: Name of the engine.
 
     Raises:
         InputError: the step size does not divide the output period.
@@ -67,7 +70,7 @@ def run_keys(
     common: dict[str, object] = {
         "model": model_version(parameters),
         "sources": sources_version(),
-        "engine": "compiled",
+        "engine": engine,
     }
     common |= {"step": checked_step(parameters, step), "integrator": parameters.integrator}
     common |= {"measures": sorted(set(measures))}
@@ -89,6 +92,7 @@ def simulate_remembered(
     measures: Iterable[str] = ("extremes",),
     step: float | None = None,
     workers: int | None = None,
+    engine: str = DEFAULT_ENGINE,
     progress: Callable[[int], None] = lambda done: None,
 ) -> xr.Dataset:
     """Run the cases whose results are not in a ledger and return the table of all cases.
@@ -102,7 +106,7 @@ def simulate_remembered(
         ledger: An open ledger.
         measures: Names of measures, keys of `wm_drake.simulation.measures.MEASURES`.
         step: Step size; None for that of the machine. [s]
-        workers: Number of threads; None for the number of cores.
+        workers, engine: As for `simulate_many`.
         progress: Called with the number of cases that have a result.
 
     Raises:
@@ -110,7 +114,7 @@ def simulate_remembered(
         SimulationInterrupted: Ctrl-C was pressed.
         LedgerError: the ledger cannot be written to, or it is damaged.
     """
-    options = BatchOptions(tuple(dict.fromkeys(measures)), step, workers=workers)
+    options = BatchOptions(tuple(dict.fromkeys(measures)), step, workers=workers, engine=engine)
     table = RunTable(machine.parameters, options.measures)
     running: dict[int, tuple[int, str]] = {}  # number and key of each case that is run
     order, done = itertools.count(), 0
@@ -154,5 +158,7 @@ def keyed(
 ) -> Iterator[tuple[Case, str]]:
     """Yield each case with its key, as `run_keys`; one case at a time is taken."""
     given, hashed = itertools.tee(cases)
-    keys = run_keys(parameters, hashed, measures=options.measures, step=options.step)
+    keys = run_keys(
+        parameters, hashed, measures=options.measures, step=options.step, engine=options.engine
+    )
     return zip(given, keys, strict=True)

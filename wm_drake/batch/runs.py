@@ -2,9 +2,9 @@
 
 import functools
 import threading
-from collections.abc import Callable, Container, Sequence
+from collections.abc import Callable, Container, Iterator, Sequence
 from dataclasses import dataclass
-from typing import cast
+from typing import Any, TypeAlias, cast
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from wm_drake.compiler.lanes import WIDTH
 from wm_drake.elements.mount import WRENCH_SIZE
 from wm_drake.elements.sensor import POINT_SIZE
 from wm_drake.elements.state_map import RATES_SIZE, WATER
+from wm_drake.engines import DEFAULT_ENGINE
 from wm_drake.engines.compiled.local_error import SUMS_SIZE, estimates_of
 from wm_drake.engines.compiled.mechanics import DRUM_ANGLE, DRUM_RATE, STATE_SIZE
 from wm_drake.engines.compiled.run import RunLanes, integrate_runs
@@ -117,6 +118,26 @@ class RunResult:
         return self.values | known
 
 
+@dataclass(frozen=True)
+class BatchOptions:
+    """How cases are run; see `simulate_many`, and `Runner` for `compared`."""
+
+    measures: tuple[str, ...]
+    step: float | None = None
+    integrator: str | None = None
+    histories: bool = False
+    workers: int | None = None
+    engine: str = DEFAULT_ENGINE
+    compared: tuple[str, ...] = COMPARED
+
+
+Advance: TypeAlias = Callable[[int, float], None]
+"""Function that is called with the number of a case and the fraction of its run that is done."""
+
+BatchJobs: TypeAlias = Iterator[tuple[Any, ...]]
+"""Functions that return lists of `RunResult`, each followed by its arguments."""
+
+
 class Runner:
     """Runs work items in any thread. Each thread reuses memory of its own from batch to batch."""
 
@@ -149,6 +170,7 @@ class Runner:
         self.stopped = threading.Event()
         self._memory = threading.local()
         self._spare = [] if scenes is None else scenes
+        self._again = list[WorkItem]()
         self.scenes: list[Scene] = []
 
     def run(
@@ -175,6 +197,23 @@ class Runner:
                 results += ended
                 again += left
         return results
+
+    def run_or_postpone(
+        self, key: BatchKey, work_items: list[WorkItem], progress: Callable[[float], None]
+    ) -> list[RunResult]:
+        """Run work items once; those that are not accurate wait for `postponed`."""
+        results, again = self.attempt(key, work_items, progress)
+        self._again.extend(again)
+        return results
+
+    def postponed(self, fewest: int) -> Iterator[tuple[BatchKey, list[WorkItem]]]:
+        """Yield batches of work items that wait, of at least some items; call it in one thread."""
+        items, self._again = self._again, []
+        for key, batch in side_by_side(items):
+            if len(batch) < fewest:
+                self._again.extend(batch)
+            else:
+                yield key, batch
 
     def attempt(
         self,

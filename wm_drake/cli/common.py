@@ -30,6 +30,10 @@ JsonOption = Annotated[
     bool, typer.Option("--json", help="Print one JSON object on standard output instead of tables.")
 ]
 
+OverwriteOption = Annotated[
+    bool, typer.Option("--overwrite", help="Replace a file that exists already.")
+]
+
 
 def folder_of(option: str) -> Callable[[str], Path]:
     """Return the parser of a folder; it refuses an empty text, which is the current folder."""

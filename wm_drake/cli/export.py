@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
-from wm_drake.cli.common import MachineOption, SetOption
+from wm_drake.cli.common import MachineOption, OverwriteOption, SetOption
 from wm_drake.cli.options import with_options
 from wm_drake.export.options import FmuOptions
 from wm_drake.report.terminal import say
@@ -27,6 +27,7 @@ def fmu(
         str, typer.Option(help="Load with which a run begins.", metavar="NAME")
     ] = "middle",
     sets: SetOption = None,
+    overwrite: OverwriteOption = False,
     **chosen: Any,
 ) -> None:
     """Write a machine as an FMU for co-simulation and model exchange, without Python inside."""
@@ -36,7 +37,7 @@ def fmu(
     for text in machine_warnings(parameters):
         say(f"warning: {text}", err=True)
     with located_in(machine):
-        written = export_fmu(parameters, load, out, options)
+        written = export_fmu(parameters, load, out, options, replace=overwrite)
     model = written.model
     speed = ""
     if host_platform() in written.platforms:
@@ -59,6 +60,7 @@ def page(
     ] = None,
     out: Annotated[Path, typer.Option(help="File to write.", metavar="FILE.html")] = DEFAULT_PAGE,
     sets: SetOption = None,
+    overwrite: OverwriteOption = False,
 ) -> None:
     """Write a machine as one HTML file that runs it in a browser, without installation."""
     from wm_drake.live.exported import export_page
@@ -67,7 +69,7 @@ def page(
     for text in machine_warnings(parameters):
         say(f"warning: {text}", err=True)
     with located_in(machine):
-        written = export_page(parameters, out, load or (), machine, sets or ())
+        written = export_page(parameters, out, load or (), machine, sets or (), replace=overwrite)
     say(
         f"{out}: {written.movable} numbers to move, {written.fixed} fixed; "
         f"{written.size / 1e3:.0f} kB"

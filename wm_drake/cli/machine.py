@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -9,10 +10,11 @@ from typing import Annotated
 
 import typer
 
-from wm_drake.cli.common import JsonOption, SetOption
+from wm_drake.cli.common import JsonOption, OverwriteOption, SetOption
 from wm_drake.cli.new_machine import NewOptions, machine_new
 from wm_drake.cli.options import with_options
 from wm_drake.errors import InputError, WmDrakeError, input_error, shortened
+from wm_drake.parameters.written_files import check_new, write_files
 from wm_drake.report.provenance import command_line
 from wm_drake.report.terminal import say
 from wm_drake.studies.inputs import built_with_problems, load_parameters, located_in
@@ -35,16 +37,17 @@ def machine_check(
             metavar="FILE.html|FOLDER",
         ),
     ] = None,
+    overwrite: OverwriteOption = False,
 ) -> None:
     """Check machine files. The exit code is 0, or 2 with one line per problem of any file.
 
     Values outside the usual range are warned of.
     """
     files = list(dict.fromkeys(files))
-    if len(files) == 1:
-        _check(files[0], strict, partial(_write_page, page) if page else None)
-        return
-    paths = _pages_in(page, files) if page else {}
+    paths = dict[str, Path]()
+    if page:
+        paths = {files[0]: page} if len(files) == 1 else _pages_in(page, files)
+        check_new(paths.values(), replace=overwrite)
     texts: dict[Path, str] = {}
     errors: list[InputError] = []
     for file in files:
@@ -55,7 +58,10 @@ def machine_check(
     if errors:
         raise WmDrakeError("\n".join(map(str, errors)))
     for path, text in texts.items():
-        _write_page(path, text)
+        with suppress(OSError):  # the message is that of the file
+            path.parent.mkdir(parents=True, exist_ok=True)
+        write_files({path: text}, replace=overwrite)
+        say(f"{path}: open it in a browser")
 
 
 def _check(file: str, strict: bool, draw: Callable[[str], None] | None) -> None:
@@ -99,16 +105,6 @@ def _pages_in(folder: Path, files: Sequence[str]) -> dict[str, Path]:
                 f"{' and '.join(same)} would have the same page, {path}", where="--page"
             )
     return paths
-
-
-def _write_page(path: Path, text: str) -> None:
-    """Write a page."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise input_error(f"cannot be written to: {error.strerror}", where=str(path)) from None
-    say(f"{path}: open it in a browser")
 
 
 @app.command("show")

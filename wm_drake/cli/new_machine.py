@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from wm_drake.errors import InputError, input_error
+from wm_drake.parameters.written_files import OTHER_NAME, check_new, write_files
 from wm_drake.report.terminal import say
 from wm_drake.studies.inputs import existing_file
 from wm_drake.studies.study import OptionModel, option
@@ -65,7 +66,7 @@ def machine_new(
             raise input_error("not allowed with numbers, which need no base", where="--extends")
         _write_first_machine(path, given, parts)
         return
-    _write_new(path, _template(path, base))
+    write_files({path: _template(path, base)}, replace=False, way_out=OTHER_NAME)
     say(f"{path} extends '{base}'. Edit it, then: wm-drake machine check {path}")
 
 
@@ -79,17 +80,6 @@ def _new_path(name: str) -> Path:
             where="machine new",
         )
     return path
-
-
-def _write_new(path: Path, text: str) -> None:
-    """Write a file that must not exist."""
-    try:
-        with path.open("x", encoding="utf-8") as file:
-            file.write(text)
-    except FileExistsError:
-        raise input_error("exists already; choose another name", where=str(path)) from None
-    except OSError as error:
-        raise input_error(f"cannot be written to: {error.strerror}", where=str(path)) from None
 
 
 def _write_first_machine(path: Path, given: dict[str, str], table: Path | None) -> None:
@@ -112,10 +102,9 @@ def _write_first_machine(path: Path, given: dict[str, str], table: Path | None) 
         ) from None
     parts = read_parts(existing_file(table, "--parts")) if table else {}
     machine, sdf = FirstMachine(path.stem, numbers, parts), path.with_suffix(".sdf")
-    if path.exists():
-        raise input_error("exists already; choose another name", where=str(path))
-    _write_new(sdf, machine.sdf())
-    _write_new(path, machine.yaml(str(path), sdf.name))
+    contents = {sdf: machine.sdf(), path: machine.yaml(str(path), sdf.name)}
+    check_new([path], replace=False, way_out=OTHER_NAME)  # named before its SDF
+    write_files(contents, replace=False, way_out=OTHER_NAME)
     say(
         f"{path} and {sdf} are a machine of their own; what you did not give is marked as an "
         f"assumption. Check it: wm-drake machine check {path}"

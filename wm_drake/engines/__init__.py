@@ -5,3 +5,6 @@ sampled states. `drake` steps the Drake diagram with an integrator of pydrake's 
 the reference. `compiled` runs the same machine as compiled code, several runs at a time.
 May import: `model`, `elements`, `systems` and the rooms before them.
 """
+
+DEFAULT_ENGINE = "compiled"
+"""Name of the engine of all runs that name no other one."""

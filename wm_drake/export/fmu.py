@@ -10,7 +10,6 @@ import html
 import importlib.metadata
 import importlib.util
 import io
-import os
 import platform as host
 import shutil
 import subprocess
@@ -41,6 +40,7 @@ from wm_drake.export.object_code import (
 )
 from wm_drake.export.options import FmuOptions
 from wm_drake.parameters import MachineParameters
+from wm_drake.parameters.written_files import check_new, write_files
 from wm_drake.simulation.outputs import variables_of
 
 WRAPPER = Path(__file__).parent / "c" / "fmu.c"
@@ -78,17 +78,24 @@ def host_platform() -> str:
 
 
 def export_fmu(
-    parameters: MachineParameters, load: str, out: str | Path, options: FmuOptions | None = None
+    parameters: MachineParameters,
+    load: str,
+    out: str | Path,
+    options: FmuOptions | None = None,
+    *,
+    replace: bool = True,
 ) -> ExportedFmu:
     """Write a machine with a load as an FMU.
 
     Args:
         load: Name of one of its loads, with which a run of the FMU begins.
-        out: File to write; it is replaced if it exists.
+        out: File to write.
+        replace: Whether a file that exists is replaced.
 
     Raises:
-        InputError: an option is not allowed, FMPy or a compiler is missing, or the compiled engine
-            does not represent the machine. Nothing is written then.
+        InputError: an option is not allowed, FMPy or a compiler is missing, the compiled engine
+            does not represent the machine, or the file exists or cannot be written. Nothing is
+            written then.
 
     Example:
         >>> import wm_drake as wm
@@ -99,7 +106,7 @@ def export_fmu(
     """
     options = options or FmuOptions()
     path, platforms = Path(out), _platforms(options)
-    _check_file(path)
+    _check_file(path, replace)
     headers = _headers()
     compilers = {p.name: [*_compiler(p), f"-I{headers}"] for p in platforms}
     model = exported_model(
@@ -112,7 +119,8 @@ def export_fmu(
     contents = _Contents(model, kernel_code(model.plan), options.fmi, platforms)
     sources = contents.sources() if options.sources else {}
     files = contents.about(sources) | contents.libraries(compilers)
-    _write(path, files | {f"sources/{name}": content for name, content in sources.items()})
+    files |= {f"sources/{name}": content for name, content in sources.items()}
+    write_files({path: _zipped(files)}, replace=replace)
     names = tuple(platform.name for platform in platforms)
     return ExportedFmu(path, model, names, path.stat().st_size)
 
@@ -169,11 +177,12 @@ def _platforms(options: FmuOptions) -> list[Platform]:
     return [PLATFORMS[name] for name in dict.fromkeys(names or [host_platform()])]
 
 
-def _check_file(path: Path) -> None:
+def _check_file(path: Path, replace: bool) -> None:
     if path.suffix != ".fmu":
         raise input_error(f"'{path.name}' must end with .fmu", where="out")
     if not path.parent.is_dir():
         raise input_error(f"there is no folder '{path.parent}'", where="out")
+    check_new([path], replace=replace)
 
 
 def _headers() -> Path:
@@ -359,16 +368,13 @@ def _row(variable: FmuVariable) -> str:
     )
 
 
-def _write(path: Path, files: Mapping[str, bytes]) -> None:
-    """Write the FMU as a whole or not at all."""
-    part = path.with_name(f".{path.name}.part")
-    try:
-        with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
-            for name, content in files.items():
-                archive.writestr(name, content)
-        os.replace(part, path)  # noqa: PTH105
-    finally:
-        part.unlink(missing_ok=True)
+def _zipped(files: Mapping[str, bytes]) -> bytes:
+    """Return the content of an FMU, which is an archive of files."""
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, file in files.items():
+            archive.writestr(name, file)
+    return content.getvalue()
 
 
 SIMULATED = 5.0

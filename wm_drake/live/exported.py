@@ -9,15 +9,15 @@ import hashlib
 import html
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from wm_drake.errors import check_known, input_error, reason_of
+from wm_drake.errors import check_known, input_error
 from wm_drake.live.page_data import page_data
 from wm_drake.parameters import MachineParameters
+from wm_drake.parameters.written_files import check_new, write_files
 from wm_drake.simulation.cases import Case, is_as_measured, notice_jumping_friction
 
 STATIC = Path(__file__).parent / "static"
@@ -57,17 +57,20 @@ def export_page(
     loads: Sequence[str] = (),
     given: str = "",
     sets: Sequence[str] = (),
+    *,
+    replace: bool = True,
 ) -> ExportedPage:
     """Write a machine as one HTML file that runs it.
 
     Args:
-        out: File to write; it is replaced if it exists.
+        out: File to write.
         loads: Names of the loads that run; all if empty.
         given, sets: As for `page_text`.
+        replace: Whether a file that exists is replaced.
 
     Raises:
         InputError: a load is unknown, the compiled engine does not represent the machine, or the
-            file cannot be written. Nothing is written then.
+            file exists or cannot be written. Nothing is written then.
     """
     for name in loads:
         message = f"no load '{name}' in machine '{parameters.name}'"
@@ -76,12 +79,10 @@ def export_page(
         chosen = {name: parameters.loads[name] for name in loads}
         parameters = parameters.model_copy(update={"loads": chosen})
     path = Path(out)
-    _check_place(path)
+    _check_place(path, replace)
     notice_jumping_friction(parameters)
     text, data = page_text(parameters, given, sets)
-    with _part_of(path) as part:
-        part.write_text(text, encoding="utf-8")
-        part.replace(path)
+    write_files({path: text}, replace=replace)
     numbers = data["machine"]["numbers"]
     fixed = sum(1 for number in numbers if number["needs"])
     return ExportedPage(path, len(text.encode()), len(numbers) - fixed, fixed)
@@ -187,25 +188,10 @@ def _in_html(text: str) -> str:
     return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
 
 
-def _check_place(path: Path) -> None:
+def _check_place(path: Path, replace: bool) -> None:
     """Check before the work that a file can be written there."""
     if path.suffix not in (".html", ".htm"):
         raise input_error(f"'{path.name}' must end with .html", where="out")
     if not path.parent.is_dir():
         raise input_error(f"there is no folder '{path.parent}'", where="out")
-    with _part_of(path):
-        pass
-
-
-@contextmanager
-def _part_of(path: Path) -> Iterator[Path]:
-    """Yield a file beside a file, which is removed, so that the file is written as a whole."""
-    part = path.with_name(f".{path.name}.part")
-    try:
-        part.touch()
-        yield part
-    except OSError as error:
-        raise input_error(f"cannot be written to: {reason_of(error)}", where=str(path)) from None
-    finally:
-        with suppress(OSError):
-            part.unlink()
+    check_new([path], replace=replace)

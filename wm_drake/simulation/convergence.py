@@ -183,8 +183,10 @@ class StepSummary:
         self._steps: set[float] = set()
         self._repeated, self._error = 0, 0.0
 
-    def add(self, name: str, accuracy: Iterable[float]) -> None:
-        """Add the run of a case."""
+    def add(self, name: str, accuracy: Iterable[float] | None) -> None:
+        """Add the run of a case, if its accuracy is known."""
+        if accuracy is None or np.isnan(accuracy := tuple(accuracy)).all():
+            return
         of_run = Accuracy(*map(float, accuracy))
         self.runs += 1
         self._steps.add(of_run.step)

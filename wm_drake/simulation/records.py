@@ -17,6 +17,7 @@ from wm_drake.errors import input_error
 from wm_drake.model.machine import Setup
 from wm_drake.parameters import Load, SpinProfile
 from wm_drake.parameters.cabinet import Cabinet
+from wm_drake.parameters.written_files import write_files
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.mounts import mount_names
 from wm_drake.simulation.netcdf import netcdf_bytes
@@ -130,7 +131,7 @@ def save_record(record: Record, path: str | Path) -> None:
     process crashes.
 
     Raises:
-        OSError: the file cannot be written.
+        InputError: the file cannot be written.
 
     Example:
         >>> import tempfile
@@ -142,7 +143,7 @@ def save_record(record: Record, path: str | Path) -> None:
         >>> Path(path).exists()
         True
     """
-    Path(path).write_bytes(netcdf_bytes(record))
+    write_files({Path(path): netcdf_bytes(record)}, replace=True)
 
 
 def load_record(path: str | Path) -> Record:

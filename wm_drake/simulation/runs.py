@@ -7,12 +7,13 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from wm_drake.engines import DEFAULT_ENGINE
 from wm_drake.engines.compiled.packing import pack
 from wm_drake.engines.compiled.run import run_compiled
 from wm_drake.engines.compiled.stepping import choose_stepping
 from wm_drake.engines.drake import run_drake
 from wm_drake.engines.trajectory import Trajectory
-from wm_drake.errors import check_known
+from wm_drake.errors import check_known, input_error
 from wm_drake.model.build import AnyMachine, machine_of
 from wm_drake.model.machine import Machine
 from wm_drake.parameters.machine import Integrator
@@ -27,7 +28,6 @@ Engine: TypeAlias = Callable[..., Trajectory]
 """Arguments: machine at rest, profile, step [s], progress called with the fraction done."""
 
 ENGINES: dict[str, Engine] = {"compiled": run_compiled, "drake": run_drake}
-DEFAULT_ENGINE = "compiled"
 
 
 class DivergenceWarning(UserWarning):
@@ -90,6 +90,8 @@ def simulate(
     if isinstance(case, str):
         case = case_of(machine.parameters, case)
     chosen = checked_integrator(machine.parameters, integrator)
+    if integrator is not None and engine != DEFAULT_ENGINE:
+        raise input_error(f"is of the compiled engine, not of '{engine}'", key="integrator")
     if engine == DEFAULT_ENGINE:  # the other one controls its error
         record = _accurate(machine, case, step, chosen, progress)
     else:

@@ -7,6 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from wm_drake.engines import DEFAULT_ENGINE
 from wm_drake.report.progress import progress_bar, progress_bars
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
@@ -34,9 +35,11 @@ class Executor:
 
     Attributes:
         ledger: Finished runs; None for a study without runs.
-        workers: Number of threads; None for the number of cores.
+        workers: Number of threads, or of processes for the Drake engine; None for the number of
+            cores.
         client: Client of a cluster, or None.
         out: Folder of the results, or None.
+        engine: Name of the engine of all runs.
         runs: Number of runs so far.
         steps: Steps and errors of the runs so far.
     """
@@ -45,6 +48,7 @@ class Executor:
     workers: int | None = None
     client: Any = None
     out: Path | None = None
+    engine: str = DEFAULT_ENGINE
     runs: int = 0
     steps: "StepSummary" = field(default_factory=lambda: _no_steps(), repr=False)
     _report: Callable[..., None] | None = field(default=None, repr=False)
@@ -109,7 +113,6 @@ class Executor:
 
         def collect(run: RunResult) -> None:
             assert run.record is not None
-            assert run.accuracy is not None
             self.steps.add(run.case.name, run.accuracy)
             keep(run.number, run.record)
 
@@ -120,6 +123,7 @@ class Executor:
                 measures=("extremes",),
                 histories=True,
                 workers=self.workers,
+                engine=self.engine,
                 progress=report,
                 finished=collect,
             )
@@ -177,7 +181,8 @@ class Executor:
         run: Callable[..., xr.Dataset] = partial(simulate_remembered, workers=self.workers)
         if self.client is not None:
             run = partial(simulate_on_cluster, client=self.client)
-        table = run(machine, cases, self.ledger, measures=measures, progress=report)
+        how: dict[str, Any] = {"measures": measures, "engine": self.engine, "progress": report}
+        table = run(machine, cases, self.ledger, **how)
         self.runs += table.sizes["run"]
         accuracies = zip(*(table[name].values for name in Accuracy._fields), strict=True)
         for name, accuracy in zip(table.case.values.tolist(), accuracies, strict=True):

@@ -19,7 +19,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from wm_drake.errors import InputError, input_error, reason_of
+from wm_drake.errors import input_error, reason_of
+from wm_drake.parameters.written_files import try_folder, unwritable
 from wm_drake.report.provenance import command_line, now, source_revision, version
 
 RUN_FILE = "run.json"
@@ -113,10 +114,10 @@ def check_is_folder(out: Path) -> None:
         raise input_error(reason_of(error), where=str(out)) from None
     if is_other:
         raise input_error("this path is a file, but a folder is needed", where=str(out))
-    nearest = next(path for path in (out, *out.absolute().parents) if path.exists())
-    code = errno.EACCES if nearest.is_dir() else errno.ENOTDIR
-    if code == errno.ENOTDIR or not os.access(nearest, os.W_OK):
-        raise _unwritable(out, OSError(code, os.strerror(code)))
+    try:
+        try_folder(out)
+    except OSError as error:
+        raise unwritable(out, error) from None
 
 
 def check_folders(out: Path, run: CommandRun) -> None:
@@ -136,7 +137,7 @@ def prepare_folder(out: Path, run: CommandRun) -> None:
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise _unwritable(out, error) from None
+        raise unwritable(out, error) from None
 
 
 @contextmanager
@@ -190,7 +191,7 @@ def one_folder(out: Path, run: CommandRun, kept: str = "") -> Iterator[Path]:
         _remove_leftovers(out, place)
         partial, lock = _locked_folder(out, place)
     except OSError as error:
-        raise _unwritable(out, error, kept) from None
+        raise unwritable(out, error, kept) from None
     try:
         yield partial
         check_folder(out, run)  # another run may have ended in the meantime
@@ -198,7 +199,7 @@ def one_folder(out: Path, run: CommandRun, kept: str = "") -> Iterator[Path]:
     except OSError as error:
         if error.errno not in _NOT_WRITTEN:
             raise
-        raise _unwritable(out, error, kept) from None
+        raise unwritable(out, error, kept) from None
     finally:
         shutil.rmtree(partial, ignore_errors=True)
         os.close(lock)
@@ -256,7 +257,7 @@ def _earlier_run(out: Path) -> dict[str, Any] | None:
         files = content["files"]
         plain = all(Path(name).name == name for name in files)
     except OSError as error:
-        raise _unwritable(out, error) from None
+        raise unwritable(out, error) from None
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         content = None
     if content is None or not plain or not all(isinstance(text, str) for text in texts):
@@ -277,7 +278,7 @@ def _check_has_no_other_files(out: Path, run: CommandRun) -> None:
     try:
         names = sorted(path.name for path in out.iterdir()) if out.is_dir() else []
     except OSError as error:
-        raise _unwritable(out, error) from None
+        raise unwritable(out, error) from None
     allowed = (".", LEDGER) if run.identity else (".",)
     others = [name for name in names if not name.startswith(allowed)]
     if others:
@@ -287,11 +288,6 @@ def _check_has_no_other_files(out: Path, run: CommandRun) -> None:
             "--out",
             where=str(out),
         )
-
-
-def _unwritable(out: Path, error: OSError, kept: str = "") -> InputError:
-    reason = "; ".join(filter(None, [f"cannot be written to: {reason_of(error)}", kept]))
-    return input_error(reason, where=str(out))
 
 
 def _locked_folder(out: Path, place: Path) -> tuple[Path, int]:

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import ValidationError
 
-from wm_drake.errors import InputError, InputNotice, Problem, input_error
+from wm_drake.engines import DEFAULT_ENGINE
+from wm_drake.errors import InputError, InputNotice, Problem, check_known, input_error
 from wm_drake.report.provenance import command_line
 from wm_drake.report.terminal import QUIET, say
 from wm_drake.studies.executor import Executor
@@ -34,6 +35,7 @@ from wm_drake.studies.result_folder import (
     result_folder,
 )
 from wm_drake.studies.study import (
+    ENGINE,
     PAGE,
     STUDIES,
     Facts,
@@ -90,6 +92,7 @@ class ClusterOptions(LedgerOptions):
     cluster: str | None = option(
         None, "Run on a dask.distributed cluster with the scheduler at this address.", "ADDRESS"
     )
+    engine: str = ENGINE
 
 
 class StudyInterrupted(KeyboardInterrupt):
@@ -210,6 +213,7 @@ def _executed(order: Order) -> tuple[Result, Facts, tuple[str, ...]]:
     machine = machines[0] if len(machines) == 1 else None
     given = getattr(options, "profile", None)
     profile = given if isinstance(given, Path) else None
+    engine = _engine(order.run)
     about_machines = _warnings(machines, partial(machine_warnings, profile=profile))
     for text in about_machines:
         say(f"warning: {text}", err=True)
@@ -217,7 +221,7 @@ def _executed(order: Order) -> tuple[Result, Facts, tuple[str, ...]]:
     run = CommandRun(
         study.folder_owner,
         order.run.overwrite,
-        _identity(study, machine, task.identity) if study.has_runs and machine else {},
+        _identity(order, machine, task.identity) if study.has_runs and machine else {},
         order.command,
         options.model_dump(mode="json"),
     )
@@ -232,7 +236,7 @@ def _executed(order: Order) -> tuple[Result, Facts, tuple[str, ...]]:
         wall_s = time.perf_counter() - begin
         warned = (*about_machines, *_warnings(machines, friction_warnings), *not_converged)
         steps = executor.steps.text
-        facts = Facts(order.command, wall_s, warned, step, integrator, steps, executor.runs)
+        facts = Facts(order.command, wall_s, warned, step, integrator, steps, executor.runs, engine)
         files = _written(result, facts, order.run.out, run)
     return result, facts, files
 
@@ -254,6 +258,17 @@ def _machine_of(order: Order, name: str) -> "Machine":
             for p in error.problems
         ) from None
     return build_checked(name, parameters)
+
+
+def _engine(options: RunOptions) -> str:
+    """Return the engine of the runs that the driver has for a study, after checking it."""
+    if not isinstance(options, ClusterOptions):
+        return DEFAULT_ENGINE if isinstance(options, LedgerOptions) else ""
+    from wm_drake.simulation.runs import ENGINES
+
+    engine = options.engine
+    check_known(engine, ENGINES, f"unknown engine '{engine}'", where="--engine")
+    return engine
 
 
 def _warnings(
@@ -296,13 +311,14 @@ def machine_text(parameters: "MachineParameters") -> str:
     return f"{parameters.name} {key_of(numbers=numbers)[:8]}"
 
 
-def _identity(study: Study, machine: "Machine", parts: Mapping[str, Any]) -> dict[str, str]:
+def _identity(order: Order, machine: "Machine", parts: Mapping[str, Any]) -> dict[str, str]:
     """Return the properties that distinguish a study from others, for its ledger."""
     from wm_drake.batch import sources_version
     from wm_drake.batch.ledger import key_of
 
     return {
-        "study": study.name,
+        "study": order.study.name,
+        "engine": _engine(order.run),
         "machine": machine_text(machine.parameters),
         **{
             name: part if isinstance(part, str) else key_of(part=part)[:8]
@@ -352,7 +368,7 @@ def _executor(order: Order, run: CommandRun) -> Iterator[Executor]:
                 client = stack.enter_context(cluster_client(chosen.cluster))
             ledger = stack.enter_context(_ledger(chosen, run))
             try:
-                yield Executor(ledger, chosen.workers, client, chosen.out)
+                yield Executor(ledger, chosen.workers, client, chosen.out, _engine(chosen))
             finally:
                 if chosen.out is not None and len(ledger):
                     kept = (

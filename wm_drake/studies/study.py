@@ -35,6 +35,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from wm_drake.engines import DEFAULT_ENGINE
 from wm_drake.errors import check_known
 from wm_drake.registry import Registry
 
@@ -98,6 +99,11 @@ MEASURED: Any = option(
     "Repeatable. Default: those of the machine file, for its own numbers, loads and profile.",
     "CSV",
 )
+ENGINE: Any = option(
+    DEFAULT_ENGINE,
+    "Engine that integrates the motion: compiled, or drake (the reference, seconds a run).",
+    "NAME",
+)
 LIVE: Any = option(
     False, "Let the page run the machine too: folded, with sliders, without a server."
 )
@@ -116,10 +122,11 @@ class Facts:
         command: Command line or Python call.
         wall_s: Duration. [s]
         warnings: Warnings of the machine, without those of the result.
-        step: Largest step of the compiled engine, as the machine has it; runs may take shorter
-            ones. 0 without a machine, or with several. [s]
+        step: Largest step, as the machine has it; runs may take shorter ones. 0 without a machine,
+            or with several. [s]
         integrator: Integrator of the compiled engine, as the machine has it.
         steps: Steps that the runs took and the error that remains; "" without runs.
+        engine: Name of the engine; "" without runs.
         runs: Number of runs.
     """
 
@@ -130,6 +137,7 @@ class Facts:
     integrator: str = ""
     steps: str = ""
     runs: int = 0
+    engine: str = ""
 
     def rows(self) -> list[tuple[str, str]]:
         """Return the facts as pairs of word and text, for the end of a page."""
@@ -138,7 +146,9 @@ class Facts:
         from wm_drake.simulation.records import versions
 
         step = f"{STEP.text(self.step)}, integrator {self.integrator}"
+        step = step if self.engine in ("", DEFAULT_ENGINE) else STEP.text(self.step)
         return [
+            *([("Engine", self.engine)] if self.engine else []),
             *([("Largest step", step)] if self.step else []),
             *([("Steps taken", self.steps)] if self.steps else []),
             ("Versions", ", ".join(f"{name} {text}" for name, text in versions().items())),

@@ -7,6 +7,7 @@ starts finds the studies of earlier ones there.
 import html
 import json
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -16,9 +17,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from wm_drake.errors import input_error, reason_of
+from wm_drake.errors import WmDrakeError, input_error
 from wm_drake.live.machine import OpenMachine
 from wm_drake.live.state import PageState
+from wm_drake.parameters.written_files import unwritable, write_files
 from wm_drake.report.provenance import now
 from wm_drake.studies.study import STUDIES
 from wm_drake.studio.forms import arguments
@@ -70,19 +72,18 @@ class Jobs:
             raise input_error(f"{MOST_WAITING} studies wait already; cancel one", key=study)
         parameters = chosen(machine, state)
         base = machines.name_or_path(state.machine)
+        identifier = self._new_folder(study)
+        folder = self.folder / identifier
         try:
-            identifier = self._new_folder(study)
-            folder = self.folder / identifier
             write_machine(folder / "machine.yaml", base, parameters, machine)
             given = ["machine.yaml"] if _takes_machine(study) else ["--machine", "machine.yaml"]
             command = ["study", study, *given, "--out", "results", *words]
             about = {"study": study, "command": command, "started": now(), "machine": state.machine}
-            (folder / "job.json").write_text(json.dumps(about, indent=1) + "\n", encoding="utf-8")
+            write_files({folder / "job.json": json.dumps(about, indent=1) + "\n"}, replace=False)
             self._enqueue(identifier, command)
-        except OSError as error:
-            raise input_error(
-                f"cannot be written to: {reason_of(error)}", where=str(self.folder)
-            ) from None
+        except WmDrakeError:
+            shutil.rmtree(folder, ignore_errors=True)
+            raise
         return identifier
 
     def resume(self, identifier: str) -> None:
@@ -173,8 +174,12 @@ class Jobs:
             number = 1
             while (self.folder / f"{study}-{number}").exists():
                 number += 1
-            (self.folder / f"{study}-{number}").mkdir(parents=True)
-            return f"{study}-{number}"
+            folder = self.folder / f"{study}-{number}"
+            try:
+                folder.mkdir(parents=True)
+            except OSError as error:
+                raise unwritable(self.folder, error) from None
+            return folder.name
 
     def _enqueue(self, identifier: str, command: Sequence[str]) -> None:
         """Let a study wait for its turn, which may come at once."""
@@ -191,15 +196,18 @@ class Jobs:
 
     def _launch(self, identifier: str, command: Sequence[str]) -> None:
         folder = self.folder / identifier
-        with (folder / "output.txt").open("wb") as output:
-            process = self._running[identifier] = subprocess.Popen(
-                [sys.executable, "-m", "wm_drake", *command],
-                cwd=folder,
-                stdin=subprocess.DEVNULL,
-                stdout=output,
-                stderr=subprocess.STDOUT,
-                start_new_session=True,  # Ctrl-C at the server reaches a study through `end` only
-            )
+        try:
+            with (folder / "output.txt").open("wb") as output:
+                process = self._running[identifier] = subprocess.Popen(
+                    [sys.executable, "-m", "wm_drake", *command],
+                    cwd=folder,
+                    stdin=subprocess.DEVNULL,
+                    stdout=output,
+                    stderr=subprocess.STDOUT,
+                    start_new_session=True,  # Ctrl-C at the server reaches it through `end` only
+                )
+        except OSError as error:
+            raise unwritable(folder, error) from None
         threading.Thread(target=self._next_after, args=(process,), daemon=True).start()
 
     def _next_after(self, process: "subprocess.Popen[bytes]") -> None:

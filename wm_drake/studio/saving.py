@@ -2,15 +2,15 @@
 
 import os
 import re
-import tempfile
 from pathlib import Path
 from typing import Any
 
-from wm_drake.errors import InputError, input_error, reason_of
+from wm_drake.errors import InputError, input_error
 from wm_drake.live.machine import OpenMachine
 from wm_drake.live.state import DESCRIBED, PageState
 from wm_drake.parameters import MachineParameters, load_machine, machine_path, shipped_machines
 from wm_drake.parameters.files import extended_files, machine_changes, yaml_text
+from wm_drake.parameters.written_files import unwritable, write_files
 from wm_drake.report.provenance import now
 from wm_drake.studio.machines import Machines
 
@@ -90,16 +90,13 @@ def write_machine(
     tree |= machine_changes(machine.parameters, parameters)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(prefix=".", suffix=".yaml", dir=path.parent)
-        try:
-            with os.fdopen(handle, "w", encoding="utf-8") as file:
-                file.write(yaml_text(tree))
-            _check_same(load_machine(temporary), parameters)
-            Path(temporary).replace(path)
-        finally:
-            Path(temporary).unlink(missing_ok=True)
     except OSError as error:
-        raise input_error(f"cannot be written to: {reason_of(error)}", where=str(path)) from None
+        raise unwritable(path, error) from None
+    write_files(
+        {path: yaml_text(tree)},
+        replace=True,
+        check=lambda part: _check_same(load_machine(part), parameters),
+    )
 
 
 def _check_same(read: MachineParameters, expected: MachineParameters) -> None:

@@ -20,17 +20,15 @@ from wm_drake.studies.fitting.methods import identify
 from wm_drake.studies.fitting.problem import Measurement, Unknown
 from wm_drake.studies.fitting.search import Search, descended
 from wm_drake.studies.gasket_damping.study import (
-    LOWER,
     NOISE,
-    SCREENED,
     STARTS,
     UPPER,
     DistanceProblem,
     as_measured,
-    damping_problem,
+    damping_numbers,
+    envelope_model,
     grid_of_paper,
     run_up_of,
-    with_damping,
 )
 
 TRUTH = np.array([28.7, 4.98])  # N s/m, N m s/rad
@@ -59,7 +57,7 @@ def records(fast):
         shorten(patch)
         profile = run_up_of(fast)
     assert profile.duration == 23.0
-    planted = with_damping(fast, TRUTH)
+    planted = damping_numbers(fast).parameters_at(TRUTH)
     machine = build_machine(planted)
     return {
         load: simulate(machine, Case(load, planted.loads[load], profile)).displacement
@@ -72,7 +70,7 @@ def short_problem(fast, monkeypatch):
     """Return the function that returns the problem of records in the short window."""
     shorten(monkeypatch)
     machine = build_machine(fast)
-    return lambda measured: damping_problem(machine, measured)
+    return lambda measured: envelope_model(machine, measured).problem()
 
 
 @pytest.fixture
@@ -92,7 +90,7 @@ def test_distance_is_the_sum_over_the_loads_of_norms_over_both_envelopes():
     problem = DistanceProblem(
         (Unknown("a", -1.0, 1.0),),
         tuple(Measurement(name, np.array(values)) for name, values in {
-            "one X": [3.0, 0.0], "one Y": [0.0, 4.0], "two X": [1.0, 0.0]}.items()),
+            "one, X": [3.0, 0.0], "one, Y": [0.0, 4.0], "two, X": [1.0, 0.0]}.items()),
         lambda points: np.zeros((len(points), 6)),
     )  # fmt: skip
     here = np.zeros((1, 1))
@@ -114,7 +112,7 @@ def test_distance_is_zero_at_the_true_damping_and_grows_away_from_it(distance):
 
 
 def test_value_does_not_depend_on_the_other_points(distance):
-    points = [LOWER, UPPER, TRUTH + 1.0]
+    points = [0.0 * UPPER, UPPER, TRUTH + 1.0]
     assert distance(points)[2] == pytest.approx(distance([points[2]])[0], rel=1e-9)
 
 
@@ -129,7 +127,7 @@ def with_noise(records, seed):
 def test_fit_and_grids_find_the_true_damping(short_problem, records):
     """Repeat with one pair, one load and the resonances only."""
     problem = short_problem(with_noise({"counter": records["counter"]}, 1))
-    fit = identify(problem, starts=STARTS, screened=SCREENED)
+    fit = identify(problem, starts=STARTS, screened=8)
     assert fit.values == pytest.approx(TRUTH, rel=0.02)
     for estimate, true in zip(fit.estimates, TRUTH, strict=True):
         assert estimate.lower < true < estimate.upper
@@ -213,8 +211,8 @@ def test_command_recovers_its_virtual_experiment_and_names_it_so(wm_drake):
 
 @pytest.mark.slow
 def test_damping_is_found_from_record_files(wm_drake, reference, machine):
-    planted = with_damping(
-        reference, np.array([28.7, np.rad2deg(0.087)])
+    planted = damping_numbers(reference).parameters_at(
+        np.array([28.7, np.rad2deg(0.087)])
     )  # N s/m, N m s/rad: 0.0287 N s/mm, 87 N mm s/deg
     records = {load: run_of(machine, planted, load) for load in ("middle", "counter")}
     records["middle"].to_netcdf("middle.nc")

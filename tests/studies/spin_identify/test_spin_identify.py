@@ -1,6 +1,7 @@
 """Identification from vibrations of the whole machine: known and undetermined numbers, command."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,15 +20,13 @@ from wm_drake.parameters.unbalance_cases import load_unbalance_cases
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.recorded_signal import recorded_signal
 from wm_drake.simulation.runs import simulate
+from wm_drake.studies.calibrate.blocks import calibrated
+from wm_drake.studies.calibrate.fit_page import FitWords, summary, warnings_of
 from wm_drake.studies.fitting.sought import at_point, sought_of
-from wm_drake.studies.spin_cycle.study import labels_of
-from wm_drake.studies.spin_identify.page import warnings_of
 from wm_drake.studies.spin_identify.study import (
-    SpinModel,
-    identified_machine,
-    identify_from_spin,
     planted_values,
-    virtual_experiment,
+    spin_model,
+    with_virtual_experiment,
 )
 
 PROFILE = SpinProfile(
@@ -59,7 +58,6 @@ def reference(tmp_path_factory):
 def model_of(reference, seen):
     """Return a model with a known answer: the last number changes the displacements only if `seen`."""
     sought = tuple(sought_of(reference, keys) for keys in KEYS)
-    labels = labels_of(reference, CASES, PROFILE)
     waves = np.sin(np.arange(3 * 2 * 5 * 9).reshape(3, 2, 5, 3, 3) ** 1.3)
 
     def regions(cases):
@@ -74,43 +72,42 @@ def model_of(reference, seen):
             )
             here = waves[:, number % len(CASES)]
             rows.append(2.0 + sum(here[k] * value**0.5 for k, value in enumerate(numbers)))
-        return xr.Dataset(
-            {
-                "region_displacement": (
-                    ("run", "region", "accelerometer", "axis"),
-                    1e-3 * np.abs(rows),
-                )
-            }
-        )
+        dims = ("run", "region", "accelerometer", "axis")
+        return xr.Dataset({"region_displacement": (dims, 1e-3 * np.abs(rows))})
 
-    assert list(labels) == ["case", "region", "accelerometer", "axis"]
-    return SpinModel(made_up(regions), reference, PROFILE, CASES, sought)
+    return spin_model(made_up(regions, reference), sought, PROFILE, CASES)
+
+
+def planted_in(model, seed, noise=0.0):
+    """Return planted values, and the model of their virtual experiment."""
+    planted = planted_values(model.free.sought, seed)
+    return planted, with_virtual_experiment(model, planted, noise, seed)
+
+
+def summary_of(model, fit, data):
+    """Return what the page says first, and its warnings."""
+    words = FitWords("", "", "cases", "displacements", "", "")
+    return summary(model, fit, data, words), warnings_of(model, fit, data)
 
 
 def test_true_numbers_are_recovered_and_differ_from_the_machines(reference):
-    model = model_of(reference, seen=True)
-    planted = planted_values(model.sought, seed=3)
-    starts = np.array([sought.unknown.start for sought in model.sought])
+    planted, model = planted_in(model_of(reference, seen=True), seed=3)
+    starts = np.array([unknown.start for unknown in model.unknowns])
     assert np.abs(planted / starts - 1.0).min() > 0.03
-    measured = virtual_experiment(model, planted, noise=0.0, seed=3)
-    fit, found = identify_from_spin(model, measured, planted=planted)
+    fit, found = calibrated(model, 0, starts=1)
     np.testing.assert_allclose(fit.values, planted, rtol=1e-4)
-    assert found.is_identified.all()
-    after, before = (float(abs(found[n] / measured - 1.0).max()) for n in ("after", "before"))
-    assert after < 1e-5 < before
+    assert all(estimate.determined for estimate in fit.estimates)
+    missed = model.missed(found)
+    assert missed["after"] < 1e-5 < missed["before"]
 
 
 def test_numbers_that_the_data_do_not_determine_are_named(reference):
-    model = model_of(reference, seen=False)
-    planted = planted_values(model.sought, seed=4)
-    fit, found = identify_from_spin(
-        model, virtual_experiment(model, planted, noise=1e-3, seed=4), planted=planted
-    )
-    assert found.is_identified.values.tolist() == [True, True, False]
-    assert np.abs(found.error[:2]).max() < 0.02
-    assert found.half_width[2] == np.inf
+    planted, model = planted_in(model_of(reference, seen=False), seed=4, noise=1e-3)
+    fit, _ = calibrated(model, 0, starts=1)
+    assert [estimate.determined for estimate in fit.estimates] == [True, True, False]
+    assert np.abs(fit.values / planted - 1.0)[:2].max() < 0.02
     assert any("gasket.damping_x" in direction.names for direction in fit.undetermined)
-    machine = identified_machine(model, fit, is_virtual=True)
+    machine = model.free.solved(fit, "virtual experiment: identified")
     assert machine.name == "reference_identified"
     assert machine.gasket.stiffness_x == fit["gasket.stiffness_x"].value
     assert machine.gasket.damping_x == reference.gasket.damping_x
@@ -120,28 +117,25 @@ def test_numbers_that_the_data_do_not_determine_are_named(reference):
 
 def test_verdict_is_that_of_the_displacements_not_of_the_intervals(reference):
     """Fit a model that cannot reproduce the measurement: it still determines its numbers."""
-    model = model_of(reference, seen=True)
-    planted = planted_values(model.sought, seed=3)
-    measured = virtual_experiment(model, planted, noise=0.0, seed=3)
-    good = identify_from_spin(model, measured)
-    assert good[1].average_error_after < 1e-3
-    other = measured * (1.0 + 0.6 * np.sin(7.0 * np.arange(measured.size)).reshape(measured.shape))
-    poor = identify_from_spin(model, other)
-    assert poor[1].average_error_after > 0.15
-    drawn = np.sqrt(np.mean(poor[1].residual.values ** 2))
-    assert drawn == pytest.approx(poor[0].rmse)  # what the search makes small
-    assert not warnings_of(*good)
-    assert any("Poor" in warning for warning in warnings_of(*poor))
+    _, model = planted_in(model_of(reference, seen=True), seed=3)
+    text, warnings = summary_of(model, *calibrated(model, 0, starts=1))
+    assert text.startswith("Good fit to cases")
+    assert not warnings
+    signs = np.sin(7.0 * np.arange(model.measured.size)).reshape(model.measured.shape)
+    other = replace(model, measured=model.measured * (1.0 + 0.6 * signs))
+    fit, data = calibrated(other, 0, starts=1)
+    text, warnings = summary_of(other, fit, data)
+    assert other.missed(data)["after"] > 0.15
+    assert np.sqrt(np.mean(data.misfit.values**2)) == pytest.approx(fit.rmse)
+    assert text.startswith("Poor fit")
+    assert len(warnings) == 1
 
 
-def test_noise_widens_intervals_until_a_number_is_not_identified(reference):
+def test_noise_widens_intervals(reference):
     model = model_of(reference, seen=True)
-    planted = planted_values(model.sought, seed=5)
-    halves = [
-        identify_from_spin(model, virtual_experiment(model, planted, noise, 5))[1].half_width
-        for noise in (1e-3, 1e-2)
-    ]
-    assert (halves[1] > 3.0 * halves[0]).all()
+    fits = [calibrated(planted_in(model, 5, noise)[1], 0, starts=1)[0] for noise in (1e-3, 1e-2)]
+    widths = np.array([[e.upper - e.lower for e in fit.estimates] for fit in fits])
+    assert (widths[1] > 3.0 * widths[0]).all()
 
 
 def test_numbers_that_are_one_unknown_change_together(reference):
@@ -190,24 +184,23 @@ def test_command_recovers_the_true_numbers(identify):
     shown = json.loads(ended.out)
     (numbers,) = shown["numbers"]
     assert numbers["is_virtual_experiment"] is True
-    assert all(
-        entry["is_identified"] and abs(entry["error_percent"]) < 2.0
-        for entry in shown["parameters"]
-    )
+    for entry in shown["estimates"]:
+        assert entry["value"] == pytest.approx(entry["planted"], rel=0.02)
     assert numbers["average_error_after_percent"] < 0.1 < numbers["average_error_before_percent"]
     written = load_machine("out/identified.yaml")
-    table = pd.read_csv("out/parameters.csv").set_index("unknown")
-    assert list(table.index) == ["gasket.stiffness_x", "gasket.stiffness_z", "gasket.stiffness_y"]
-    for key in table.index:
-        value = getattr(written.gasket, key.removeprefix("gasket."))
-        assert table.value[key] == pytest.approx(1e-3 * value, rel=1e-5)
-        assert table.lower_95[key] <= table.value[key] <= table.upper_95[key]
-        assert table.unit[key] == "N/mm"
+    table = pd.read_csv("out/estimates.csv").set_index("unknown")
+    assert list(table.index) == ["gasket.stiffness_x+gasket.stiffness_z", "gasket.stiffness_y"]
+    for name in table.index:
+        for key in name.split("+"):
+            value = getattr(written.gasket, key.removeprefix("gasket."))
+            assert table.value[name] == pytest.approx(1e-3 * value, rel=1e-5)
+        assert table.lower_95[name] <= table.value[name] <= table.upper_95[name]
+        assert table.unit[name] == "N/mm"
     assert written.name == "reference_identified"
     real = identify("--json", "--measured", "out/measured.csv", "--overwrite", *unknowns)
     told = json.loads(real.out)
     assert told["numbers"][0]["is_virtual_experiment"] is False
-    for entry, other in zip(told["parameters"], shown["parameters"], strict=True):
+    for entry, other in zip(told["estimates"], shown["estimates"], strict=True):
         assert "planted" not in entry
         assert entry["value"] == pytest.approx(other["value"], rel=1e-3)
 

@@ -1,6 +1,6 @@
 """Data of recordings for a fit: signals over time, or their amplitudes, with their deviations."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal, TypeAlias
@@ -13,6 +13,7 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.report.quantity import TIME
 from wm_drake.simulation.mount_forces import speed_ranges
 from wm_drake.simulation.records import profile_of
+from wm_drake.studies.calibrate.blocks import Block
 from wm_drake.studies.compare.pairs import Pair
 from wm_drake.studies.compare.signals import (
     band_passed,
@@ -53,43 +54,28 @@ class RecordedLoad:
         return [places.attrs["quantity"].text(value) for value in places.values]
 
 
-@dataclass(frozen=True, eq=False)
-class Block:
-    """Data of one load, or of one recording: values at places (or times) of sensors (m, k). [SI]
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RecordedBlock(Block):
+    """Data of one load, or of one recording.
 
     Attributes:
         load: The load.
         pairs: Recordings whose mean the values are.
-        deviation: Standard deviations of the values.
-        baseline: Columns of each sensor that may be added, offset and drift; None without.
     """
 
     load: RecordedLoad
     pairs: tuple[Pair, ...]
-    places: Sequence[str]
-    measured: FloatArray
-    deviation: FloatArray
-    baseline: FloatArray | None = None
-
-    @cached_property
-    def valid(self) -> np.ndarray:
-        """Which values there are. (m, k)"""
-        return np.isfinite(self.measured) & (self.deviation > 0.0)
 
 
-def block_name(block: Block, by: By) -> str:
-    """Return the name of the load of a block, or of its recording."""
-    return block.pairs[0].recording.path.name if by == "history" else block.load.name
-
-
-def amplitude_block(load: RecordedLoad, by: By) -> Block:
+def amplitude_block(load: RecordedLoad, by: By) -> RecordedBlock:
     """Return the amplitudes of a load, means of its repeats."""
     each = np.stack([reduced(load, pair, pair.measured, by) for pair in load.pairs])
     places = load.places
     if by == "rms":
         run = load.pairs[0].run
         places = [part.name for part in speed_ranges(run, profile_of(run))]
-    return Block(load, load.pairs, places, mean_of(each), deviations_of(each))
+    values = mean_of(each), deviations_of(each)
+    return RecordedBlock(load.name, places, *values, load=load, pairs=load.pairs)
 
 
 def reduced(load: RecordedLoad, pair: Pair, signals: FloatArray, by: By) -> FloatArray:
@@ -137,7 +123,9 @@ def deviations_of(measured: FloatArray) -> FloatArray:
     return np.asarray(np.hypot(scatter, least))
 
 
-def history_block(load: RecordedLoad, pair: Pair, sensors: Mapping[str, RecordedSensor]) -> Block:
+def history_block(
+    load: RecordedLoad, pair: Pair, sensors: Mapping[str, RecordedSensor]
+) -> RecordedBlock:
     """Return the signals of a recording, of which offset and drift may be those of the sensors."""
     time = pair.run.time.values
     baseline = np.column_stack([np.ones(len(time)), time / time[-1] - 0.5])
@@ -147,7 +135,9 @@ def history_block(load: RecordedLoad, pair: Pair, sensors: Mapping[str, Recorded
     ]
     places = list(map(TIME.text, time))
     deviation = np.broadcast_to(deviations, pair.measured.shape)
-    return Block(load, (pair,), places, pair.measured, deviation, baseline)
+    values = pair.measured, deviation, baseline
+    name = pair.recording.path.name
+    return RecordedBlock(name, places, *values, load=load, pairs=(pair,))
 
 
 def noise_of(signal: FloatArray, sensor: RecordedSensor) -> float:

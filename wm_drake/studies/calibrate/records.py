@@ -9,14 +9,13 @@ signals over time the angle of the drum at the start.
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Protocol, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
-import xarray as xr
 from scipy.interpolate import CubicSpline
 
-from wm_drake.errors import InputError, input_error
-from wm_drake.parameters import Load, MachineParameters, SpinProfile
+from wm_drake.errors import InputError
+from wm_drake.parameters import Load, SpinProfile
 from wm_drake.parameters.recorded_sensors import RecordedSensor
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
@@ -24,31 +23,19 @@ from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.recorded_signal import turned_signals
 from wm_drake.simulation.records import Record, profile_of
+from wm_drake.studies.calibrate.blocks import BlockModel
 from wm_drake.studies.calibrate.recorded import (
-    Block,
     By,
+    RecordedBlock,
     RecordedLoad,
     amplitude_block,
-    block_name,
     history_block,
     mean_of,
     reduced,
 )
 from wm_drake.studies.compare.pairs import OFFSET, PHASE, Pair, order_one
 from wm_drake.studies.compare.study import RATE
-from wm_drake.studies.experiment import Experiment
-from wm_drake.studies.fitting.fit import Fit
-from wm_drake.studies.fitting.methods import identify
-from wm_drake.studies.fitting.problem import (
-    SMOOTH,
-    Errors,
-    FitProblem,
-    Measurement,
-    ModelValues,
-    Progress,
-    Unknown,
-)
-from wm_drake.studies.fitting.search import silent
+from wm_drake.studies.fitting.problem import SMOOTH, Errors, Unknown
 
 RECORDED = replace(SMOOTH, cost=1e-5, point=1e-4, gradient=1e-9, most=25)
 """Descent of a fit to records: noise of the amplitudes is larger than these tolerances."""
@@ -79,41 +66,27 @@ KEPT_RUNS, KEPT_COLUMNS = 40, 1500
 """Numbers of runs and of amplitudes of a sensor beyond which none are kept for the next call."""
 
 
-class FreeNumbers(Protocol):
-    """Unknown numbers of a machine: keys with ranges, or the quantities of a free file."""
-
-    @property
-    def unknowns(self) -> tuple[Unknown, ...]:
-        """Return the unknowns."""
-
-    def parameters_at(self, point: FloatArray) -> MachineParameters:
-        """Return the machine at a point. [SI]"""
-
-    def known(self, points: FloatArray) -> FloatArray:
-        """Return the residuals of what else is known at points (k, p). (k, m)"""
-
-    def solved(self, fit: Fit, source: str) -> MachineParameters:
-        """Return the machine with the values of a fit; `source` says where they come from."""
-
-
 @dataclass(frozen=True, eq=False)
-class RecordModel:
+class RecordModel(BlockModel):
     """What sensors record as a function of unknowns of the machine and of the recorder.
 
     Attributes:
-        experiment: Runs of the machine.
-        free: Unknowns of the machine.
-        loads: Loads with their recordings.
         sensors, points: Sensors by name, and their positions in T. [m]
+        loads: Loads with their recordings.
         by: What is fitted.
     """
 
-    experiment: Experiment
-    free: FreeNumbers
-    loads: tuple[RecordedLoad, ...]
     sensors: Mapping[str, RecordedSensor]
+    loads: tuple[RecordedLoad, ...]
     points: Mapping[str, FloatArray]
     by: By
+
+    misfit = MISFIT
+    most_misfit = 2.0
+    """A choice: planted machines with the right structure stay below it, one without its gasket has
+    7."""
+    descent = RECORDED
+
     _runs: dict[RunKey, FloatArray] = field(default_factory=dict, repr=False)
     _columns: dict[ColumnKey, FloatArray] = field(default_factory=dict, repr=False)
 
@@ -157,48 +130,21 @@ class RecordModel:
         return tuple(unknowns)
 
     @cached_property
-    def blocks(self) -> tuple[Block, ...]:
+    def blocks(self) -> tuple[RecordedBlock, ...]:
         """Return the data."""
         if self.by == "history":
             pairs = ((load, pair) for load in self.loads for pair in load.pairs)
             return tuple(history_block(load, pair, self.sensors) for load, pair in pairs)
         return tuple(amplitude_block(load, self.by) for load in self.loads)
 
-    def problem(self) -> FitProblem:
-        """Return the problem of all unknowns: a measurement for each sensor of each block.
+    @property
+    def errors(self) -> Errors:
+        """What the errors are like: those of RMS of regions do not depend on each other."""
+        return "alike" if self.by == "rms" else "correlated"
 
-        Raises:
-            InputError: no sensor has an amplitude.
-        """
-        tests = []
-        for block in self.blocks:
-            name = "" if len(self.blocks) == 1 else f"{block_name(block, self.by)}, "
-            for k, sensor in enumerate(self.sensors):
-                used = block.valid[:, k]
-                if used.any():
-                    values = block.measured[used, k] / block.deviation[used, k]
-                    base = None if block.baseline is None else block.baseline[used]
-                    errors: Errors = "alike" if self.by == "rms" else "correlated"
-                    tests.append(Measurement(f"{name}{sensor}", values, base, errors=errors))
-        if not tests:
-            raise input_error("no sensor has an amplitude to fit; the records are too short")
-        return FitProblem(self.unknowns, tuple(tests), self._values, RECORDED)
-
-    def _values(self, points: FloatArray) -> ModelValues:
-        """Return the computed values of all measurements, in their deviations."""
-        values = np.stack(
-            [
-                np.concatenate(
-                    [
-                        (computed[block.valid[:, k], k] / block.deviation[block.valid[:, k], k])
-                        for block, computed in zip(self.blocks, of_point, strict=True)
-                        for k in range(len(self.sensors))
-                    ]
-                )
-                for of_point in self.computed(points)
-            ]
-        )
-        return ModelValues(values, known=self.free.known(points[:, : len(self.free.unknowns)]))
+    def apart(self, rmse: float) -> str:
+        """Return the RMS of the residuals in words."""
+        return f"or by {MISFIT.number(rmse)} standard deviations"
 
     def computed(self, points: FloatArray) -> list[list[FloatArray]]:
         """Return what is predicted of each block (m, k) at each point; NaN where a run failed."""
@@ -208,7 +154,7 @@ class RecordModel:
                 self._reduce(load, pair, points)
         return [[self._computed(block, point) for block in self.blocks] for point in points]
 
-    def _computed(self, block: Block, point: FloatArray) -> FloatArray:
+    def _computed(self, block: RecordedBlock, point: FloatArray) -> FloatArray:
         runs = [self._runs[self._key(block.load, pair, point)] for pair in block.pairs]
         if any(np.isnan(signals[0]).any() for signals in runs):
             return np.full(block.measured.shape, np.nan)
@@ -310,64 +256,3 @@ def turned_load(load: Load, angle: float) -> Load:
         static=turned(load.static),
         couple=turned(load.couple),
     )
-
-
-def calibrated(
-    model: RecordModel, seed: int, progress: Progress = silent, starts: int = 2
-) -> tuple[Fit, xr.Dataset]:
-    """Fit the unknowns of a model to its recordings.
-
-    Args:
-        progress: Called with the fraction done and the least misfit so far.
-        starts: Number of searches.
-
-    Returns:
-        The fit; and over place and sensor, in SI: `measured`, mean of the repeats, its `deviation`,
-        `before` and `after` the search, and the residual `misfit` after it, in deviations; signals
-        over time without their offset and drift. Over place the name of the load or of the record,
-        `block`. Over sensor: `error_before` and `error_after`, RMS of the difference by that of the
-        measured values.
-
-    Raises:
-        InputError: no sensor has an amplitude.
-    """
-    problem = model.problem()
-    fit = identify(problem, seed=seed, starts=starts, screened=8, progress=progress)
-    start = problem.points_at(problem.start)
-    before, after = model.computed(np.stack([start, fit.values]))
-    parts = [
-        _compared(block, block_name(block, model.by), *pair)
-        for block, *pair in zip(model.blocks, before, after, strict=True)
-    ]
-    data = xr.concat(parts, "place").assign_coords(sensor=list(model.sensors))
-    for name in ("before", "after"):
-        missed = np.sqrt(((data[name] - data.measured) ** 2).sum("place"))
-        size = np.sqrt((data.measured.where(data[name].notnull()) ** 2).sum("place"))
-        data[f"error_{name}"] = missed / size.where(size > 0.0)
-    data["misfit"] = MISFIT.variable(
-        ("place", "sensor"), (data.after - data.measured) / data.deviation
-    )
-    return fit, data
-
-
-def _compared(block: Block, name: str, before: FloatArray, after: FloatArray) -> xr.Dataset:
-    """Return measured and computed values of a block over place and sensor."""
-    masked = np.where(block.valid, 1.0, np.nan)
-    values = {"measured": block.measured, "before": before, "after": after}
-    kept = {key: _without_baseline(block, values_ * masked) for key, values_ in values.items()}
-    kept["deviation"] = block.deviation * masked
-    places = {"place": list(block.places), "block": ("place", [name] * len(block.places))}
-    return xr.Dataset({key: (("place", "sensor"), v) for key, v in kept.items()}, places)
-
-
-def _without_baseline(block: Block, values: FloatArray) -> FloatArray:
-    """Return values (m, k) less their offset and drift, if a block has a baseline."""
-    if block.baseline is None:
-        return values
-    result = values.copy()
-    for k in range(values.shape[1]):
-        used = np.isfinite(values[:, k])
-        base = block.baseline[used]
-        amount = np.linalg.lstsq(base, values[used, k], rcond=None)[0] if used.any() else 0.0
-        result[used, k] -= base @ amount if used.any() else 0.0
-    return result

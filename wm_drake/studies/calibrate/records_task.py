@@ -11,12 +11,14 @@ from wm_drake.parameters import located
 from wm_drake.parameters.free import load_free
 from wm_drake.simulation.cases import load_of
 from wm_drake.studies.answer import Answer
+from wm_drake.studies.calibrate.blocks import FreeNumbers, calibrated
+from wm_drake.studies.calibrate.fit_page import FitWords, compared, fit_answer
 from wm_drake.studies.calibrate.options import CalibrateOptions
 from wm_drake.studies.calibrate.parameter_map import parameter_map_of
 from wm_drake.studies.calibrate.recorded import RecordedLoad, without_edges
-from wm_drake.studies.calibrate.records import FreeNumbers, RecordModel, calibrated
-from wm_drake.studies.calibrate.records_page import records_answer
+from wm_drake.studies.calibrate.records import RecordModel
 from wm_drake.studies.calibrate.solutions import FreeQuantities
+from wm_drake.studies.compare.pairs import QUANTITIES
 from wm_drake.studies.compare.task import CompareTask
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.experiment import Experiment, record_here
@@ -26,6 +28,16 @@ from wm_drake.studies.study import Task
 
 OF_TARGETS = ("targets", "deviation", "weight", "limit", "leave_out")
 """Options that are about targets, not about records."""
+
+
+METHOD = (
+    "The model predicts the signals as they were recorded. Unknowns of the fit beside those of the "
+    "machine are what is not known of the recorder: gain and tilt of each sensor, offset and rate "
+    "of each clock, and, if signals over time are fitted, the angle of the drum at the start. Each "
+    "has a prior: expected value and standard deviation. Of signals over time, offset and drift "
+    "are taken out. Two seconds at both ends of a record are left out. Confidence intervals take "
+    "the correlation of neighbouring residuals into account."
+)
 
 
 class CalibrateRecordsTask(Task):
@@ -86,7 +98,23 @@ def fitted_answer(
     """
     with executor.fraction("search") as report:
         fit, data = calibrated(model, seed, lambda fraction, least: report(fraction))
-    return records_answer(model, fit, data, *words)
+    files = ", ".join(pair.recording.path.name for pair in model.pairs)
+    loads, count = ", ".join(load.name for load in model.loads), len(model.pairs)
+    fitted = "signals" if model.by == "history" else "amplitudes"
+    texts = FitWords(
+        *words,
+        data="1 record" if count == 1 else f"{count} records",
+        fitted=fitted,
+        source=f"calibrated to {files}",
+        method=METHOD,
+        facts=(("Records", files), ("Load", loads), ("Fitted", model.by)),
+    )
+    parts = []
+    for quantity in QUANTITIES.values():
+        names = [n for n, sensor in model.sensors.items() if sensor.quantity == quantity.words]
+        if names:
+            parts.append(compared(data.sel(sensor=names), quantity, fitted))
+    return fit_answer(model, fit, data, texts, parts)
 
 
 def records_here(machine: Machine, executor: Executor) -> Experiment:
@@ -124,7 +152,7 @@ def record_model(
                 f"{', '.join(test.sensors)}, those of load {tests[0].case.name} {', '.join(names)}",
                 where="RECORD",
             )
-    return RecordModel(experiment, free, tuple(loads), tests[0].sensors, tests[0].points, by)
+    return RecordModel(experiment, free, tests[0].sensors, tuple(loads), tests[0].points, by)
 
 
 def _by_load(options: CalibrateOptions) -> dict[str | None, tuple[Path, ...]]:

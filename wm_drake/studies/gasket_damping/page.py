@@ -6,102 +6,100 @@ import numpy as np
 import xarray as xr
 from scipy.interpolate import griddata
 
-from wm_drake.parameters import MachineParameters
+from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import Share
 from wm_drake.report import figure as fig
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import TIME, Quantity, quantity_of, shown, text_of
+from wm_drake.report.quantity import Quantity, quantity_of, shown, text_of
 from wm_drake.simulation.displacements import envelopes, percent_difference
+from wm_drake.simulation.runs import simulate
 from wm_drake.studies.answer import Answer, Part, Plot
+from wm_drake.studies.calibrate.fit_page import FitWords, compared, fit_answer
 from wm_drake.studies.fitting.fit import Fit
-from wm_drake.studies.fitting.page import fit_parts
 from wm_drake.studies.gasket_damping.study import (
-    APART,
     DAMPING,
     ENVELOPE,
     NOISE,
-    PERCENT,
     UNKNOWNS,
     WINDOW,
-    Comparison,
+    EnvelopeModel,
 )
+
+PERCENT = Quantity("", Share(), 1)
 
 SHOWN_CELLS = 60
 """Number of columns and of rows of the coloured map of distances."""
 
-SHOWN_SAMPLES = 10
-"""Every so many samples of an envelope are drawn."""
+METHOD = (
+    "The residuals are differences of smooth envelopes (magnitude of the analytic signal) at all "
+    f"sensors, every 5 ms from {WINDOW[0]:g} to {WINDOW[1]:g} s. Samples of one curve depend on "
+    "each other, which widens the intervals. An error that all curves share, such as a wrong "
+    "stiffness of a spring, is not in them."
+)
 
 
 def gasket_damping_answer(
-    parameters: MachineParameters, fit: Fit, comparison: Comparison, grids: xr.Dataset | None
+    model: EnvelopeModel,
+    fit: Fit,
+    data: xr.Dataset,
+    truth: FloatArray | None,
+    grids: xr.Dataset | None,
 ) -> Answer:
     """Return the answer of the study.
 
     Args:
-        parameters: Machine before the search.
+        fit, data: As of `calibrated` in `wm_drake.studies.calibrate.blocks`.
+        truth: True damping of a virtual experiment; None for a measurement. [N s/m, N m s/rad]
         grids: As of `grid_of_paper`; None if its search was not made.
     """
-    truth = comparison.truth
-    planted = None if truth is None else dict(zip(UNKNOWNS, truth.tolist(), strict=True))
-    plots = tuple(envelopes_plot(comparison, load) for load in comparison.measured)
-    amplitudes = LabelledTable(
-        "amplitudes",
-        amplitudes_of(comparison),
-        "Amplitudes at the optimum",
-        "Amplitudes in the time window and their differences, [B] Eq. (1) and Table 2.",
-    )
-    surface = []
+    loads, parameters = list(model.measured), model.experiment.machine.parameters
+    source = "measured records" if truth is None else "virtual experiment"
+    about = f"{source}, load{'s' if len(loads) > 1 else ''} {' and '.join(loads)}"
+    surface: tuple[Part, ...] = ()
     if grids is not None:
         table = LabelledTable("objective", grids)
-        surface = [Part("Distance over both dampings", (surface_plot(grids, fit, truth), table))]
-    return Answer(
-        f"Gasket damping of machine {parameters.name}",
-        " ".join([summary(fit, comparison), *([] if grids is None else [about_grids(grids)])]),
-        parameters,
-        (
-            Part("Envelopes at the optimum", plots),
-            *surface,
-            *fit_parts(fit, APART, planted),
-            Part("Amplitudes at the optimum", (amplitudes,)),
+        shown = surface_plot(grids, fit, truth), table
+        surface = (Part("Distance over both dampings", shown, about_grids(grids)),)
+    words = FitWords(
+        title=f"Gasket damping of machine {parameters.name}",
+        file="identified",
+        data=f"the {about}",
+        fitted="envelopes",
+        source=f"fitted to envelopes of the {about}",
+        method=METHOD,
+        facts=(("Data", about),),
+    )
+    planted = None if truth is None else dict(zip(UNKNOWNS, truth.tolist(), strict=True))
+    warned = () if truth is None else (about_virtual_experiment(truth),)
+    parts = (
+        compared(data, ENVELOPE, "envelopes", is_scattered=False),
+        *surface,
+        amplitudes_part(model, fit),
+    )
+    return fit_answer(model, fit, data, words, parts, planted, warned)
+
+
+def amplitudes_part(model: EnvelopeModel, fit: Fit) -> Part:
+    """Return the largest envelopes in the window: computed, measured and their difference."""
+    machine, dims = model.experiment.machine, ("load", "sensor")
+    ours, measured = (
+        xr.concat(map(_largest, displacements), xr.Variable("load", list(model.measured)))
+        for displacements in (
+            [simulate(machine, case).displacement for case in model.cases_at(fit.values)],
+            model.measured.values(),
+        )
+    )
+    columns = {
+        "computed": ENVELOPE.named("computed").variable(dims, ours.transpose(*dims)),
+        "measured": ENVELOPE.named("measured").variable(dims, measured.transpose(*dims)),
+        "difference": PERCENT.named("difference").variable(
+            dims, 0.01 * percent_difference(ours, measured).transpose(*dims)
         ),
-        (("Data", _about_data(comparison)),),
-        "The residuals are differences of smooth envelopes (magnitude of the analytic signal) at "
-        f"all sensors, every 5 ms from {WINDOW[0]:g} to {WINDOW[1]:g} s. Samples of one curve "
-        "depend on each other, which widens the intervals. An error that all curves share, such "
-        "as a wrong stiffness of a spring, is not in them.",
-        warned=() if truth is None else (about_virtual_experiment(truth),),
-    )
-
-
-def _about_data(comparison: Comparison) -> str:
-    loads = list(comparison.measured)
-    return f"{comparison.source}, load{'s' if len(loads) > 1 else ''} {' and '.join(loads)}"
-
-
-def summary(fit: Fit, comparison: Comparison) -> str:
-    """Return the damping with its intervals, and how far it is from planted values."""
-    text = (
-        f"The computed envelopes agree best with the {_about_data(comparison)}, at "
-        f"{damping_text(fit.values)}; RMSE {APART.text(fit.rmse)}. "
-    )
-    intervals = [
-        f"{DAMPING[e.name].number(e.lower)} to {DAMPING[e.name].text(e.upper)} for {e.name}"
-        for e in fit.estimates
-        if np.isfinite(e.lower)
-    ]
-    if intervals:
-        text += f"95 % intervals: {' and '.join(intervals)}."
-    if comparison.truth is None:
-        return text
-    errors = [
-        PERCENT.text((value - true) / true)
-        for value, true in zip(fit.values, comparison.truth, strict=True)
-        if true
-    ]
-    return (
-        f"{text} The planted values are {damping_text(comparison.truth)}; the fit differs from "
-        f"them by {' and '.join(errors)}."
-    )
+    }
+    data = xr.Dataset(columns, {"load": ours["load"].values, "sensor": ours.sensor.values})
+    title = "Amplitudes at the optimum"
+    caption = "Amplitudes in the time window and their differences, [B] Eq. (1) and Table 2."
+    return Part(title, (LabelledTable("amplitudes", data, title, caption),))
 
 
 def about_grids(grids: xr.Dataset) -> str:
@@ -130,64 +128,9 @@ def damping_text(damping: np.ndarray) -> str:
     return " and ".join(texts)
 
 
-def amplitudes_of(comparison: Comparison) -> xr.Dataset:
-    """Return the largest envelopes in the window: computed, measured and their difference."""
-    loads = list(comparison.measured)
-    pairs = [(comparison.computed[load], comparison.measured[load]) for load in loads]
-    ours, measured = (
-        xr.concat([_largest(pair[side]) for pair in pairs], xr.Variable("load", loads))
-        for side in (0, 1)
-    )
-    amplitude, dims = ENVELOPE.named("computed"), ("load", "sensor")
-    change = 0.01 * percent_difference(ours, measured)
-    return xr.Dataset(
-        {
-            "computed": amplitude.variable(dims, ours.transpose(*dims)),
-            "measured": amplitude.named(comparison.source).variable(
-                dims, measured.transpose(*dims)
-            ),
-            "difference": PERCENT.named("difference").variable(dims, change.transpose(*dims)),
-        },
-        {"load": loads, "sensor": ours.sensor.values},
-    )
-
-
 def _largest(displacement: xr.DataArray) -> xr.DataArray:
     both = envelopes(xr.Dataset({"displacement": displacement})).sel(time=slice(*WINDOW))
     return np.maximum(abs(both.upper), abs(both.lower)).max("time")
-
-
-def envelopes_plot(comparison: Comparison, load: str) -> Plot:
-    """Return the envelopes computed at the optimum and the measured ones, one panel per sensor."""
-    every = {"time": slice(None, None, SHOWN_SAMPLES)}
-    ours, others = (
-        envelopes(xr.Dataset({"displacement": of[load]})).isel(every)
-        for of in (comparison.computed, comparison.measured)
-    )
-    panels = []
-    for name in ours.sensor.values.tolist():
-        low, high = (ENVELOPE.values(ours[side].sel(sensor=name)) for side in ("lower", "upper"))
-        curves = [
-            fig.Line(
-                others.time.values,
-                ENVELOPE.values(others[side].sel(sensor=name)),
-                color=fig.MEASURED,
-                dash="dashed",
-                key=comparison.source,
-            )
-            for side in ("upper", "lower")
-        ]
-        area = fig.band(ours.time.values, low, high, opacity=0.3)
-        marks = (fig.Rule(0.0, color=fig.QUIET), replace(area, key="computed"), *curves)
-        x, y = fig.Axis(label=TIME.label), fig.Axis(label=ENVELOPE.unit_text)
-        panels.append(fig.Panel(title=name, marks=marks, x=x, y=y))
-    return Plot(
-        fig.Figure(panels=fig.in_grid(panels, 3, share="both"), height=150.0),
-        f"Computed envelopes at the optimum and {comparison.source}, load {load}.",
-        f"Load {load}: envelopes of the filtered displacement at each sensor. Shaded area: "
-        f"computed at the optimum. Dashed lines: {comparison.source}. The envelopes are compared "
-        f"from {WINDOW[0]:g} to {WINDOW[1]:g} s.",
-    )
 
 
 def surface_plot(grids: xr.Dataset, fit: Fit, truth: np.ndarray | None) -> Plot:

@@ -1,7 +1,9 @@
 """Identification of the gasket damping C_L and C_T from measured envelopes, [B] section 3.1.2."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TypeAlias
 
@@ -13,8 +15,10 @@ from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import (
     GASKET_FACTORS,
+    Change,
     MachineParameters,
     SpinProfile,
+    Variation,
     load_factors,
     with_values,
 )
@@ -23,24 +27,26 @@ from wm_drake.parameters.machine import OUTPUT_PERIOD
 from wm_drake.parameters.recorded import ChannelUse, read_recording, resampled
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
-from wm_drake.report.quantity import Quantity
+from wm_drake.parameters.variation import number_at
+from wm_drake.report.quantity import TIME, Quantity
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.displacements import smooth_envelope
 from wm_drake.simulation.records import read_measured
 from wm_drake.simulation.runs import simulate
+from wm_drake.studies.calibrate.blocks import Block, BlockModel
 from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.fitting.grid import grid_search
-from wm_drake.studies.fitting.problem import FAILED, FitProblem, Measurement, Unknown
+from wm_drake.studies.fitting.problem import FAILED, FitProblem, Unknown
+from wm_drake.studies.fitting.sought import Sought, SoughtNumbers
 from wm_drake.studies.inputs import existing_file
 
 UNKNOWNS = ("C_L", "C_T")
 
-LOWER = np.array([0.0, 0.0])
 UPPER = np.array([50.0, 0.2 * 180.0 / np.pi])
 """Upper bounds of [B]: 0.05 N s/mm for C_L and 200 N mm s/deg for C_T. [N s/m, N m s/rad]"""
 
-STARTS, SCREENED = 3, 8
-"""Searches by least squares at most, and points from which all but the first of them start."""
+STARTS = 3
+"""Searches by least squares at most."""
 
 WINDOW = (10.0, 50.0)
 """Time interval that is compared ([B] section 3.1.2). [s]"""
@@ -56,10 +62,6 @@ NOISE = 1e-4
 UNITS = (Unit("N*s/m", "N*s/mm"), Unit("N*m*s/rad", "N*mm*s/deg"))
 """SI units and printed units of C_L and C_T."""
 
-MeasuredDisplacements: TypeAlias = Mapping[str, xr.DataArray]
-"""Displacements (time, sensor), sampled every 5 ms, by load. [m]"""
-
-
 LENGTH = Unit("m", "mm")
 ENVELOPE = Quantity("envelope", LENGTH, 1)
 APART = Quantity("difference of envelopes", LENGTH, 3)
@@ -69,26 +71,9 @@ DAMPING = {
     "C_T": Quantity("C_T", UNITS[1], 1),
 }
 SPACING = Quantity("spacing", Unit("dimensionless", "%"))
-PERCENT = Quantity("", Unit("dimensionless", "%"), 1)
 
-
-@dataclass(frozen=True)
-class Comparison:
-    """Measured displacements and those computed with the fitted damping.
-
-    Attributes:
-        computed: Displacements (time, sensor), by load. [m]
-        truth: True damping of a virtual experiment; None for a measurement. [N s/m, N m s/rad]
-    """
-
-    measured: MeasuredDisplacements
-    computed: MeasuredDisplacements
-    truth: FloatArray | None
-
-    @property
-    def source(self) -> str:
-        """What the measured displacements are."""
-        return "measured records" if self.truth is None else "virtual experiment"
+MeasuredDisplacements: TypeAlias = Mapping[str, xr.DataArray]
+"""Displacements (time, sensor), sampled every 5 ms, by load. [m]"""
 
 
 def read_records(parameters: MachineParameters, entries: Sequence[str]) -> dict[str, xr.DataArray]:
@@ -148,49 +133,70 @@ def planted_damping(parameters: MachineParameters, linear: str, torsional: str) 
     return np.array([changed.gasket.damping_x, changed.gasket.rotational_damping_x])
 
 
-def damping_problem(machine: Machine, measured: MeasuredDisplacements) -> FitProblem:
-    """Return the problem of C_L and C_T: a curve for each load and sensor, its smooth envelope. [m]
+def damping_numbers(parameters: MachineParameters) -> SoughtNumbers:
+    """Return C_L and C_T, each that of all axes of the gasket, as the unknowns of a fit."""
+    factors, sought = load_factors(GASKET_FACTORS), []
+    for name, upper, unit in zip(UNKNOWNS, UPPER.tolist(), UNITS, strict=True):
+        numbers = tuple(number_at(parameters, key) for key in factors[name].keys)
+        variation = Variation(name, numbers, Change.VALUE, unit)
+        sought.append(Sought(variation, Unknown(name, 0.0, upper, unit)))
+    return SoughtNumbers(parameters, tuple(sought), "identified")
+
+
+@dataclass(frozen=True, eq=False)
+class EnvelopeModel(BlockModel):
+    """Smooth envelopes as a function of C_L and C_T: a block for each load. [m]
+
+    Attributes:
+        measured: Measured displacements.
+    """
+
+    measured: MeasuredDisplacements
+
+    misfit = APART
+
+    @cached_property
+    def blocks(self) -> list[Block]:
+        """Return the measured envelopes of each load."""
+        blocks = []
+        for load, displacement in self.measured.items():
+            envelopes = envelopes_of(displacement)
+            places = list(map(TIME.text, envelopes.time.values))
+            blocks.append(Block(load, places, envelopes.values, np.ones(envelopes.shape)))
+        return blocks
+
+    def computed(self, points: FloatArray) -> list[list[FloatArray]]:
+        """Return the computed envelopes of each load at each point; NaN where a run failed."""
+        loads, shape = tuple(self.measured), self.blocks[0].measured.shape
+        values = self.experiment.records(
+            {"point": range(len(points)), "load": loads},
+            (case for point in points for case in self.cases_at(point)),
+            lambda record: envelopes_of(record.displacement).values.ravel(),
+            math.prod(shape),
+        )
+        return [[of_load.reshape(shape) for of_load in of_point] for of_point in values]
+
+    def cases_at(self, damping: FloatArray) -> list[Case]:
+        """Return a case for each load, with a damping C_L, C_T. [N s/m, N m s/rad]"""
+        changed = self.free.parameters_at(damping)
+        profile = run_up_of(changed)
+        return [Case(n, changed.loads[n], profile, parameters=changed) for n in self.measured]
+
+
+def envelope_model(machine: Machine, measured: MeasuredDisplacements) -> EnvelopeModel:
+    """Return the model of measured displacements.
 
     Raises:
         InputError: the machine has no gasket, or its profile ends before the window.
     """
-    envelopes = {load: envelopes_of(displacement) for load, displacement in measured.items()}
-    curves = tuple(
-        Measurement(f"{load} {sensor}", curve.values, errors="correlated")
-        for load, of_load in envelopes.items()
-        for sensor, curve in zip(of_load.sensor.values, of_load.T, strict=True)
-    )
-    unknowns = tuple(
-        Unknown(name, float(lower), float(upper), unit)
-        for name, lower, upper, unit in zip(UNKNOWNS, LOWER, UPPER, UNITS, strict=True)
-    )
-    loads, size = tuple(measured), sum(len(curve.values) for curve in curves)
-    experiment = Experiment(machine, ())
-    run_up_of(machine.parameters)  # refuses a machine without gasket, and a short profile
-
-    def computed(points: FloatArray) -> FloatArray:
-        values = experiment.records(
-            {"point": range(len(points)), "load": loads},
-            (case for point in points for case in cases_at(machine.parameters, point, loads)),
-            lambda record: envelopes_of(record.displacement).values.T.ravel(),
-            size // len(loads),
-        )
-        return values.reshape(len(points), size)
-
-    return FitProblem(unknowns, curves, computed)
-
-
-def cases_at(
-    parameters: MachineParameters, damping: FloatArray, loads: Sequence[str]
-) -> list[Case]:
-    """Return a case for each load, with a damping C_L, C_T. [N s/m, N m s/rad]"""
-    changed, profile = with_damping(parameters, damping), run_up_of(parameters)
-    return [Case(load, changed.loads[load], profile, parameters=changed) for load in loads]
+    run_up_of(machine.parameters)
+    free, sensors = damping_numbers(machine.parameters), list(machine.parameters.sensors)
+    return EnvelopeModel(Experiment(machine, ()), free, sensors, measured)
 
 
 @dataclass(frozen=True, eq=False)
 class DistanceProblem(FitProblem):
-    """Problem of `damping_problem` with the distance of [B] Eq. (2), (3) as cost. [m]
+    """Problem of an `EnvelopeModel` with the distance of [B] Eq. (2), (3) as cost. [m]
 
     It is the sum over the loads of the 2-norm of the differences of the upper and lower envelopes
     of all sensors. The lower envelope is the upper one with the other sign.
@@ -202,7 +208,7 @@ class DistanceProblem(FitProblem):
         for where, curve in zip(self.slices, self.measurements, strict=True):
             apart = np.abs(rows[:, where])
             apart = np.where(apart >= FAILED * curve.largest, np.inf, apart)
-            load = curve.name.rpartition(" ")[0]
+            load = curve.name.rpartition(", ")[0]
             both = 2.0 * np.sum(np.square(apart), axis=1)
             squares[load] = squares.get(load, np.zeros(len(rows))) + both
         return np.sum(np.sqrt(list(squares.values())), axis=0)
@@ -244,7 +250,7 @@ def virtual_experiment(
         truth: True values of C_L and C_T. [N s/m, N m s/rad]
     """
     rng = np.random.default_rng(seed)
-    true_parameters = with_damping(parameters, truth)
+    true_parameters = damping_numbers(parameters).parameters_at(truth)
     machine = build_machine(true_parameters)
     records = {}
     for load in LOADS:
@@ -252,15 +258,6 @@ def virtual_experiment(
         displacement = simulate(machine, case, "drake").displacement
         records[load] = displacement + rng.normal(scale=NOISE, size=displacement.shape)
     return records
-
-
-def with_damping(parameters: MachineParameters, damping: FloatArray) -> MachineParameters:
-    """Return the machine with C_L and C_T on every axis of its gasket. [N s/m, N m s/rad]"""
-    factors = load_factors(GASKET_FACTORS)
-    numbers = zip(UNKNOWNS, damping, strict=True)
-    return with_values(
-        parameters, {key: float(value) for name, value in numbers for key in factors[name].keys}
-    )
 
 
 def envelopes_of(displacement: xr.DataArray) -> xr.DataArray:

@@ -2,18 +2,14 @@
 
 from wm_drake.model.machine import Machine
 from wm_drake.report.terminal import say
-from wm_drake.simulation.runs import simulate
 from wm_drake.studies.answer import Answer
+from wm_drake.studies.calibrate.blocks import calibrated
 from wm_drake.studies.executor import Executor
-from wm_drake.studies.fitting.methods import identify
 from wm_drake.studies.gasket_damping.options import GasketDampingOptions
 from wm_drake.studies.gasket_damping.page import gasket_damping_answer
 from wm_drake.studies.gasket_damping.study import (
-    SCREENED,
     STARTS,
-    Comparison,
-    cases_at,
-    damping_problem,
+    envelope_model,
     grid_of_paper,
     planted_damping,
     read_records,
@@ -46,19 +42,15 @@ class GasketDampingTask(Task):
                 err=True,
             )
             records = virtual_experiment(machine.parameters, self.truth, self.options.seed)
-        problem = damping_problem(machine, records)
+        model = envelope_model(machine, records)
+        problem = model.problem()
         with executor.fraction("fit") as progress:
-            fit = identify(
-                problem,
-                seed=self.options.seed,
+            fit, data = calibrated(
+                model,
+                self.options.seed,
+                lambda fraction, _: progress(fraction),
                 starts=STARTS,
-                screened=SCREENED,
-                progress=lambda fraction, _: progress(fraction),
+                problem=problem,
             )
         grids = None if mesh is None else grid_of_paper(problem, mesh / 100.0)
-        computed = {
-            case.name: simulate(machine, case).displacement
-            for case in cases_at(machine.parameters, fit.values, tuple(records))
-        }
-        comparison = Comparison(records, computed, self.truth)
-        return gasket_damping_answer(machine.parameters, fit, comparison, grids)
+        return gasket_damping_answer(model, fit, data, self.truth, grids)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import field_validator
 
 from wm_drake.studies.inputs import with_drive, with_measured
-from wm_drake.studies.study import LIVE, MEASURED, PROFILE, Options, Study, imported, option
+from wm_drake.studies.study import ENGINE, LIVE, MEASURED, PROFILE, Options, Study, imported, option
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     from wm_drake.parameters import MachineParameters
@@ -36,11 +36,7 @@ class SpinOptions(Options):
         False, "Compare with and without the gasket on one page: amplitudes and the steady state."
     )
     profile: Path | None = PROFILE
-    engine: str | None = option(
-        None,
-        "Engine that integrates the motion: compiled (default) or drake (slow reference).",
-        "NAME",
-    )
+    engine: str = ENGINE
     replay: bool = option(
         False, "Also write a 3D replay around the largest amplitude of each load."
     )

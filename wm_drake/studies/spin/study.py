@@ -1,25 +1,21 @@
 """Spin runs: cases with their records and measures, in one or several processes."""
 
-import multiprocessing
-import os
-import signal
 import time
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
 
-from wm_drake.batch.runs import Runner
-from wm_drake.batch.work_items import Preparation
+from wm_drake.batch.many import run_cases
+from wm_drake.batch.runs import BatchOptions, RunResult
 from wm_drake.elements.kind import element_kind
-from wm_drake.engines.memory import RECORDS_OF_BATCH
-from wm_drake.errors import InputError, WmDrakeError
+from wm_drake.engines import DEFAULT_ENGINE
+from wm_drake.errors import InputError
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
 from wm_drake.model.scene import Scene
@@ -27,13 +23,11 @@ from wm_drake.parameters import MachineParameters, Sensor
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.report.quantity import SPEED, STEP, TIME, Quantity
-from wm_drake.simulation.cases import Case, is_as_measured, notice_jumping_friction
+from wm_drake.simulation.cases import Case, is_as_measured
 from wm_drake.simulation.convergence import Accuracy
 from wm_drake.simulation.displacements import band_of, largest_motion
 from wm_drake.simulation.measures import MEASURES, Measures, measure
 from wm_drake.simulation.records import Record, sample_period
-from wm_drake.simulation.runs import DEFAULT_ENGINE, DivergenceWarning, simulate
-from wm_drake.simulation.steps import checked_integrator, checked_step
 
 if TYPE_CHECKING:
     from wm_drake.studies.modes.study import NaturalModes
@@ -43,8 +37,8 @@ if TYPE_CHECKING:
 class CaseResult:
     """Result of one case: its record, which has times of its own, and its measures.
 
-    `wall_s` is the time for simulation and measures together; of runs side by side, a share. [s]
-    `accuracy` is None with an engine that controls its error.
+    `wall_s` is its share of the time for simulation and measures of all cases. [s]
+    `accuracy` is None if it is not known.
     """
 
     case: Case
@@ -183,16 +177,6 @@ def _of_parts(case: CaseResult) -> xr.Dataset:
     return table.assign(changed | {name: np.nan * table[name] for name in gasket})
 
 
-@dataclass(frozen=True)
-class _WorkItem:
-    """All data that a process needs for one run."""
-
-    parameters: MachineParameters
-    case: Case
-    engine: str
-    step: float
-
-
 def run_spin(
     machine: MachineParameters | Machine,
     cases: Sequence[Case],
@@ -214,9 +198,8 @@ def run_spin(
         step: Step size; None for that of the machine. [s]
         progress: Called with the index of a case and the fraction of it that is done; for cases in
             processes, when a case has ended.
-        workers: Number of processes for an engine that needs processes; None for the number of
-            cores. A single case always runs in this process, and all cases do in a daemon process,
-            which cannot start others.
+        workers: Number of threads, or of processes for the Drake engine; None for the number of
+            cores.
         comparison: Which cases are compared with the measured amplitudes of the machine.
 
     Raises:
@@ -230,21 +213,25 @@ def run_spin(
         'middle'
     """
     built = machine if isinstance(machine, Machine) else build_machine(machine)
-    parameters = built.parameters
-    step = checked_step(parameters, step)
-    count = min(workers or os.cpu_count() or 1, len(cases))
-    work_items = [_WorkItem(parameters, case, engine, step) for case in cases]
-    if engine == DEFAULT_ENGINE:
-        results = _run_side_by_side(built, cases, step, progress)
-    elif count > 1 and not multiprocessing.current_process().daemon:  # such one may start no other
-        results = _run_in_processes(work_items, count, progress)
-    else:
-        scene = Scene(parameters)
-        results = [
-            _run(item, built, scene, partial(progress, index))
-            for index, item in enumerate(work_items)
-        ]
-    return SpinRuns(parameters, engine, tuple(results), comparison)
+    scene, begin = Scene(built.parameters), time.time()
+    ended = dict[int, tuple[Record, Measures, Accuracy | None]]()
+
+    def collect(runs: list[RunResult]) -> None:
+        for run in runs:
+            assert run.record is not None  # all are kept
+            ended[run.number] = run.record, measure(run.record, scene), run.accuracy
+            progress(run.number, 1.0)
+
+    shown = (m for m in MEASURES.values() if m.is_in_spin and m.applies(built.parameters))
+    compared = tuple(one.name for one in shown)
+    options = BatchOptions((), step, None, True, workers, engine, compared)
+    run_cases(built, cases, options, collect, progress)
+    share = (time.time() - begin) / max(1, len(cases))
+    results = (
+        CaseResult(case, *ended[number][:2], share, ended[number][2])
+        for number, case in enumerate(cases)
+    )
+    return SpinRuns(built.parameters, engine, tuple(results), comparison)
 
 
 def natural_modes_of(machine: Machine, case: Case) -> "NaturalModes | None":
@@ -258,82 +245,6 @@ def natural_modes_of(machine: Machine, case: Case) -> "NaturalModes | None":
     except InputError:  # its cabinet moves, or the compiled engine does not represent it
         return None
     return replace(natural, load=case.name)
-
-
-def _run_in_processes(
-    items: Sequence[_WorkItem], count: int, progress: Callable[[int, float], None]
-) -> list[CaseResult]:
-    """Return the results of runs in new processes: systems of Drake in Python block other threads.
-
-    Raises:
-        WmDrakeError: a process ended before its time, such as for lack of memory.
-    """
-    from concurrent.futures import ProcessPoolExecutor, as_completed  # slow to import
-    from concurrent.futures.process import BrokenProcessPool
-
-    # a fork of a process with threads or with Drake is not safe; Ctrl-C ends a worker at once
-    spawn, at_begin = multiprocessing.get_context("spawn"), (signal.SIGINT, signal.SIG_DFL)
-    pool = ProcessPoolExecutor(count, spawn, signal.signal, at_begin)
-    try:
-        futures = {pool.submit(_build_and_run, item): index for index, item in enumerate(items)}
-        for future in as_completed(futures):
-            future.result()
-            progress(futures[future], 1.0)
-        return [future.result() for future in futures]
-    except BrokenProcessPool:
-        raise WmDrakeError(
-            "a worker process ended before its result; a script that uses several workers needs "
-            '`if __name__ == "__main__":`'
-        ) from None
-    finally:
-        pool.shutdown(cancel_futures=True)
-
-
-def _run_side_by_side(
-    machine: Machine, cases: Sequence[Case], step: float, progress: Callable[[int, float], None]
-) -> list[CaseResult]:
-    """Return the results of cases, which the compiled engine runs in the lanes of a batch."""
-    notice_jumping_friction(machine.parameters)
-    scene, shown = Scene(machine.parameters), [m for m in MEASURES.values() if m.is_in_spin]
-    compared = tuple(one.name for one in shown if one.applies(machine.parameters))
-    runner = Runner(machine.parameters, (), histories=True, compared=compared)
-    integrator = checked_integrator(machine.parameters, None)
-    preparation = Preparation(machine, step, integrator, RECORDS_OF_BATCH)
-    results = dict[int, CaseResult]()
-    for key, items in preparation.batches(cases):
-        begin = time.perf_counter()
-
-        def report(fraction: float, numbers: tuple[int, ...]) -> None:
-            for index in numbers:
-                progress(index, fraction)
-
-        numbers = tuple(item.number for item in items)
-        runs = runner.run(key, items, partial(report, numbers=numbers))
-        share = (time.perf_counter() - begin) / len(runs)
-        for run in runs:
-            assert run.record is not None  # the runner keeps all
-            begin = time.perf_counter()
-            measures = measure(run.record, scene)
-            wall = share + time.perf_counter() - begin
-            results[run.number] = CaseResult(run.case, run.record, measures, wall, run.accuracy)
-    return [results[number] for number in range(len(cases))]
-
-
-def _build_and_run(item: _WorkItem) -> CaseResult:
-    """Return the result of a case in a process that has no built machine yet."""
-    machine, scene = build_machine(item.parameters), Scene(item.parameters)
-    return _run(item, machine, scene, lambda fraction: None)
-
-
-def _run(
-    item: _WorkItem, machine: Machine, scene: Scene, progress: Callable[[float], None]
-) -> CaseResult:
-    begin = time.perf_counter()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DivergenceWarning)  # the report shows it from the record
-        record = simulate(machine, item.case, item.engine, step=item.step, progress=progress)
-    measures = measure(record, scene)
-    return CaseResult(item.case, record, measures, time.perf_counter() - begin)
 
 
 def _water_in(case: CaseResult, shown: Record) -> FloatArray | None:

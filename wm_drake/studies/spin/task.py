@@ -8,7 +8,7 @@ from wm_drake.errors import check_known, input_error, shortened
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters
 from wm_drake.simulation.cases import Case
-from wm_drake.simulation.runs import DEFAULT_ENGINE, ENGINES
+from wm_drake.simulation.runs import ENGINES
 from wm_drake.studies.answer import Answer
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import selected_cases
@@ -36,7 +36,7 @@ class SpinTask(Task):
     def __init__(self, options: SpinOptions, *machines: Machine) -> None:
         """Check the options."""
         self.options = options
-        self.engine = options.engine or DEFAULT_ENGINE
+        self.engine = options.engine
         check_known(self.engine, ENGINES, f"unknown engine '{self.engine}'", where="--engine")
         self._check_variants(machines)
         parameters = [machine.parameters for machine in machines]

@@ -45,20 +45,10 @@ class SpinCycleDataOptions(Options):
     )
 
 
-class SpinCycleOptions(SpinCycleDataOptions):
-    """Options of the study of a spin cycle."""
-
-    engine: str = option(
-        "compiled",
-        "Engine that integrates the motion: compiled, or drake (takes minutes per case).",
-        "NAME",
-    )
-
-
 SPIN_CYCLE = Study(
     "spin-cycle",
     "Run a spin cycle with many unbalances, and report RMS displacements per region and sensor.",
-    SpinCycleOptions,
+    SpinCycleDataOptions,
     imported("wm_drake.studies.spin_cycle.task:SpinCycleTask"),
     quick={"case": ("2",)},
 )

@@ -64,7 +64,6 @@ def spin_cycle_answer(
         ),
         (
             ("SDF model", Path(parameters.model).name),
-            ("Engine", engine),
             ("Sensors", f"{', '.join(sensors)}; axes x to the right, y to the rear, z up"),
             (
                 "Displacement",

@@ -1,6 +1,6 @@
 """Spin cycle: RMS displacement per region, sensor and axis for unbalance cases ([A] section 4)."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -9,23 +9,19 @@ import numpy as np
 import xarray as xr
 
 from wm_drake.batch import simulate_many
-from wm_drake.batch.run_table import RunTable
 from wm_drake.elements.bushing import AXES
 from wm_drake.errors import InputError, check_known, input_error
 from wm_drake.model.machine import Machine
-from wm_drake.model.scene import Scene
 from wm_drake.parameters import MachineParameters, SpinProfile
 from wm_drake.parameters.drive import motor_of
 from wm_drake.parameters.unbalance_cases import TABLE_9, UnbalanceCase, load_unbalance_cases
 from wm_drake.parameters.units import Share, Unit
 from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.cases import Case
-from wm_drake.simulation.measures import measure
 from wm_drake.simulation.vibration import relative_error
 from wm_drake.studies.executor import RunCases
 from wm_drake.studies.experiment import placed
 from wm_drake.studies.inputs import channel_names, existing_file
-from wm_drake.studies.spin.study import run_spin
 from wm_drake.studies.spin_cycle.measured import DIMS, RMS, read_accelerations, read_rms
 from wm_drake.studies.spin_cycle.options import SpinCycleDataOptions
 
@@ -217,31 +213,3 @@ def measured_displacements(
 def compiled_runs(machine: Machine) -> RunCases:
     """Return a function that runs cases of a built machine with the compiled engine."""
     return partial(simulate_many, machine, measures=measures_of(machine.parameters))
-
-
-def drake_runs(
-    parameters: MachineParameters, *, progress: Callable[[int], None] = lambda done: None
-) -> RunCases:
-    """Return a function that runs cases with the Drake engine in processes, minutes a case."""
-
-    def evaluate(cases: Iterable[Case]) -> xr.Dataset:
-        runs = list(cases)
-        done = np.zeros(len(runs))
-
-        def report(index: int, fraction: float) -> None:
-            done[index] = fraction
-            progress(int(done.sum()))
-
-        results = run_spin(parameters, runs, "drake", progress=report).results
-        measures, scene = measures_of(parameters), Scene(parameters)
-        table = RunTable(parameters, measures)
-        for number, result in enumerate(results):
-            of_run = measure(result.record, scene, measures)
-            values = {
-                variable.name: of_run.table[variable.name].values for variable in table.variables
-            }
-            diverged = str(result.record.attrs["diverged"])
-            table.put(number, result.case.name, values, diverged)
-        return table.dataset()
-
-    return evaluate

@@ -3,33 +3,27 @@
 from functools import partial
 from typing import Any
 
-from wm_drake.errors import check_known
 from wm_drake.model.machine import Machine
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import runnable_profile
 from wm_drake.studies.spin_cycle.measured import DIMS, RMS
-from wm_drake.studies.spin_cycle.options import SpinCycleOptions
+from wm_drake.studies.spin_cycle.options import SpinCycleDataOptions
 from wm_drake.studies.spin_cycle.page import spin_cycle_answer
 from wm_drake.studies.spin_cycle.study import (
     cases_of_table,
-    drake_runs,
     measured_displacements,
     measures_of,
     run_spin_cycle,
 )
 from wm_drake.studies.study import Result, Task
 
-ENGINES = ("compiled", "drake")
-
 
 class SpinCycleTask(Task):
     """The study with checked options."""
 
-    def __init__(self, options: SpinCycleOptions, machine: Machine) -> None:
+    def __init__(self, options: SpinCycleDataOptions, machine: Machine) -> None:
         """Read profile, cases and measurements."""
-        engine = options.engine
-        check_known(engine, ENGINES, f"unknown engine '{engine}'", where="--engine")
-        self.machine, self.engine = machine, engine
+        self.machine = machine
         self.profile = runnable_profile(options.profile, machine.parameters)
         self.cases = cases_of_table(options.cases, options.case)
         self.measured = measured_displacements(
@@ -39,19 +33,14 @@ class SpinCycleTask(Task):
     @property
     def identity(self) -> dict[str, Any]:
         """Return what determines the runs."""
-        return {"profile": self.profile, "engine": self.engine}
+        return {"profile": self.profile}
 
     def run(self, executor: Executor) -> Result:
         """Run all cases."""
         parameters = self.machine.parameters
-        if self.engine == "drake":
-            with executor.progress(len(self.cases), "cases") as progress:
-                evaluate = drake_runs(parameters, progress=progress)
-                data = run_spin_cycle(parameters, self.cases, self.profile, evaluate)
-        else:
-            measures = measures_of(parameters)
-            evaluate = partial(executor.simulate, self.machine, measures, what="cases")
-            data = run_spin_cycle(parameters, self.cases, self.profile, evaluate)
+        measures = measures_of(parameters)
+        evaluate = partial(executor.simulate, self.machine, measures, what="cases")
+        data = run_spin_cycle(parameters, self.cases, self.profile, evaluate)
         if self.measured is not None:
             data["measured"] = RMS.variable(DIMS, self.measured)
-        return spin_cycle_answer(parameters, self.profile, self.cases, data, self.engine)
+        return spin_cycle_answer(parameters, self.profile, self.cases, data, executor.engine)

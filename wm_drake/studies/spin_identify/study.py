@@ -5,7 +5,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import cached_property
 
 import numpy as np
 import xarray as xr
@@ -17,25 +17,17 @@ from wm_drake.parameters.unbalance_cases import UnbalanceCase
 from wm_drake.parameters.units import Share
 from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.cases import Case
+from wm_drake.studies.calibrate.blocks import Block, BlockModel
 from wm_drake.studies.experiment import Experiment
-from wm_drake.studies.fitting.fit import Fit
-from wm_drake.studies.fitting.methods import identify
-from wm_drake.studies.fitting.problem import FitProblem, Measurement, Progress
-from wm_drake.studies.fitting.search import silent
-from wm_drake.studies.fitting.sought import Sought, SoughtNumbers, at_point, sought_in, sought_of
-from wm_drake.studies.spin_cycle.measured import DIMS, RMS
-from wm_drake.studies.spin_cycle.study import average_errors, labels_of, region_errors, runs_of
+from wm_drake.studies.fitting.problem import Errors
+from wm_drake.studies.fitting.sought import Sought, SoughtNumbers, sought_in, sought_of
+from wm_drake.studies.spin_cycle.measured import DIMS
+from wm_drake.studies.spin_cycle.study import labels_of, runs_of
 
 PLANTED = (0.8, 1.25)
 """Range of the ratio of true number to machine's number in a virtual experiment."""
 
-AVERAGE_ERROR = Quantity("average error of an RMS displacement", Share(), 1)
-RELATIVE_ERROR = Quantity("relative error", Share(), 2)
 RESIDUAL = Quantity("residual", Share(), 2)
-HALF_WIDTH = Quantity("95 % interval, ±", Share(), 2)
-
-KNOWN = 0.02
-"""Largest relative half-width of the 95 % confidence interval of an identified unknown."""
 
 TABLE_8 = (
     ("bushing_types.connecting.friction_torque_y",),
@@ -79,15 +71,54 @@ def planted_values(sought: Sequence[Sought], seed: int) -> FloatArray:
     return np.clip(guesses * np.exp(drawn), 1.02 * lower, 0.98 * upper)
 
 
-@dataclass(frozen=True)
-class SpinModel:
-    """RMS displacements of unbalance cases as a function of the unknowns."""
+@dataclass(frozen=True, eq=False)
+class SpinModel(BlockModel):
+    """RMS displacements of unbalance cases as a function of the unknowns: a block for each case.
 
-    experiment: Experiment
-    parameters: MachineParameters
+    The residuals are those of [A] Eq. (9): each value is divided by the norm of the measured values
+    in its case and region. Its error is a part of the value, so each has a variance of its own.
+
+    Attributes:
+        sensors: Accelerometer and axis of each sensor.
+        measured: (case, region, accelerometer, axis) RMS displacements; NaN where nothing was
+            measured. [m]
+    """
+
+    free: SoughtNumbers
     profile: SpinProfile
     cases: tuple[UnbalanceCase, ...]
-    sought: tuple[Sought, ...]
+    measured: xr.DataArray
+
+    misfit = RESIDUAL
+
+    @property
+    def errors(self) -> Errors:
+        """What the errors are like: each is a part of the value."""
+        return "each"
+
+    @cached_property
+    def with_data(self) -> list[int]:
+        """Indices of the cases of which something was measured."""
+        return [k for k, values in enumerate(self.measured.values) if np.nanmax(values, initial=0)]
+
+    @cached_property
+    def blocks(self) -> list[Block]:
+        """Return the measured values of each case."""
+        blocks, regions = [], self.measured.region.values.tolist()
+        for index in self.with_data:
+            values = self.measured.values[index].reshape(len(regions), -1)
+            norms = np.sqrt(np.nansum(values**2, axis=1, keepdims=True))
+            sizes = np.broadcast_to(norms, values.shape)
+            blocks.append(Block(f"case {self.cases[index].name}", regions, values, sizes))
+        return blocks
+
+    def computed(self, points: FloatArray) -> list[list[FloatArray]]:
+        """Return the RMS displacements of each case with data at each point. [m]"""
+        regions = self.measured.sizes["region"]
+        return [
+            [of_point[index].reshape(regions, -1) for index in self.with_data]
+            for of_point in self.displacements(points)
+        ]
 
     def displacements(self, points: FloatArray) -> FloatArray:
         """Compute the RMS displacements at points.
@@ -104,133 +135,46 @@ class SpinModel:
 
     def _runs(self, points: FloatArray) -> Iterator[Case]:
         for point in points:
-            parameters = at_point(self.parameters, self.sought, point)
+            parameters = self.free.parameters_at(point)
             for run in runs_of(parameters, self.cases, self.profile):
                 yield replace(run, parameters=parameters)
 
+    def missed(self, data: xr.Dataset) -> dict[str, float]:
+        """Return the mean errors of single values, as in [A] Table 9: mean of those of the cases.
 
-def virtual_experiment(
+        They are `before` and `after` the search.
+        """
+        single = abs(data[["before", "after"]] - data.measured) / data.measured
+        of_cases = single.where(data.measured > 0.0).groupby("block").mean(...)
+        return {str(name): float(of_case.mean()) for name, of_case in of_cases.items()}
+
+
+def spin_model(
+    experiment: Experiment,
+    sought: Sequence[Sought],
+    profile: SpinProfile,
+    cases: Sequence[UnbalanceCase],
+    measured: xr.DataArray | None = None,
+) -> SpinModel:
+    """Return the model of unbalance cases; without measured values for a virtual experiment."""
+    parameters = experiment.machine.parameters
+    labels = labels_of(parameters, cases, profile)
+    sensors = [f"{name} {axis}" for name in labels["accelerometer"] for axis in labels["axis"]]
+    if measured is None:
+        measured = xr.DataArray(np.full([*map(len, labels.values())], np.nan), labels, DIMS)
+    free = SoughtNumbers(parameters, tuple(sought), "identified")
+    return SpinModel(experiment, free, sensors, profile, tuple(cases), measured)
+
+
+def with_virtual_experiment(
     model: SpinModel, planted: FloatArray, noise: float, seed: int
-) -> xr.DataArray:
-    """Simulate an experiment: RMS displacements with the true numbers and random errors.
+) -> SpinModel:
+    """Return a model with simulated measurements: those of true numbers, with random errors.
 
     Args:
         planted: True numbers of the unknowns, in SI units.
         noise: Relative standard deviation of the error of each value.
-
-    Returns:
-        (case, region, accelerometer, axis). [m]
     """
     exact = model.displacements(planted[None])[0]
     errors = np.random.default_rng(seed).standard_normal(exact.shape)
-    return xr.DataArray(
-        exact * (1.0 + noise * errors),
-        labels_of(model.parameters, model.cases, model.profile),
-        DIMS,
-    )
-
-
-def identify_from_spin(
-    model: SpinModel,
-    measured: xr.DataArray,
-    *,
-    planted: FloatArray | None = None,
-    seed: int = 0,
-    progress: Progress = silent,
-) -> tuple[Fit, xr.Dataset]:
-    """Identify the unknowns from measured RMS displacements.
-
-    The fit minimizes the root mean square of the relative errors [A] Eq. (9) of all regions and
-    cases.
-
-    Args:
-        measured: (case, region, accelerometer, axis) RMS displacements; NaN where nothing was
-            measured. [m]
-        planted: True numbers of a virtual experiment, in SI units.
-        progress: Called with the fraction done and the lowest error so far.
-
-    Returns:
-        The fit; and over case, region, accelerometer and axis, RMS displacements [m]: `measured`,
-        `before` the identification, and `after` it, with the identified numbers; `residual`, after
-        less measured, by the norm of what was measured in the case and region. Over `case` alone:
-        relative errors, [A] Eq. (9), `error_before` and `error_after`, means over the regions. Over
-        no dimension: `average_error_before` and `average_error_after`. Over `unknown`:
-        `half_width` of the 95 % interval by the value, infinite if the data do not determine it;
-        whether it `is_identified` to within `KNOWN`; in a virtual experiment the relative `error`.
-
-    Raises:
-        InputError: nothing was measured in the cases of the study.
-    """
-    problem = _problem(model, measured)
-    fit = identify(problem, seed=seed, starts=1, screened=8, progress=progress)
-    start = np.array([s.guess for s in model.sought])
-    computed = [
-        measured.copy(data=values) for values in model.displacements(np.stack([start, fit.values]))
-    ]
-    data: dict[str, Any] = {"measured": RMS.variable(DIMS, measured)}
-    for name, values in zip(("before", "after"), computed, strict=True):
-        error = region_errors(values, measured).mean("region")
-        average = average_errors(values, measured).mean()
-        data[name] = RMS.named(name).variable(DIMS, values)
-        data[f"error_{name}"] = RELATIVE_ERROR.named(name).variable("case", error)
-        words = f"{AVERAGE_ERROR.words} {name}"
-        data[f"average_error_{name}"] = AVERAGE_ERROR.named(words).variable((), average)
-    norms = (measured**2).sum(DIMS[2:]) ** 0.5
-    residual = (computed[1] - measured) / norms.where(norms > 0.0)
-    data["residual"] = RESIDUAL.variable(DIMS, residual.transpose(*DIMS))
-    halves = half_widths(fit)
-    data["half_width"] = HALF_WIDTH.variable("unknown", halves)
-    data["is_identified"] = ("unknown", halves <= KNOWN)
-    if planted is not None:
-        data["error"] = RELATIVE_ERROR.named("error").variable(
-            "unknown", fit.values / planted - 1.0
-        )
-    coords = {str(dim): measured[dim].values for dim in DIMS}
-    names = [sought.unknown.name for sought in model.sought]
-    return fit, xr.Dataset(data, {**coords, "unknown": names})
-
-
-def half_widths(fit: Fit) -> FloatArray:
-    """Return half the 95 % interval of each estimate by its value; infinite without an interval."""
-    halves = [
-        0.5 * (e.upper - e.lower) / abs(e.value) if e.value else np.nan for e in fit.estimates
-    ]
-    return np.where(np.isfinite(halves), halves, np.inf)
-
-
-def identified_machine(model: SpinModel, fit: Fit, *, is_virtual: bool) -> MachineParameters:
-    """Return the machine with the identified numbers and the source of each."""
-    virtual = "virtual experiment: " if is_virtual else ""
-    cases = ", ".join(case.name for case in model.cases)
-    source = f"{virtual}identified from spin cycle, cases {cases}"
-    return SoughtNumbers(model.parameters, model.sought, "identified").solved(fit, source)
-
-
-def _problem(model: SpinModel, measured: xr.DataArray) -> FitProblem:
-    """Return the fit problem, whose residuals are those of [A] Eq. (9).
-
-    Each value is divided by the norm of the measured values in its case and region. Its error is a
-    part of the value, so each has a variance of its own.
-    """
-    is_measured = np.isfinite(measured.values)
-    data = np.where(is_measured, measured.values, 0.0)
-    norms = np.sqrt(np.sum(data**2, axis=(2, 3), keepdims=True))
-    is_measured &= norms > 0.0
-    weights = is_measured / np.where(norms > 0.0, norms, 1.0)
-    with_data = [k for k in range(len(model.cases)) if is_measured[k].any()]
-    if not with_data:
-        raise input_error(
-            "nothing was measured in the cases of this study; at least one needs values above 0"
-        )
-
-    def scaled(values: FloatArray) -> list[FloatArray]:
-        return [(values[..., k, :, :, :] * weights[k])[..., is_measured[k]] for k in with_data]
-
-    tests = tuple(
-        Measurement(f"case {model.cases[k].name}", numbers, errors="each")
-        for k, numbers in zip(with_data, scaled(data), strict=True)
-    )
-    unknowns = tuple(s.unknown for s in model.sought)
-    return FitProblem(
-        unknowns, tests, lambda points: np.concatenate(scaled(model.displacements(points)), axis=1)
-    )
+    return replace(model, measured=model.measured.copy(data=exact * (1.0 + noise * errors)))

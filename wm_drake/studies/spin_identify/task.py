@@ -6,6 +6,7 @@ from typing import Any
 from wm_drake.errors import check_known, input_error
 from wm_drake.model.machine import Machine
 from wm_drake.studies.answer import Answer
+from wm_drake.studies.calibrate.blocks import calibrated
 from wm_drake.studies.calibrate.records_task import (
     fitted_answer,
     record_model,
@@ -22,11 +23,10 @@ from wm_drake.studies.spin_cycle.study import cases_of_table, measured_displacem
 from wm_drake.studies.spin_identify.options import SpinIdentifyOptions
 from wm_drake.studies.spin_identify.page import spin_identify_answer
 from wm_drake.studies.spin_identify.study import (
-    SpinModel,
-    identify_from_spin,
     planted_values,
+    spin_model,
     unknowns_of,
-    virtual_experiment,
+    with_virtual_experiment,
 )
 from wm_drake.studies.study import Task
 
@@ -93,23 +93,18 @@ class SpinIdentifyTask(Task):
         """Identify the unknowns, from measurements or from a virtual experiment."""
         if self.tests:
             return self._fitted(executor)
-        seed, measured, planted = self.options.seed, self.measured, None
+        seed, truth = self.options.seed, None
         with executor.fraction("search") as report:
             experiment = Experiment(self.machine, ("regions",), executor.simulate)
-            model = SpinModel(
-                experiment, self.machine.parameters, self.profile, tuple(self.cases), self.sought
-            )
-            if measured is None:
+            model = spin_model(experiment, self.sought, self.profile, self.cases, self.measured)
+            if self.measured is None:
                 planted = planted_values(self.sought, seed)
-                measured = virtual_experiment(model, planted, self.options.noise, seed)
-            fit, identified = identify_from_spin(
-                model,
-                measured,
-                planted=planted,
-                seed=seed,
-                progress=lambda fraction, least: report(fraction),
-            )
-        return spin_identify_answer(model, fit, identified, planted)
+                truth = {
+                    s.unknown.name: v for s, v in zip(self.sought, planted.tolist(), strict=True)
+                }
+                model = with_virtual_experiment(model, planted, self.options.noise, seed)
+            fit, data = calibrated(model, seed, lambda fraction, least: report(fraction), starts=1)
+        return spin_identify_answer(model, fit, data, truth)
 
     def _fitted(self, executor: Executor) -> Answer:
         """Fit the unknowns to the records."""
