@@ -239,7 +239,7 @@ class MachineParameters(Frozen):
         gravity: Acceleration of free fall.
         step: Largest step of the integrator. A run that is not accurate with it has shorter ones.
         accuracy: Largest relative error of each measure of a run, by its steps. 0.5 % is small
-            beside what a machine file does not know of a machine.
+            beside what a machine file does not know of a machine; with 100 % no run is repeated.
         output_period: Longest time between samples of a record, an integer multiple of the step.
             Measures of runs are computed from the samples. A fast profile halves it until a turn
             of the drum has 30 samples.

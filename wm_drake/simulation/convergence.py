@@ -99,8 +99,8 @@ class Attempt:
     size: float = 0.0
 
     def holds(self, accuracy: float) -> bool:
-        """Return whether its estimates hold an accuracy."""
-        return (
+        """Return whether its estimates hold an accuracy; all do at 100 %."""
+        return accuracy >= 1.0 or (
             self.estimates.steps <= accuracy
             and self.estimates.samples <= LARGEST_LOSS
             and not self.diverged
