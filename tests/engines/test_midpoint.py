@@ -13,8 +13,8 @@ from wm_drake.engines.compiled.midpoint import integrate_midpoint_lanes, midpoin
 from wm_drake.engines.compiled.midpoint_check import (
     midpoint_follows,
     relaxation_matrices,
-    tube_jacobians,
     step_matrices,
+    tube_jacobians,
 )
 from wm_drake.engines.compiled.packing import initial_state, pack
 from wm_drake.engines.compiled.step_check import free_states

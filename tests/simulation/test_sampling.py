@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import wm_drake as wm
-from wm_drake.parameters import SpinProfile, spin
+from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.spin import SAMPLES_OF_TURN
 from wm_drake.simulation.displacements import filtered_displacement
 from wm_drake.simulation.records import sample_period
@@ -55,21 +55,3 @@ def test_peaks_of_a_hold_are_those_of_fine_samples(machine, rpm):
             for record in (usual, finer)
         )
         assert found == pytest.approx(expected, abs=MOST_BESIDE * expected.max())
-
-
-def test_a_run_whose_samples_miss_the_peaks_gets_more_of_them(machine, monkeypatch):
-    parameters = machine.parameters
-    case = wm.Case("front", parameters.loads["front"], run_up(1200.0, 2.0, 3.0))
-    usual = wm.simulate_many(machine, [case], measures=["mounts", "amplitudes"])
-    monkeypatch.setattr(spin, "SAMPLES_OF_TURN", 1)  # ten samples a turn of the drum, at 5 ms
-    as_it_is = parameters.model_copy(update={"accuracy": 1.0})
-    rough, again = (
-        wm.simulate_many(machine, [one], measures=["mounts", "amplitudes"])
-        for one in (replace(case, parameters=as_it_is), case)
-    )
-    assert (rough.halvings.item(), again.halvings.item() > 0) == (0, True)
-    for name in ("mount_force_peak", "amplitude"):
-        expected = usual[name].values
-        off = [np.nanmax(np.abs(t[name].values / expected - 1.0)) for t in (rough, again)]
-        assert off[1] < 2.0 * MOST_BESIDE
-    assert off[0] > 2.0 * MOST_BESIDE
