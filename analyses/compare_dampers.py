@@ -36,7 +36,7 @@ def lighter(machine: Machine) -> MachineParameters:
             name = f"damper_{damper}_{part}"
             override = machine.parameters.bodies.get(name)
             inertia = override.inertia.model_dump() if override and override.inertia else None
-            mass = 0.1 * machine.plant.GetBodyByName(name).default_mass()
+            mass = 0.1 * machine.drawn.plant.GetBodyByName(name).default_mass()
             bodies[name] = {
                 "mass": mass,
                 "inertia": inertia and {key: 0.5 * value for key, value in inertia.items()},

@@ -9,19 +9,17 @@ includes making the design, its runs, and its analysis. The script takes about t
 
 import argparse
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 
-from wm_drake import build_machine, load_machine, progress_bar, simulate_many
-from wm_drake.parameters import GASKET_FACTORS, SpinProfile, at_levels, levels_of, load_factors
-from wm_drake.simulation.cases import Case
-from wm_drake.studies.doe.design import Design, make_design
-from wm_drake.studies.experiment import Experiment
-from wm_drake.studies.gasket.screening import analyse
-from wm_drake.studies.gasket.study import LOADS, GasketTrials
+import wm_drake as wm
+from wm_drake.parameters import SpinProfile
+from wm_drake.studies.doe.design import Design
+from wm_drake.studies.gasket.study import LOADS
 
 SMALLEST_SHARE = 0.01
 """Smallest contribution to a response of the full factorial with which a term is compared."""
@@ -29,12 +27,12 @@ SMALLEST_SHARE = 0.01
 
 def designs(names: tuple[str, ...], trials: int) -> dict[str, tuple[Design, float]]:
     """Return the designs by name, with the time that it took to make each. [s]"""
-    full = make_design("full", names)
+    full = wm.make_design("full", names)
     rows = np.sort(np.random.default_rng(0).choice(full.trials, trials, replace=False))
     makers = {
-        f"D-optimal {trials}": lambda: make_design("d-optimal", names, trials=trials),
-        "orthogonal 243": lambda: make_design("orthogonal", names, trials=243),
-        "orthogonal 729": lambda: make_design("orthogonal", names, trials=729),
+        f"D-optimal {trials}": lambda: wm.make_design("d-optimal", names, trials=trials),
+        "orthogonal 243": lambda: wm.make_design("orthogonal", names, trials=243),
+        "orthogonal 729": lambda: wm.make_design("orthogonal", names, trials=729),
         f"random {trials}": lambda: Design("random", names, full.levels[rows], full.model),
         f"full {full.trials}": lambda: full,
     }
@@ -57,36 +55,23 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="use five factors and runs of 2 s")
     parser.add_argument("--out", type=Path, help="also write the table to this file")
     arguments = parser.parse_args()
-    reference = load_machine("reference")
-    profile, known, trials = reference.profile, load_factors(GASKET_FACTORS), 1000
+    machine, names, trials = wm.load_machine("reference"), (), 1000
     if arguments.quick:
-        profile, trials = SpinProfile(time=(0.0, 2.0), speed=(0.0, 9.0)), 100
-        known = {name: known[name] for name in list(known)[:5]}
-    levels = levels_of(reference, known)
-    # at the middle levels, numbers replace the stiffnesses that are tables
-    middle = at_levels(reference, levels, [0] * len(levels))
-    machine = build_machine(middle)
-    study = GasketTrials(
-        middle, levels, [Case(name, middle.loads[name], profile) for name in LOADS], ("D", "F", "M")
-    )
-    made = designs(tuple(known), trials)
+        profile = SpinProfile(time=(0.0, 2.0), speed=(0.0, 9.0))
+        machine = wm.with_value(machine, "profile", profile)
+        names, trials = ("C_L", "C_T", "K_Lx", "K_Ly", "K_Lz"), 100
+    factors = wm.factors(machine, names, tables="linear")
+    made = designs(factors.names, trials)
     *_, (full, _) = made.values()
     begin = time.perf_counter()
-    with progress_bar(full.trials * len(LOADS)) as progress:
-        experiment = Experiment(
-            machine,
-            ("extremes",),
-            lambda machine, measures, cases, _: simulate_many(
-                machine, cases, measures=measures, progress=progress
-            ),
-            tuple(study.loads),
-        )
-        runs = study.responses(full, experiment)
+    with wm.progress_bar(full.trials * len(LOADS)) as progress:
+        whole = wm.run_trials(factors, full, LOADS, ("D", "F", "M"), progress=progress)
     each_s = (time.perf_counter() - begin) / full.trials
-    reference, rows = analyse(full, runs).share, []
+    reference, rows = wm.anova(whole).table.share, []
     for name, (design, made_s) in made.items():
         begin = time.perf_counter()
-        error = np.abs(analyse(design, part_of(runs, design)).share - reference)
+        part = replace(whole, design=design, runs=part_of(whole.runs, design))
+        error = np.abs(wm.anova(part).table.share - reference)
         largest = 100.0 * error.where(reference > SMALLEST_SHARE).max(["response", "term"])
         seconds = made_s + design.trials * each_s + time.perf_counter() - begin
         errors = {f"largest error, {load}": largest.sel(load=load).item() for load in LOADS}

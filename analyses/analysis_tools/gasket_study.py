@@ -6,25 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from wm_drake.model.build import build_machine
-from wm_drake.parameters import (
-    GASKET_FACTORS,
-    MachineParameters,
-    at_levels,
-    levels_of,
-    load_factors,
-)
-from wm_drake.simulation.cases import Case
-from wm_drake.studies.doe.design import make_design
-from wm_drake.studies.experiment import Experiment
+import wm_drake as wm
+from wm_drake.parameters import MachineParameters
 from wm_drake.studies.gasket.screening import (
     is_main,
     leaders,
     mean_difference,
-    run_screening,
     sign_differs,
 )
-from wm_drake.studies.gasket.study import GasketTrials
 
 ORTHOGONAL = 243
 """Trials of the orthogonal array; a study of fewer trials has a D-optimal design."""
@@ -47,14 +36,10 @@ def screening_of(
         tables: How a level changes a stiffness table; "linear" as in [B].
         loads: Names of the loads.
     """
-    levels = levels_of(machine, load_factors(GASKET_FACTORS), tables)
+    factors = wm.factors(machine, tables=tables)
     kind = "orthogonal" if trials >= ORTHOGONAL else "d-optimal"
-    design = make_design(kind, tuple(level.name for level in levels), trials=trials)
-    middle = at_levels(machine, levels, [0] * len(levels))
-    cases = [Case(name, machine.loads[name], machine.profile) for name in loads]
-    study = GasketTrials(middle, levels, cases, ["D", "F", "M"])
-    experiment = Experiment(build_machine(middle), study.measures, loads=tuple(cases))
-    return run_screening(design, lambda plan: study.responses(plan, experiment))
+    design = wm.make_design(kind, factors.names, trials=trials)
+    return wm.anova(wm.run_trials(factors, design, loads, ["D", "F", "M"])).table
 
 
 @dataclass(frozen=True)

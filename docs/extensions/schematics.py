@@ -5,8 +5,10 @@ a machine file, and the links and joints of its SDF.
 """
 
 import functools
+import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,7 +22,9 @@ from wm_drake.model.bodies import sdf_path
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.damper_laws import DAMPER_LAWS
 from wm_drake.parameters.elements import BushingType
-from wm_drake.rigs import JIG_ARM
+from wm_drake.report.drawing import matplotlib_of
+from wm_drake.rigs import JIG_ARM, damper_bench
+from wm_drake.studies.rig.section import section_plots
 
 Place = tuple[float, float] | np.ndarray
 ZIGZAG = [(x, 0.16 * (-1) ** k) for k, x in enumerate(np.linspace(-0.37, 0.37, 8))]
@@ -125,6 +129,14 @@ def damper_parts() -> Figure:
     return figure
 
 
+@picture("damper-section", "Cross-section of the damper of the machine free_stroke")
+def damper_section() -> Figure:
+    """Draw the cross-section of the free-stroke damper, from its numbers."""
+    (damper, *_) = wm.load_machine("free_stroke").damper_types.values()
+    (plot,) = section_plots(damper_bench(damper))
+    return matplotlib_of(plot.figure)
+
+
 @picture("bushing-parts", "Springs, dashpots and friction of a bushing along and about three axes")
 def bushing_parts() -> Figure:
     """Draw the parts of a bushing, from its fields."""
@@ -174,6 +186,42 @@ def benches() -> Figure:
         axes.set(xlim=(-0.5, 6.2), ylim=(-1.3, 2.0))
         axes.set_title(title, fontsize=9)
     return figure
+
+
+HOW_TO = Path(__file__).parents[1] / "how-to" / "bench-to-machine.md"
+FLOW = {
+    "Measure force loops": "displacement and force of the driven end",
+    "Look at the loops of the law": "loops of numbers that you guess",
+    "Find the numbers": "least E = RMSE of [C] (5) within bounds; lack of fit, intervals",
+    "Compare laws": "each test predicted from the others",
+    "Use them in the machine": "identified.yaml extends your machine",
+}
+"""Sections of the page that the flow goes through, and what each of them yields."""
+
+
+@picture("bench-to-machine", "From the bench to the machine: sections of this page and commands")
+def bench_to_machine() -> Figure:
+    """Draw the flow of [C] Fig. 10 with the first command of each section of the page."""
+    figure = Figure(figsize=(9.0, 5.6))
+    (axes,) = _bare(figure, 1, 1)
+    parts = re.split(r"^## (?:\d+\. )?(.+)$", HOW_TO.read_text("utf-8"), flags=re.MULTILINE)
+    texts = dict(zip(parts[1::2], parts[2::2], strict=True))
+    for k, (section, result) in enumerate(FLOW.items()):
+        command = re.search(r"^wm-drake (?!record).*", texts[section], re.MULTILINE)
+        called = f"\n{command[0]}" if command and k else ""
+        text = f"{k + 1}. {section}{called}\n→ {result}"
+        box(axes, (0.0, -2.2 * k), text, "#cfe3f5" if called else "0.92")
+        if k:
+            _arrow(axes, (0.0, -2.2 * k + 1.5), (0.0, -2.2 * k + 0.7))
+    axes.plot([-7.0, -7.6, -7.6], [-6.6, -6.6, -4.4], color="0.3", lw=1.0)
+    _arrow(axes, (-7.6, -4.4), (-4.8, -4.4))
+    axes.text(-7.7, -5.5, "lack of fit:\nanother law", fontsize=8, ha="right", va="center")
+    axes.set(xlim=(-10.2, 6.5), ylim=(-9.8, 0.9))
+    return figure
+
+
+def _arrow(axes: Axes, start: Place, end: Place) -> None:
+    axes.annotate("", end, start, arrowprops={"arrowstyle": "->", "color": "0.3"})
 
 
 JOINTS = {"fixed": "k", "revolute": BLUE, "prismatic": ORANGE}

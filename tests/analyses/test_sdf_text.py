@@ -19,7 +19,7 @@ def changed(machine):
         "bodies.tub.inertia",
         "bodies.tub.mass",
     )
-    parameters = with_sdf_values(machine.plant, machine.parameters, keys)
+    parameters = with_sdf_values(machine.drawn.plant, machine.parameters, keys)
     parameters = with_value(parameters, "frames.sensor_Xr.position", (0.01, 0.02, -0.03))
     parameters = with_value(parameters, "bodies.motor.centre_of_mass", (0.04, 0.05, -0.26))
     parameters = with_value(parameters, "bodies.tub.mass", 10.5)

@@ -109,7 +109,7 @@ def test_face_is_at_the_gap_and_pushes_the_point_away():
     point, foot = np.array([-0.1, 0.02, -0.2]), np.array([-0.25, 0.03, -0.5])
     ends = Ends(point, np.eye(3), foot, np.eye(3))
     placed = STOP.place(ends, Stop.model_validate({**BUFFER, "gap": 0.03, "friction": 0.0}))
-    system = ElementSystem(STOP, placed.packed(), 0)
+    system = ElementSystem(STOP, placed.packed())
     context = system.CreateDefaultContext()
     axis = (point - foot) / np.linalg.norm(point - foot)
 
@@ -128,7 +128,7 @@ def test_face_is_at_the_gap_and_pushes_the_point_away():
 def test_derivatives_are_those_of_differences():
     point, foot = np.array([-0.1, 0.02, -0.2]), np.array([-0.25, 0.03, -0.5])
     placed = STOP.place(Ends(point, np.eye(3), foot, np.eye(3)), Stop.model_validate(BUFFER))
-    system = ElementSystem(STOP, placed.packed(), 0)
+    system = ElementSystem(STOP, placed.packed())
     state = np.array([0.01, -0.02, 0.03, 0.02, 0.0, 0.03, 0.4, 0.1, -0.2, 0.1, -0.3, 0.2, 0.4, 7.0])
     state[3:6] -= 0.2 * (point - foot)  # deep in the buffer
 

@@ -274,15 +274,15 @@ def test_unbalance_that_changes_in_a_run_is_that_of_drake(fmu, machine):
     instance.set([references["unbalance[1].mass"]], [1.5])
     actual = np.array(advanced(instance, references, 200, 200))
 
-    setup = machine.set_up("middle", profile=SpinProfile(time=(0.0, 2.0), speed=(0.0, 10.0)))
+    profile = SpinProfile(time=(0.0, 2.0), speed=(0.0, 10.0))
+    setup = machine.set_up("middle", profile=profile)
     simulator = Simulator(machine.diagram, setup.context)
     configure(simulator)
     simulator.AdvanceTo(1.0)
-    plant, context = machine.plant, setup.plant_context
-    state = plant.GetPositionsAndVelocities(context)
+    state = setup.context.get_continuous_state_vector().CopyToVector()
     heavy = wm.with_value(machine.parameters, "loads.middle.unbalances.0.mass", 1.5)
-    machine.set_up_bodies(heavy.loads["middle"], heavy, setup.context)
-    plant.SetPositionsAndVelocities(context, state)
+    machine.set_up("middle", context=setup.context, parameters=heavy, profile=profile)
+    setup.context.SetContinuousState(state)
     expected = []
     for k in range(200):
         simulator.AdvanceTo(1.0 + 5e-3 * (k + 1))

@@ -171,7 +171,7 @@ def test_derivatives_of_the_system_are_those_of_differences(kind, numbers):
     point, ground = np.array([-0.1, 0.02, -0.2]), np.array([-0.25, 0.03, -0.5])
     ends = Ends(point, np.eye(3), ground, np.eye(3))
     placed = kind.place(ends, kind.parameters.model_validate(numbers))
-    system = ElementSystem(kind, placed.packed(), placed.state_size)
+    system = ElementSystem(kind, placed.packed(), np.zeros(placed.state_size))
     rng = np.random.default_rng(1)
     state = rng.uniform(-0.2, 0.2, 14 + placed.state_size)
 

@@ -68,7 +68,7 @@ def test_both_engines_agree_at_random_states(name):
 def law_at(state, motion, ring):
     """Return generalized force and rates of a ring alone from the state of tub and drum (14)."""
     placed = BALL_RING.place(PLACE, BallRing.model_validate(ring))
-    system = ElementSystem(placed.kind, placed.packed(), placed.state_size)
+    system = ElementSystem(placed.kind, placed.packed(), np.zeros(placed.state_size))
     context = system.CreateDefaultContext()
     system.GetInputPort("plant_state").FixValue(context, motion)
     context.SetContinuousState(state)
@@ -129,7 +129,10 @@ def test_power_and_momentum_balance(balls):
 
 def test_derivatives_of_the_system_are_those_of_differences():
     placed = BALL_RING.place(PLACE, BallRing.model_validate({**RING, "balls": 2}))
-    system, rng = ElementSystem(placed.kind, placed.packed(), 14), np.random.default_rng(1)
+    system, rng = (
+        ElementSystem(placed.kind, placed.packed(), np.zeros(14)),
+        np.random.default_rng(1),
+    )
     sizes = np.array([0.2] * 3 + [0.05] * 3 + [2.0] + [0.5] * 6 + [20.0])
     state = np.concatenate([sizes * rng.uniform(-1.0, 1.0, 14), moved(2, rng)])
 

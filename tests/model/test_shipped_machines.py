@@ -149,6 +149,7 @@ def test_oscillating_mass_is_that_of_the_sdf(washing_machine, built, sdf):
         for name, override in machine.bodies.items()
         if override.mass is not None
     }
+    masses |= {f"liquid at {part.y}": part.mass for part in machine.masses_on_drum}
     assert oscillating_mass(built.set_up()) == pytest.approx(sum(masses.values()))
     assert 20.0 < sum(masses.values()) < 100.0
 

@@ -293,7 +293,7 @@ def test_the_dampers_system_under_drakes_integrator_gives_the_loop_of_the_bench(
     )
     state = builder.AddSystem(Multiplexer([7, 7]))
     system = builder.AddSystem(
-        ElementSystem(parameters.kind, parameters.packed(), parameters.state_size)
+        ElementSystem(parameters.kind, parameters.packed(), np.zeros(parameters.state_size))
     )
     builder.Connect(sine.get_output_port(0), state.get_input_port(0))
     builder.Connect(sine.get_output_port(1), state.get_input_port(1))

@@ -135,7 +135,7 @@ class Element:
 
     def system(self, packed=None):
         packed = self.packed if packed is None else packed
-        return ElementSystem(self.kind, packed, len(self.state))
+        return ElementSystem(self.kind, packed, self.state)
 
 
 ELEMENTS = {
@@ -187,7 +187,7 @@ def line_of(damper, x):
 )  # fmt: skip
 def test_a_damper_without_sponge_resists_its_elongation_rate(name, full_force, transition):
     placed = damper_parameters(DAMPERS[name], EndBushing())
-    damper = ElementSystem(FRICTION_DAMPER_STRUT, placed.packed(), 0)
+    damper = ElementSystem(FRICTION_DAMPER_STRUT, placed.packed())
     for x in random_plant_states(10, seed=22):
         arm, e, _, rate, _, _ = line_of(placed, x)
         tension = 20.0 * rate + full_force * transition(rate / 0.2)  # N
@@ -204,7 +204,7 @@ def test_end_bushings_bend_back_a_strut_and_their_moments_are_balanced(damper):
     placed = damper_parameters(damper)
     state = [0.0] * int(placed.has_sponge)
     bent, free = (
-        ElementSystem(FRICTION_DAMPER_STRUT, p.packed(), len(state))
+        ElementSystem(FRICTION_DAMPER_STRUT, p.packed(), state)
         for p in (placed, damper_parameters(damper, EndBushing()))
     )
     axis = placed.p_ToA_T - placed.p_WH
@@ -381,7 +381,7 @@ def test_a_disengaged_element_exerts_nothing_at_all(damper):
             damper, EndBushing(), engaged=0.0
         )  # its end bushings would act on
         state = [2e-3] if placed.has_sponge else []  # m
-        system = ElementSystem(FRICTION_DAMPER_STRUT, placed.packed(), int(placed.has_sponge))
+        system = ElementSystem(FRICTION_DAMPER_STRUT, placed.packed(), np.zeros(placed.state_size))
     context = context_of(system, random_plant_states(1, seed=32)[0], state)
     assert not np.any(port(system, context, "generalized_force"))
     assert not np.any(own_outputs(system, context))

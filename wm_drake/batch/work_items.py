@@ -179,11 +179,12 @@ class Preparation:
 
     def _bodies(self, parameters: MachineParameters, load: Load | None) -> FloatArray:
         """Return the packed bodies, which cases with the same bodies, drive and load share."""
-        drawn = parameters.bodies, parameters.frames, parameters.drive  # which has the rotor
+        rotor, masses = parameters.drive, parameters.masses_on_drum
+        drawn = parameters.bodies, parameters.frames, rotor, masses
         if not self._drawn or self._drawn[0][0] != drawn:
-            self._context = self.machine.set_up_bodies(None, parameters, self._context)
-            plant_context = self.machine.plant.GetMyContextFromRoot(self._context)
-            bodies = DrawnBodies(self.machine.plant, plant_context, parameters.drive.joint)
+            machine = self.machine.drawn
+            context = machine.bodies(None, parameters)
+            bodies = DrawnBodies(machine.plant, context, parameters.drive.joint)
             self._drawn[:] = [(drawn, bodies)]
             self._known_bodies.clear()
         imbalance = parameters.imperfections.residual_imbalance

@@ -25,7 +25,7 @@ class NewOptions(OptionModel):
         "", "Centre of mass of the tub with all that is fixed to it. Default: the origin.", "VALUE"
     )
     springs: str = option("", "Number of springs, 2 to 4. Default: 2.", "N")
-    dampers: str = option("", "Number of dampers, 2 to 4. Default: 2.", "N")
+    dampers: str = option("", "Number of dampers, 2 to 4; a third is at the rear. Default: 2.", "N")
     spring_rate: str = option("", "Rate of one spring. Default: for 2.5 Hz vertically.", "VALUE")
     friction: str = option("", "Friction force of one damper. Default: 80 N in all.", "VALUE")
     gasket_stiffness: str = option("", "Stiffness of the door gasket. Default: 2 N/mm.", "VALUE")

@@ -1,19 +1,21 @@
-"""Liquid balancer: a partly filled ring on the drum, whose liquid is pushed aside by a whirl.
+"""A liquid balancer: a partly filled ring on the drum, whose liquid is pushed aside by a whirl.
 
 Above the critical speeds the liquid gathers opposite to the unbalance, below them beside it. Own
-derivation; `docs/theory/liquid-ring.md` shows it. The liquid turns at w; in the field w^2 r of a
-whirl whose centre is at the distance e from the axis, its surface is a circle about that centre.
-Its centre of mass is then at q(e) from the axis: linear as long as liquid covers the outer wall and
-leaves the inner one, then saturating. The liquid is a particle of mass m at q in T, with the axis a
-of the drum, at the velocity v in W:
+derivation; `docs/theory/liquid-ring.md` shows it: the first-order motion of an inviscid layer that
+turns at w, for forces of any direction and frequency. With L = R^2/r_s^2 the liquid of mass M acts
+as a rigid mass M L/(L + 1) on the axis of the drum (`mass_on_drum`), and a particle of mass
+m = M/(L + 1) at s from the axis. The centre of mass of the liquid is at q = s/(L + 1):
 
-    F = -(m w^2 (q + e(q)) + N) n - c s - (k y + b u.a) a,    m v' = F + m g
-    c = m ((R^2/r_s^2 - 1) tau w^2 + c_0)
-    I w' = I (W - w)/tau + 2 m w (q + e) q'
+    F = -(m w^2 (s + e(q)) + N) n + m (4 L/(L + 1)) w a x s' - m d/tau - (k y + b u.a) a
+    m v' = F + m g
+    I w' = I (W - w)/tau + m w (2 (s + e) - 4 L/(L + 1) s) n.s'
 
-n: direction of q; N: wall that holds a pool (`wm_drake.laws.stop`); s: velocity against the drum;
-y, u: place and velocity in T along the axis; R, r_s: outer radius and that of the surface at e = 0;
-W: rate of the drum. -F acts on the drum where the particle is, beside it -I (W - w)/tau about the
+n: direction of s; e(q): distance of the centre of a forward whirl whose field holds the liquid at
+q, (L - 1) q as long as liquid covers the outer wall and leaves the inner one; N: wall that holds a
+pool (`wm_drake.laws.stop`); s': velocity seen from a frame that turns at w; d: velocity against the
+drum; a: axis; y, u: place and velocity in T along the axis; R, r_s: radii of the outer wall and of
+the surface at rest in the drum; W: rate of the drum. Pressure acts through the axis of the drum,
+the drag -m d/tau where the particle is. -F acts on the drum, beside it -I (W - w)/tau about the
 axis and the gyroscopic moment of I w.
 """
 
@@ -49,8 +51,6 @@ WALL_DAMPING = 0.5
 """Damping ratio along the axis, in which the liquid cannot move; own choice."""
 WALL_LOSS = 1.0
 """Loss of the wall that holds a pool, as in `wm_drake.laws.stop`; own choice. [s/m]"""
-SLOSH_DAMPING = 0.05
-"""Damping ratio of a pool that swings in a ring at rest; own choice."""
 SMALLEST = 1e-9
 """Distance from the axis below which the direction of the liquid fades out. [m]"""
 
@@ -61,19 +61,19 @@ NUMBERS = PackedLayout(
     top=VECTOR,
     gravity=VECTOR,
     mass=SCALAR,
+    ratio=SCALAR,
+    coriolis=SCALAR,
     inertia=SCALAR,
     most=SCALAR,
     lag=SCALAR,
-    stiffening=SCALAR,
-    sloshing=SCALAR,
     stiffness=SCALAR,
     dashpot=SCALAR,
     wall=CURVE,
     whirl=CURVE,
 )
 """Centre of the ring from To, axis of the drum and direction to its top at angle 0, in T; gravity
-in W [m/s^2]; m [kg]; I [kg m^2]; largest q [m]; tau [s]; R^2/r_s^2 - 1; c_0 [1/s]; k [N/m],
-b [N s/m]; stiffness of the wall [N/m]; e(q) [m]."""
+in W [m/s^2]; m [kg]; L + 1; 4 L/(L + 1); I [kg m^2]; largest s [m]; tau [s]; k [N/m], b [N s/m];
+stiffness of the wall [N/m]; e(q) over s [m]."""
 read_numbers = NUMBERS.read
 
 
@@ -87,8 +87,8 @@ class LiquidRing(DrumElement):
         width: Width of the chamber along the axis.
         fill: Part of the chamber that is filled.
         density: Density of the liquid.
-        lag: Time constant with which the liquid follows the centrifugal field and the speed of the
-            drum.
+        lag: Time constant of the drag of baffles and walls on liquid that moves against the drum.
+            Walls alone give 1 to 4 s; for baffles nothing is published.
         wall_frequency: Natural frequency of the liquid along the axis, and of a pool on the wall.
             The mass that moves along the axis is too large by the square of spin speed over this
             frequency.
@@ -130,9 +130,28 @@ class LiquidRing(DrumElement):
     def closes_from(self) -> float:
         """Return the speed from which gravity of 9.81 m/s^2 leaves liquid all around. [rad/s]
 
-        W^2 = g (R + r_s) / R^2, without lag: there the surface touches the top of the outer wall.
+        W^2 = g (R + r_s) / (2 R^2), without drag: there the surface, which gravity moves down by
+        g (L - 1)/(2 L W^2), touches the bottom of the outer wall.
         """
-        return float(np.sqrt(9.81 * (self.outer_radius + self.surface_radius)) / self.outer_radius)
+        return float(
+            np.sqrt(0.5 * 9.81 * (self.outer_radius + self.surface_radius)) / self.outer_radius
+        )
+
+    @property
+    def is_full(self) -> bool:
+        """Return whether the liquid has no room to move, and is plain mass."""
+        largest = LARGEST_WHIRL * self.outer_radius
+        return float(self.offsets(np.array([largest]))[0]) < FULL * self.outer_radius
+
+    @property
+    def ratio(self) -> float:
+        """Return s/q = L + 1, the whole mass over that of the particle; 1 for a full ring."""
+        return 1.0 if self.is_full else (self.outer_radius / self.surface_radius) ** 2 + 1.0
+
+    @property
+    def mass_on_drum(self) -> float:
+        """Return the part of the mass that moves with the axis of the drum. [kg]"""
+        return self.mass * (1.0 - 1.0 / self.ratio)
 
     def offsets(self, whirl: FloatArray) -> FloatArray:
         """Return q, the distance of the centre of mass from the axis, for e > 0. (n,) [m]"""
@@ -179,46 +198,54 @@ def liquid_ring(motion, state, p, at):
 
     Args:
         motion: `DrumMotion`.
-        state: Place from the centre of the ring in T [m], velocity in W [m/s], spin w [rad/s].
+        state: Place q of the centre of mass of the liquid from the centre of the ring, in T [m];
+            velocity of the particle in W [m/s]; spin w [rad/s].
         p, at: Packed numbers.
     """
     numbers = read_numbers(p, at)
     axis, mass, spin = numbers.axis, numbers.mass, state.spin
-    place = (state.place_x, state.place_y, state.place_z)
+    place = scale(numbers.ratio, (state.place_x, state.place_y, state.place_z))
     velocity = (state.velocity_x, state.velocity_y, state.velocity_z)
     w = rotate_back(motion.rotation, motion.angular_velocity)
-    arm = add(numbers.centre, place)
-    rate = rate_in_tub(motion, arm, velocity)
-    along, pushed = dot(place, axis), dot(rate, axis)
+    rate = rate_in_tub(motion, add(numbers.centre, place), velocity)
+    along, pushed, turning = dot(place, axis), dot(rate, axis), dot(w, axis)
     across = subtract(place, scale(along, axis))
-    q = sqrt(dot(across, across) + SMALLEST * SMALLEST)
-    outward = scale(1.0 / q, across)
-    reach, growth = q + stiffness_force(q, *numbers.whirl), dot(rate, outward)
-    wall = stop_force(q - numbers.most, growth, WALL_LOSS, numbers.wall)
-    pull = mass * spin * spin * reach + wall
-    guide = numbers.stiffness * along + numbers.dashpot * pushed
-    slip = subtract(rate, add(scale(pushed, axis), scale(motion.drum_rate, cross(axis, place))))
-    drag = mass * (numbers.stiffening * numbers.lag * spin * spin + numbers.sloshing)
-    on_drum = add(add(scale(pull, outward), scale(guide, axis)), scale(drag, slip))
-    spinning_up = (motion.drum_rate + dot(w, axis) - spin) / numbers.lag
-    spin_rate = spinning_up + 2.0 * mass / numbers.inertia * spin * reach * growth
-    twist = dot(axis, cross(place, on_drum)) - numbers.inertia * spinning_up
+    s = sqrt(dot(across, across) + SMALLEST * SMALLEST)
+    outward, ahead = scale(1.0 / s, across), cross(axis, place)
+    reach, growth = s + stiffness_force(s, *numbers.whirl), dot(rate, outward)
+    wall = stop_force(s - numbers.most, growth, WALL_LOSS, numbers.wall)
+    in_plane = subtract(rate, scale(pushed, axis))
+    flow = subtract(in_plane, scale(spin - turning, ahead))
+    drag = scale(mass / numbers.lag, subtract(in_plane, scale(motion.drum_rate, ahead)))
+    guide = scale(numbers.stiffness * along + numbers.dashpot * pushed, axis)
+    pressure = subtract(
+        scale(mass * spin * spin * reach + wall, outward),
+        scale(mass * numbers.coriolis * spin, cross(axis, flow)),
+    )
+    on_drum = add(add(pressure, guide), drag)
+    spinning_up = (motion.drum_rate + turning - spin) / numbers.lag
+    excess = 2.0 * reach - numbers.coriolis * s
+    spin_rate = spinning_up + mass / numbers.inertia * spin * excess * growth
+    dragged = cross(across, add(drag, guide))
+    twist = dot(axis, dragged) - numbers.inertia * spinning_up
     gyroscopic = scale(-numbers.inertia * spin, cross(w, axis))
-    moment = add(cross(arm, on_drum), scale(-numbers.inertia * spinning_up, axis))
+    moment = add(cross(add(numbers.centre, scale(along, axis)), on_drum), dragged)
+    moment = add(moment, scale(-numbers.inertia * spinning_up, axis))
     m, f = rotate(motion.rotation, add(moment, gyroscopic)), rotate(motion.rotation, on_drum)
     a = subtract(numbers.gravity, scale(1.0 / mass, f))
     up, side = seen_from_drum(motion, axis, numbers.top, across)
     return (
         (m[0], m[1], m[2], f[0], f[1], f[2], twist),
         (mass * side, 0.0 * up, mass * up, spin),
-        (rate[0], rate[1], rate[2], a[0], a[1], a[2], spin_rate),
+        (*scale(1.0 / numbers.ratio, rate), a[0], a[1], a[2], spin_rate),
     )
 
 
 def numbers_of(parameters: LiquidRing, ends: DrumPlace) -> dict[str, Any]:
     """Return the packed numbers by name."""
-    mass, outer = parameters.mass, parameters.outer_radius
-    surface, frequency = parameters.surface_radius, parameters.wall_frequency
+    mass = parameters.mass - parameters.mass_on_drum
+    outer, surface = parameters.outer_radius, parameters.surface_radius
+    frequency, ratio = parameters.wall_frequency, parameters.ratio
     most, whirl = _whirl_curve(parameters)
     return {
         "centre": ends.tub_point,
@@ -226,11 +253,11 @@ def numbers_of(parameters: LiquidRing, ends: DrumPlace) -> dict[str, Any]:
         "top": ends.tub_rotation[:, 2],
         "gravity": ends.gravity,
         "mass": mass,
-        "inertia": 0.5 * mass * (outer**2 + surface**2),
-        "most": most,
+        "ratio": ratio,
+        "coriolis": 4.0 * (ratio - 1.0) / ratio,
+        "inertia": 0.5 * parameters.mass * (outer**2 + surface**2),
+        "most": ratio * most,
         "lag": parameters.lag,
-        "stiffening": (outer / surface) ** 2 - 1.0 if most else 1.0,
-        "sloshing": 2.0 * SLOSH_DAMPING * np.sqrt(np.linalg.norm(ends.gravity) / outer),
         "stiffness": mass * frequency**2,
         "dashpot": 2.0 * WALL_DAMPING * mass * frequency,
         "wall": pack_number(mass * frequency**2),
@@ -239,44 +266,43 @@ def numbers_of(parameters: LiquidRing, ends: DrumPlace) -> dict[str, Any]:
 
 
 def _whirl_curve(parameters: LiquidRing) -> tuple[float, FloatArray]:
-    """Return the largest q, 0 for a full ring, and the packed curve e(q). [m]"""
+    """Return the largest q, 0 for a full ring, and the packed curve e(q) over s. [m]"""
     outer, surface = parameters.outer_radius, parameters.surface_radius
     largest = LARGEST_WHIRL * outer
     free = max(min(outer - surface, surface - parameters.inner_radius), 1e-3 * outer)
     whirl = np.concatenate([[0.0, 0.5 * free], np.geomspace(free, largest, POINTS - 2)])
     q = np.concatenate([[0.0], parameters.offsets(whirl[1:])])
     most = float(q[-1])
-    if most < FULL * outer:
+    if parameters.is_full:
         q, most = whirl / STIFF, 0.0
-    cubics = monotone_cubics(q, whirl[:, None])[:, :, 0]
-    (_, a, b, c), h = cubics[:, -1], q[-1] - q[-2]
-    return most, pack_table(q, cubics, a + h * (2.0 * b + h * 3.0 * c))
+    s = parameters.ratio * q
+    cubics = monotone_cubics(s, whirl[:, None])[:, :, 0]
+    (_, a, b, c), h = cubics[:, -1], s[-1] - s[-2]
+    return most, pack_table(s, cubics, a + h * (2.0 * b + h * 3.0 * c))
 
 
 def placed_ring(ends: DrumPlace, parameters: LiquidRing) -> PlacedElement:
     """Return a ring in its place; at the start its liquid hangs in the field of a steady drum."""
     numbers = numbers_of(parameters, ends)
-    start = functools.partial(_hanging, parameters, numbers["most"], ends.gravity)
+    start = functools.partial(_at_start, parameters, numbers["most"], ends.gravity)
     return PlacedElement(LIQUID_RING, ends, NUMBERS.pack(**numbers), start)
 
 
-def _hanging(
+def _at_start(
     parameters: LiquidRing, most: float, gravity: FloatArray, drum_rate: float
 ) -> FloatArray:
-    """Return the states of a ring whose drum turns at a rate: q + e(q) = g/W^2, no lag. (7,)"""
-    fall, largest = float(np.linalg.norm(gravity)), LARGEST_WHIRL * parameters.outer_radius
+    """Return the states of a ring whose drum turns at a rate, without drag. (7,)
+
+    A ring that is closed has its liquid above the axis, at q = -g/(2 L W^2); else it is a pool at
+    the bottom.
+    """
+    fall, ratio = float(np.linalg.norm(gravity)), parameters.ratio
     state = np.zeros(7)
     state[6] = drum_rate
     if most and fall:
-        distance = most
-        if fall < (most + largest) * drum_rate**2:
-
-            def excess(e: float) -> float:
-                return float(parameters.offsets(np.array([e]))[0]) + e - fall / drum_rate**2
-
-            e = brentq(excess, 1e-12, largest)
-            distance = float(parameters.offsets(np.array([e]))[0])
-        state[:3] = distance * gravity / fall
+        closed = drum_rate >= parameters.closes_from
+        lift = -fall / (2.0 * (ratio - 1.0) * drum_rate**2) if closed else most / ratio
+        state[:3] = lift * gravity / fall
     return state
 
 

@@ -52,9 +52,10 @@ class Contents:
         self.machine, self.move, self.profile, self.depths = machine, move, profile, depths
         self.context = machine.diagram.CreateDefaultContext()
         self.setup = self.set_up({})
-        drawn = machine.set_up_bodies(None, machine.parameters)
-        self.drawn = machine.plant.GetMyContextFromRoot(drawn)
-        self.bodies = DrawnBodies(machine.plant, self.drawn, self.setup.parameters.drive.joint)
+        self.drawn = machine.drawn.bodies(None, machine.parameters)
+        self.bodies = DrawnBodies(
+            machine.drawn.plant, self.drawn, self.setup.parameters.drive.joint
+        )
         self.packed, self.layout = pack(self.setup)
         parameters = self.setup.parameters
         self.period = profile.sample_period(parameters.output_period)
@@ -155,7 +156,7 @@ class Contents:
 
     def body_constants(self, name: str) -> FloatArray | None:
         """Return the constants of a body that may change; None if it is in neither group."""
-        plant, context = self.machine.plant, self.drawn
+        plant, context = self.machine.drawn.plant, self.drawn
         tub, drum = plant.GetBodyByName("tub"), self._drum_joint.child_body()
         body = plant.GetBodyByName(name)
         groups = [{b.index() for b in plant.GetBodiesWeldedTo(of)} for of in (tub, drum)]
@@ -176,7 +177,7 @@ class Contents:
 
     @property
     def _drum_joint(self) -> Any:
-        return drum_joint(self.machine.plant, self.setup.parameters.drive.joint)
+        return drum_joint(self.machine.drawn.plant, self.setup.parameters.drive.joint)
 
     def of_load(self, load: Load) -> FloatArray:
         """Return what a load adds to the harmonics of the drum beside its point masses."""

@@ -72,7 +72,7 @@ class OpenMachine:
     def sliders(self) -> Mapping[str, Slider]:
         """Return a slider for each number that can be moved, by key path; also for the SDF's."""
         if not self._sliders:
-            plant, parts = self.machine.plant, ("mass", "centre_of_mass")
+            plant, parts = self.machine.drawn.plant, ("mass", "centre_of_mass")
             names = sdf_names(plant)
             keys = [f"bodies.{link}.{part}" for link in names.links for part in parts]
             keys += [f"frames.{name}" for name in names.movable_frames]
@@ -150,7 +150,7 @@ class OpenMachine:
 
     def moved_by(self, parameters: MachineParameters, key: str, step: float) -> MachineParameters:
         """Return parameters with one number changed by a step in SI units."""
-        with_sdf = with_sdf_values(self.machine.plant, parameters, [key])
+        with_sdf = with_sdf_values(self.machine.drawn.plant, parameters, [key])
         number = number_at(with_sdf, key)
         assert number.nominal is not None  # the values of the SDF are in these parameters
         return with_values(with_sdf, {key: number.at(number.nominal + step)})
@@ -163,7 +163,7 @@ class OpenMachine:
                     key=key,
                 )
         given = {key: self._value(key, text) for key, text in values.items()}
-        return with_values(with_sdf_values(self.machine.plant, parameters, given), given)
+        return with_values(with_sdf_values(self.machine.drawn.plant, parameters, given), given)
 
     def _value(self, key: str, text: str) -> str | float | CurveTable:
         """Return what a text sets: itself, the number of an entry, or a scaled curve."""
@@ -259,7 +259,7 @@ def _rings(parameters: MachineParameters) -> list[dict[str, object]]:
 
 def drum_of(setup: Setup) -> dict[str, object]:
     """Return origin and axes, as columns of a matrix, of the drum at angle 0, in T. [m]"""
-    poses = setup.machine.cache.frame_poses(setup.machine.plant, setup.parameters)
+    poses = setup.machine.cache.frame_poses(setup.machine.drawn.plant, setup.parameters)
     origin, axes = poses.on_drum(0.0)
     return {"origin": origin.tolist(), "axes": axes.tolist()}
 

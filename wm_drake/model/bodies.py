@@ -209,6 +209,11 @@ def axis_pose(plant: MultibodyPlant) -> RigidTransform:
     return pose
 
 
+def share_axis_pose(plant: MultibodyPlant, copy: MultibodyPlant) -> None:
+    """Make the `axis_pose` of a plant that of its copy, which by default is not as drawn."""
+    _AXIS_POSES[copy] = axis_pose(plant)
+
+
 def _axis_pose(plant: MultibodyPlant) -> RigidTransform:
     joint = plant.get_joint_actuator(plant.GetJointActuatorIndices()[0]).joint()
     if not isinstance(joint, RevoluteJoint):
@@ -439,6 +444,8 @@ def set_bodies(plant: MultibodyPlant, context: Any, parameters: MachineParameter
         frame.SetPoseInParentFrame(context, RigidTransform(rotation, frame_override.position))
     if drive := motor_of(parameters.drive):
         set_rotor(plant, context, drive)
+    if masses := parameters.masses_on_drum:
+        add_load(plant, context, Load(unbalances=masses))
 
 
 def add_load(plant: MultibodyPlant, context: Any, load: Load) -> None:

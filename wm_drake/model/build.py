@@ -1,24 +1,24 @@
 """Add a machine to a diagram, or build a diagram of it alone."""
 
+from enum import Enum
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn, TypeAlias, TypeVar
 
 import numpy as np
 from pydrake.geometry import Meshcat
-from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder, InputPort, OutputPort
 
-from wm_drake.elements.cabinet import FEET, FEET_SIZE, SLIP_SIZE
+from wm_drake.elements.cabinet import FEET, SLIP_SIZE
 from wm_drake.elements.motor import DRUM_FRICTION, packed_controller, packed_friction, packed_limit
+from wm_drake.elements.water import packed_water
 from wm_drake.errors import input_error
-from wm_drake.model.bodies import add_bodies
-from wm_drake.model.frame_poses import FramePoses, measured_points, tub_points
+from wm_drake.model.drawn_machine import DrawnMachine, RestingMachine
 from wm_drake.model.machine import Machine, MachineSystems, MotorSystems
-from wm_drake.model.placed_elements import PlacedElements, placed_elements
-from wm_drake.model.state_layout import state_layout_of
+from wm_drake.model.placed_elements import Parts, PlacedElements, initial_state
+from wm_drake.model.plant_copy import plant_at
 from wm_drake.model.visualization import add_visualizer
 from wm_drake.model.wiring import Link, Wiring
-from wm_drake.parameters import MachineParameters, MotorDrive, load_machine
+from wm_drake.parameters import Load, MachineParameters, MotorDrive, load_machine
 from wm_drake.parameters.drive import motor_of
 from wm_drake.systems.cabinet import Cabinet
 from wm_drake.systems.element_system import ElementSystem
@@ -29,25 +29,43 @@ from wm_drake.systems.spin_profile_source import SpinProfileSource
 from wm_drake.systems.tub_force import TubForce
 from wm_drake.systems.water import Water
 
+
+class Loads(Enum):
+    """A load that is named by its place in the machine file."""
+
+    FIRST = "the first load of the machine"
+
+
 AnyMachine: TypeAlias = Machine | MachineParameters | str | Path
 """A built machine, parameters, the name of a shipped machine, or a machine file."""
 
 
 def add_washing_machine(
-    builder: DiagramBuilder, parameters: MachineParameters, *, name: str = ""
+    builder: DiagramBuilder,
+    parameters: MachineParameters | str | Path,
+    *,
+    load: Load | str | Loads | None = Loads.FIRST,
+    gasket: bool = True,
+    name: str = "",
 ) -> MachineSystems:
     """Add a washing machine to a diagram.
 
-    Connect your own systems to the ports of the result, build the diagram, and call `set_up` with a
-    Context of it.
+    Connect your own systems to the ports of the result and build the diagram. In its default
+    Context the machine is at rest with its load; `set_up` changes numbers and load in a Context.
+    A default Context has no velocities: with a spin profile that starts above 0 rpm a Simulator
+    refuses it, and `set_up` is needed.
 
     Args:
         builder: Any DiagramBuilder.
-        parameters: The machine.
+        parameters: The machine, the name of a shipped one, or a machine file.
+        load: Point masses in the drum, or the name of one of the machine's loads, by default the
+            first; None for the empty machine.
+        gasket: False disengages it.
         name: Prefix of the names of its systems, for several machines in one diagram.
 
     Raises:
-        InputError: the SDF or the machine file has an error.
+        InputError: the SDF or the machine file has an error, there is no such load, or there is no
+            equilibrium.
 
     Example:
         >>> import wm_drake as wm
@@ -57,23 +75,28 @@ def add_washing_machine(
         >>> sorted(washer.inputs)
         ['drum_acceleration', 'tub_force']
     """
-    prefix = f"{name}_" if name else ""
-    plant = builder.AddNamedSystem(f"{prefix}bodies", MultibodyPlant(time_step=0.0))
-    add_bodies(plant, parameters)
-    layout = state_layout_of(plant, parameters)
-    poses = FramePoses(plant, parameters)
-    placed = placed_elements(plant, poses, parameters)
-    points = measured_points(tub_points(poses, parameters), np.zeros(6))
+    if not isinstance(parameters, MachineParameters):
+        parameters = load_machine(parameters)
+    if load is Loads.FIRST:
+        load = next(iter(parameters.loads.values()), None)
+    drawn, prefix = DrawnMachine(parameters), f"{name}_" if name else ""
+    resting = drawn.at_rest(load, parameters, Parts(gasket))
+    assert resting.bodies is not None  # they are asked for
+    plant = builder.AddNamedSystem(f"{prefix}bodies", plant_at(drawn.plant, resting.bodies))
+    layout, placed = drawn.state_layout, resting.elements
     wiring = Wiring(builder, plant, layout, prefix)
-    by_label, on_tub, links = _element_systems(placed)
+    by_label, on_tub, links = _element_systems(placed, parameters.profile.speed[0])
     drive = motor_of(parameters.drive)
     friction = ElementSystem(DRUM_FRICTION, packed_friction(drive)) if drive else None
-    tub_force, sensors = TubForce(), Sensors(points)
+    tub_force, sensors = TubForce(), Sensors(resting.measured_points)
     others = [("tub_force", tub_force), *([("drum_friction", friction)] if friction else [])]
     tub_state = wiring.tub_state()
     cabinet, feet, seen = None, None, tub_state
-    if parameters.cabinet_moves:
-        cabinet, feet = Cabinet(), ElementSystem(FEET, np.zeros(FEET_SIZE), SLIP_SIZE)
+    if resting.cabinet is not None:
+        cabinet, feet = (
+            Cabinet(),
+            ElementSystem(FEET, resting.cabinet.packed(), np.zeros(SLIP_SIZE)),
+        )
         on_cabinet = Link("cabinet", cabinet, len(layout.trees) - 1)
         wiring.connect_elements(tub_state, others, [*links, on_cabinet])
         seen = wiring.connect_cabinet(cabinet, on_tub, feet)
@@ -85,12 +108,12 @@ def add_washing_machine(
     if drive and friction:
         motor, driven = _add_motor(wiring, drive, profile, sensors, friction)
     else:
-        source, driven = _add_speed_source(wiring, profile)
+        source, driven = _add_speed_source(wiring, profile, sensors)
     outputs = {"state": plant.get_state_output_port()}
     for port in ("displacement", "detergent_displacement", *DRUM_OUTPUTS):
         outputs[port] = sensors.GetOutputPort(port)
     outputs |= driven.outputs
-    water = _add_water(wiring, parameters, sensors)
+    water = _add_water(wiring, resting, sensors)
     if water:
         outputs["water_left"] = water.GetOutputPort("left")
     if feet:
@@ -101,7 +124,7 @@ def add_washing_machine(
     return MachineSystems(
         parameters=parameters,
         plant=plant,
-        state_layout=layout,
+        drawn=drawn,
         spin_profile=profile,
         speed_source=source,
         motor=motor,
@@ -116,29 +139,36 @@ def add_washing_machine(
 
 
 def build_machine(
-    parameters: MachineParameters | str | Path, *, meshcat: Meshcat | None = None
+    parameters: MachineParameters | str | Path,
+    *,
+    load: Load | str | Loads | None = Loads.FIRST,
+    gasket: bool = True,
+    meshcat: Meshcat | None = None,
 ) -> Machine:
     """Build the diagram of a machine alone, with its named ports exported.
 
+    In its default Context the machine is at rest with its load, so that a plain Simulator runs it.
     Build once and reuse: every number can be changed afterwards in a Context (`Machine.set_up`).
 
     Args:
         parameters: The machine, the name of a shipped one, or a machine file.
+        load, gasket: As in `add_washing_machine`.
         meshcat: Shows the moving machine if given; the shapes cannot touch the dynamics.
 
     Raises:
-        InputError: the SDF or the machine file has an error.
+        InputError: as `add_washing_machine`.
 
     Example:
         >>> import wm_drake as wm
-        >>> machine = wm.build_machine("reference")
+        >>> from pydrake.systems.analysis import Simulator
+        >>> machine = wm.build_machine("reference", load="counter")
+        >>> simulator = Simulator(machine.diagram)
+        >>> simulator.Initialize()
         >>> sorted(machine.springs)
         ['left', 'rear', 'right']
     """
-    if not isinstance(parameters, MachineParameters):
-        parameters = load_machine(parameters)
     builder = DiagramBuilder()
-    systems = add_washing_machine(builder, parameters)
+    systems = add_washing_machine(builder, parameters, load=load, gasket=gasket)
     if meshcat is not None:
         add_visualizer(builder, systems, meshcat)
     for name, port in systems.inputs.items():
@@ -146,7 +176,7 @@ def build_machine(
     for name, port in systems.outputs.items():
         builder.ExportOutput(port, name)
     diagram = builder.Build()
-    diagram.set_name(parameters.name)
+    diagram.set_name(systems.parameters.name)
     return Machine(**vars(systems), diagram=diagram)
 
 
@@ -156,12 +186,17 @@ def machine_of(machine: AnyMachine) -> Machine:
 
 
 def _element_systems(
-    placed: PlacedElements,
+    placed: PlacedElements, drum_rate: float
 ) -> tuple[dict[str, ElementSystem], list[tuple[str, Any]], list[Link]]:
-    """Return the systems of all elements by label, those on the tub, and those of tubes."""
+    """Return the systems of all elements by label, those on the tub, and those of tubes.
+
+    Args:
+        drum_rate: Rate of the drum at the start. [rad/s]
+    """
     by_label, on_tub, links = dict[str, ElementSystem](), list[tuple[str, Any]](), list[Link]()
     for label, element, kind, tree in placed.by_tree():
-        system = by_label[label] = ElementSystem(kind, element.packed(), element.state_size)
+        initial = initial_state(element, drum_rate)
+        system = by_label[label] = ElementSystem(kind, element.packed(), initial)
         if tree:
             links.append(Link(label, system, tree))
         else:
@@ -221,16 +256,19 @@ def _add_motor(
     return MotorSystems(controller, motor, belt, friction), DrivePorts(inputs, outputs)
 
 
-def _add_speed_source(wiring: Wiring, profile: SpinProfileSource) -> tuple[SpeedSource, DrivePorts]:
+def _add_speed_source(
+    wiring: Wiring, profile: SpinProfileSource, sensors: Sensors
+) -> tuple[SpeedSource, DrivePorts]:
     """Add speed source and motor torque, and connect them to the profile and the plant."""
     builder, plant = wiring.builder, wiring.plant
     source = wiring.add("speed_source", SpeedSource())
     size, drum = plant.num_velocities(), wiring.layout.drum
     torque = wiring.add("motor_torque", MotorTorque(size, drum))
     actuation = source.GetOutputPort("actuation")
-    builder.Connect(
-        profile.GetOutputPort("acceleration"), source.GetInputPort("profile_acceleration")
-    )
+    for quantity in ("acceleration", "speed"):
+        port = source.GetInputPort(f"profile_{quantity}")
+        builder.Connect(profile.GetOutputPort(quantity), port)
+    builder.Connect(sensors.GetOutputPort("drum_speed"), source.GetInputPort("drum_speed"))
     builder.Connect(actuation, plant.get_actuation_input_port())
     builder.Connect(actuation, torque.GetInputPort("actuation"))
     builder.Connect(
@@ -241,11 +279,13 @@ def _add_speed_source(wiring: Wiring, profile: SpinProfileSource) -> tuple[Speed
     return source, DrivePorts(inputs, {"motor_torque": torque.GetOutputPort("torque")})
 
 
-def _add_water(wiring: Wiring, parameters: MachineParameters, sensors: Sensors) -> Water | None:
+def _add_water(wiring: Wiring, resting: RestingMachine, sensors: Sensors) -> Water | None:
     """Add the water in the laundry, which leaves with the drum speed; None if no load is wet."""
-    if not parameters.most_wet:
+    packed = packed_water(resting.load) if resting.load else []
+    count = max(resting.parameters.most_wet, len(packed))
+    if not count:
         return None
-    water = wiring.add("water", Water(parameters.most_wet))
+    water = wiring.add("water", Water(count, packed))
     speed = sensors.GetOutputPort("drum_speed")
     wiring.builder.Connect(speed, water.GetInputPort("drum_speed"))
     return water

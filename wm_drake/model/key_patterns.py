@@ -29,7 +29,7 @@ def keys_like(machine: Machine, pattern: str) -> tuple[str, ...]:
     form = re.compile(".*".join(map(re.escape, pattern.split(ANY))).replace(".*", "[^.]*"))
     links = sdf_names(machine.plant).links
     of_sdf = [f"bodies.{link}.{part}" for link in links for part in OF_BODIES]
-    full = with_sdf_values(machine.plant, machine.parameters, of_sdf)
+    full = with_sdf_values(machine.drawn.plant, machine.parameters, of_sdf)
     return tuple(dict.fromkeys(key for key in _keys(full) if form.fullmatch(key)))
 
 

@@ -1,32 +1,26 @@
 """The machine in a Drake diagram: its systems and ports, and the numbers set in a Context."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.framework import Context, Diagram, InputPort, OutputPort
 
 from wm_drake.elements.bearing import DrumBearingParameters
 from wm_drake.elements.bushing import SixComponentBushingParameters
-from wm_drake.elements.cabinet import CabinetOnFeet
 from wm_drake.elements.friction_damper import FrictionDamperParameters
 from wm_drake.elements.motor import packed_controller, packed_friction, packed_limit
 from wm_drake.elements.spring import SpringStrutParameters
 from wm_drake.elements.telescopic_damper import TelescopicDamperParameters
 from wm_drake.elements.water import packed_water
-from wm_drake.errors import check_known, input_error
-from wm_drake.model.bodies import add_load, drum_inertia, set_bodies, set_drum
-from wm_drake.model.cabinet import cabinet_at_rest
-from wm_drake.model.equilibrium import force_as_drawn, preloaded, put_to_rest, rest_pose
-from wm_drake.model.frame_poses import FramePoses, TubPoints, measured_points, tub_points
-from wm_drake.model.placed_elements import PlacedElements, placed_elements
-from wm_drake.model.same_elements import check_same_elements
-from wm_drake.model.scene import Scene
+from wm_drake.errors import input_error
+from wm_drake.model.bodies import set_drum
+from wm_drake.model.drawn_machine import DrawnMachine, RestingMachine, SetUpCache
+from wm_drake.model.placed_elements import Parts, PlacedElements
+from wm_drake.model.plant_copy import copy_numbers
 from wm_drake.model.state_layout import StateLayout
-from wm_drake.model.tub_statics import TubStatics, Weight, weight_of
 from wm_drake.parameters import Drive, Load, MachineParameters, MotorDrive, Sensor, SpinProfile
 from wm_drake.parameters.drive import motor_of
 from wm_drake.parameters.types import FloatArray
@@ -39,77 +33,17 @@ from wm_drake.systems.spin_profile_source import SpinProfileSource
 from wm_drake.systems.water import Water
 
 
-class SetUpCache:
-    """Parameters, frame poses and weight of the last set-up, and scenes that no thread uses.
-
-    Threads may share it: each value is replaced as a whole, and a thread that misses computes it.
-
-    Attributes:
-        scenes: Scenes to take from and to give back; many short batches share them.
-    """
-
-    def __init__(self) -> None:
-        """Begin empty."""
-        self.scenes: list[Scene] = []
-        self._poses: FramePoses | None = None
-        self._weight: tuple[Any, Weight] | None = None
-        self._checked: MachineParameters | None = None
-
-    def check(self, built: MachineParameters, requested: MachineParameters) -> None:
-        """Check that a machine has the elements of the built one; see `check_same_elements`."""
-        check_same_elements(built, requested, self._checked)
-        self._checked = requested
-
-    def frame_poses(self, plant: MultibodyPlant, parameters: MachineParameters) -> FramePoses:
-        """Return the frame poses; those of the last set-up if its overrides were the same."""
-        poses = self._poses
-        if poses is None or poses.frames != parameters.frames:
-            poses = self._poses = FramePoses(plant, parameters)
-        return poses
-
-    def weight(self, parameters: MachineParameters, compute: Callable[[], Weight]) -> Weight:
-        """Return the weight on the springs; that of the last set-up if its bodies were the same."""
-        bodies, last = (parameters.bodies, parameters.frames), self._weight
-        if last is None or last[0] != bodies:
-            last = self._weight = bodies, compute()
-        return last[1]
-
-
-@dataclass(frozen=True, repr=False)
-class Setup:
-    """A machine set up in a Context: numbers chosen, preloads solved, at rest at its rest pose.
+@dataclass(frozen=True, repr=False, kw_only=True)
+class Setup(RestingMachine):
+    """A machine at rest, set up in a Context.
 
     Attributes:
-        parameters: The numbers in force.
+        machine: The machine in its diagram.
         context: Root Context of the diagram.
-        elements: The elements at their frames.
-        points: Measured points of the tub.
-        rest_pose: Equilibrium of the empty machine: roll, pitch, yaw, x, y, z. (6,) [rad, m]
-        residual: Moment about To and force on the tub that remain there, in W. (6,) [N m, N]
-        tube_rest: Angles and position of each outer tube and extension of the damper at rest.
-            (telescopic dampers, 7) [rad, m]
-        carrier_rest: Angles and position of the drum carrier at rest with a compliant bearing, else
-            empty. (6,) [rad, m]
-        cabinet: The cabinet on its feet if it moves, else None. Its frame then takes the place of W
-            for the tub; at rest they coincide.
-        measured_points: The measured points as packed numbers, from the function of this name.
-        load: Point masses in the drum; None for the empty machine.
-        drum: Inertia of the drum without load, about Do in D; None if it is not known.
     """
 
     machine: "MachineSystems"
-    parameters: MachineParameters
     context: Context
-    elements: PlacedElements
-    points: TubPoints
-    rest_pose: FloatArray
-    residual: FloatArray
-    tube_rest: FloatArray
-    carrier_rest: FloatArray
-    cabinet: CabinetOnFeet | None
-    measured_points: FloatArray
-    load: Load | None = None
-    drum: SpatialInertia | None = None
 
     def __repr__(self) -> str:
         """Return the machine and its rest position in one line."""
@@ -245,7 +179,7 @@ class MachineSystems:
     Attributes:
         parameters: The numbers it was built from.
         plant: The bodies.
-        state_layout: Indices in the state of the plant.
+        drawn: The bodies as the SDF draws them, on which set-ups are solved.
         spin_profile, sensors: Systems of the spin profile and of what is measured.
         speed_source: System that prescribes the speed of the drum; None with a motor.
         motor: Systems of a drive with a motor; None if the speed is prescribed.
@@ -264,12 +198,11 @@ class MachineSystems:
             "motor_torque"; and for each element its own
             outputs, such as "spring_left_force", "damper_left_force", "gasket_force" and
             "gasket_moment"; of a cabinet that moves "feet_floor_force".
-        cache: Values that set-ups and runs share.
     """
 
     parameters: MachineParameters
     plant: MultibodyPlant
-    state_layout: StateLayout
+    drawn: DrawnMachine
     spin_profile: SpinProfileSource
     speed_source: SpeedSource | None
     motor: MotorSystems | None
@@ -285,7 +218,6 @@ class MachineSystems:
     water: Water | None
     inputs: dict[str, InputPort]
     outputs: dict[str, OutputPort]
-    cache: SetUpCache = field(default_factory=SetUpCache, repr=False, compare=False, kw_only=True)
 
     def __repr__(self) -> str:
         """Return the machine and the number of its ports in one line."""
@@ -307,8 +239,7 @@ class MachineSystems:
         """Set numbers and load in a Context, at the rest pose and the first speed of the profile.
 
         A built machine with these numbers set in a Context computes bit for bit the same as a
-        machine built from them. A default Context has the bodies of the SDF and is not at rest:
-        call this first.
+        machine built from them, whose default Context has them already.
 
         Args:
             load: Point masses in the drum, or the name of one of the machine's loads; None for the
@@ -323,92 +254,34 @@ class MachineSystems:
             friction: False takes the dry friction out of all elements, as for a small motion on top
                 of steady sliding.
             systems: False for the compiled engine, which reads the `Setup`: it may leave the
-                Context as it is, without these numbers and at another pose.
+                Context as it is.
 
         Raises:
             InputError: the elements are not those that were built, a name is not in the SDF, or
                 there is no equilibrium.
         """
         parameters, context = parameters or self.parameters, context or self.new_context()
-        self.cache.check(self.parameters, parameters)
-        load = self._load(load, parameters)
-        layout, poses = self.state_layout, self.cache.frame_poses(self.plant, parameters)
-        systems = systems or bool(layout.attached.size or self.motor or self.cabinet)
-        unloaded = placed_elements(self.plant, poses, parameters)
-        weight = self._weight(parameters, context)
-        plant_context = self.plant.GetMyContextFromRoot(context)
-        if systems:
-            self.set_up_bodies(None, parameters, context)
-        elements = self._preloaded(unloaded, poses, weight, plant_context)
-        elements = elements if gasket else elements.without_gasket()
-        elements = elements if dampers else elements.without_dampers()
-        elements = elements if friction else elements.without_friction()
-        q, residual = self._at_rest(elements, weight, plant_context)
-        parts = parameters.sensors, parameters.clearance_frame, parameters.accelerometers
-        points = poses.placed("points", parts, lambda: tub_points(poses, parameters))
-        measured = measured_points(points, q[layout.tub])
-        cabinet, drum = None, None
-        if systems:
-            self.plant.SetPositions(plant_context, q)
-            cabinet = cabinet_at_rest(self.plant, plant_context, layout, parameters)
-            drum = drum_inertia(self.plant, plant_context)
-            self._add_load(plant_context, parameters, load)
-            self._set_water(context, load)
-            self._set_systems(context, elements, measured)
-            self._set_drive(context, parameters)
-            self._set_feet(context, cabinet)
-            self.set_profile(context, profile or parameters.profile, elements)
-        rest = q[layout.tub], residual, q[layout.tubes], q[layout.carrier]
-        placed = elements, points, *rest, cabinet, measured
-        return Setup(self, parameters, context, *placed, load, drum)
+        parts = Parts(gasket, dampers, friction)
+        resting = self.drawn.at_rest(load, parameters, parts, bodies=systems)
+        setup = Setup(machine=self, context=context, **vars(resting))
+        if resting.bodies is not None:
+            self._set(setup, resting.bodies)
+            self.set_profile(context, profile or parameters.profile, resting.elements)
+        return setup
+
+    @property
+    def state_layout(self) -> StateLayout:
+        """Return the indices in the state of the plant."""
+        return self.drawn.state_layout
+
+    @property
+    def cache(self) -> SetUpCache:
+        """Return the values that set-ups and runs share."""
+        return self.drawn.cache
 
     def new_context(self) -> Context:
         """Return a new root Context at time 0; only a machine with a diagram of its own has one."""
         raise input_error("is that of the diagram that contains the machine", key="context")
-
-    def _preloaded(
-        self,
-        unloaded: PlacedElements,
-        poses: FramePoses,
-        weight: Weight | None,
-        plant_context: Context,
-    ) -> PlacedElements:
-        """Return the elements with the spring preloads that balance the machine as drawn."""
-        if weight:
-            as_drawn = TubStatics(unloaded.at_rest(), weight).wrench(np.zeros(6))
-        else:
-            as_drawn = force_as_drawn(
-                self.plant, plant_context, self.state_layout, unloaded.at_rest()
-            )
-        balanced = (*unloaded.springs.values(), as_drawn.tobytes())
-        springs = poses.placed("preloads", balanced, lambda: preloaded(unloaded, as_drawn).springs)
-        return replace(unloaded, springs=springs)
-
-    def _at_rest(
-        self, elements: PlacedElements, weight: Weight | None, plant_context: Context
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return the positions of the plant at rest, and the wrench that remains on the tub."""
-        if weight:
-            q = np.zeros(self.state_layout.size)
-            q[self.state_layout.tub], residual = rest_pose(elements.at_rest(), weight)
-            return q, residual
-        residual = put_to_rest(self.plant, plant_context, self.state_layout, elements.at_rest())
-        return self.plant.GetPositions(plant_context), residual
-
-    def set_up_bodies(
-        self, load: Load | None, parameters: MachineParameters, context: Context | None = None
-    ) -> Context:
-        """Set bodies, frames and load in a Context and return it; all positions are zero, as drawn.
-
-        Raises:
-            InputError: a name is not in the SDF.
-        """
-        context = context or self.new_context()
-        plant_context = self.plant.GetMyContextFromRoot(context)
-        self.plant.SetDefaultContext(plant_context)
-        set_bodies(self.plant, plant_context, parameters)
-        self._add_load(plant_context, parameters, load)
-        return context
 
     def set_profile(self, context: Context, profile: SpinProfile, elements: PlacedElements) -> None:
         """Set the spin profile in a root Context, and drum and elements to its first speed."""
@@ -436,42 +309,25 @@ class MachineSystems:
             self.speed_source.GetMyContextFromRoot(context), [acceleration]
         )
 
-    def _load(self, load: Load | str | None, parameters: MachineParameters) -> Load | None:
-        """Return a load that may be given by its name."""
-        if not isinstance(load, str):
-            return load
-        message = f"no load '{load}' in machine '{parameters.name}'"
-        check_known(load, parameters.loads, message, key="loads")
-        return parameters.loads[load]
+    def _set(self, setup: Setup, bodies: Context) -> None:
+        """Set the numbers of a setup in its Context.
 
-    def _add_load(
-        self, plant_context: Context, parameters: MachineParameters, load: Load | None
-    ) -> None:
-        """Add a load and the drum's residual imbalance to the drum; add neither without a load."""
-        if load is not None:
-            add_load(self.plant, plant_context, load)
-            imbalance = parameters.imperfections.residual_imbalance
-            add_load(self.plant, plant_context, Load(unbalances=(imbalance,)))
-
-    def _set_water(self, context: Context, load: Load | None) -> None:
-        """Set the wet masses of a load in a root Context, with all their water."""
-        if self.water is not None:
-            packed = packed_water(load) if load else []
-            self.water.set_load(self.water.GetMyContextFromRoot(context), packed)
-
-    def _weight(self, parameters: MachineParameters, context: Context) -> Weight | None:
-        """Return the weight on the springs, maybe that of the last set-up; changes the Context.
-
-        None with bodies attached to the tub, whose weight depends on their pose.
+        Args:
+            bodies: Context of `DrawnMachine.plant`.
         """
-        if self.state_layout.attached.size:
-            return None
-
-        def compute() -> Weight:
-            self.set_up_bodies(None, parameters, context)
-            return weight_of(self.plant, self.plant.GetMyContextFromRoot(context))
-
-        return self.cache.weight(parameters, compute)
+        context, parameters = setup.context, setup.parameters
+        copy_numbers(self.drawn.plant, bodies, self.plant, setup.plant_context)
+        if self.water is not None:
+            packed = packed_water(setup.load) if setup.load else []
+            self.water.set_load(self.water.GetMyContextFromRoot(context), packed)
+        self._set_systems(context, setup.elements, setup.measured_points)
+        if drive := motor_of(parameters.drive):
+            assert self.motor  # the parameters have been checked
+            self.motor.set_drive(context, drive)
+        if self.feet is not None and setup.cabinet is not None:
+            part = self.feet.GetMyContextFromRoot(context)
+            self.feet.set_parameters(part, setup.cabinet.packed())
+            part.SetContinuousState(np.zeros(self.feet.state_size))
 
     def _set_systems(self, context: Context, elements: PlacedElements, points: FloatArray) -> None:
         """Set the parameters of elements and sensors in a root Context, and relax the sponges."""
@@ -491,19 +347,6 @@ class MachineSystems:
                 if system.state_size:
                     part.SetContinuousState(np.zeros(system.state_size))
         self.sensors.set_points(self.sensors.GetMyContextFromRoot(context), points)
-
-    def _set_drive(self, context: Context, parameters: MachineParameters) -> None:
-        """Set the numbers of a motor in a root Context, and its state before a run."""
-        if drive := motor_of(parameters.drive):
-            assert self.motor  # the parameters have been checked
-            self.motor.set_drive(context, drive)
-
-    def _set_feet(self, context: Context, cabinet: CabinetOnFeet | None) -> None:
-        """Set the parameters of the feet of a cabinet that moves; no foot has slid."""
-        if self.feet is not None and cabinet is not None:
-            part = self.feet.GetMyContextFromRoot(context)
-            self.feet.set_parameters(part, cabinet.packed())
-            part.SetContinuousState(np.zeros(self.feet.state_size))
 
 
 @dataclass(frozen=True, repr=False)

@@ -58,6 +58,18 @@ ON_TUB = (*SHIPPED, "others")
 """Kinds of elements whose forces depend on the motion of the tub only, in packed order."""
 
 
+class Parts(NamedTuple):
+    """What acts in a machine; the arguments of these names of `MachineSystems.set_up`."""
+
+    gasket: bool = True
+    dampers: bool = True
+    friction: bool = True
+
+
+ALL_PARTS = Parts()
+"""Everything acts."""
+
+
 @dataclass(frozen=True)
 class PlacedElements:
     """All elements of a machine at their frames, by name.
@@ -71,6 +83,12 @@ class PlacedElements:
     telescopes: dict[str, TelescopicDamperParameters]
     bearing: DrumBearingParameters | None
     others: dict[str, PlacedElement]
+
+    def with_parts(self, parts: "Parts") -> "PlacedElements":
+        """Return the elements without those parts that do not act."""
+        elements = self if parts.gasket else self.without_gasket()
+        elements = elements if parts.dampers else elements.without_dampers()
+        return elements if parts.friction else elements.without_friction()
 
     def without_gasket(self) -> "PlacedElements":
         """Return the elements with the gasket disengaged; the same elements if there is none."""
@@ -249,6 +267,13 @@ class AppliedForce:
             evaluate(parts[part], at_rest, packed, force, outputs, rate)
             total[of_force] += force  # no index occurs twice
         return total
+
+
+def initial_state(element: Any, drum_rate: float) -> FloatArray:
+    """Return the state of a placed element at the start of a run, at a rate of the drum. [rad/s]"""
+    if isinstance(element, PlacedElement):
+        return element.initial(drum_rate)
+    return np.zeros(element.state_size)
 
 
 def structure_of(element: Any) -> list[int]:

@@ -31,6 +31,11 @@ class DrumElement(OfKind):
 
     y: u.Length = 0.0
 
+    @property
+    def mass_on_drum(self) -> float:
+        """Return the mass of the element that moves with the axis of the drum. [kg]"""
+        return 0.0
+
 
 class Element(OfKind):
     """An element in its place; the parameters of an element kind extend this type.

@@ -396,10 +396,11 @@ SPRING_PLACES = {
 
 DAMPER_PLACES = {
     2: {"left": (-1.0, 0.0), "right": (1.0, 0.0)},
-    3: {"left": (-1.0, 0.0), "right_front": (1.0, -0.2), "right_rear": (1.0, 0.2)},
+    3: {"left": (-1.0, -0.1), "right": (1.0, -0.1), "rear": (0.0, 0.4)},
     4: SPRING_PLACES[4],
 }
-"""Places of the dampers by their number, in the same way."""
+"""Places of the dampers by their number, in the same way. The third of three is at the rear, as in
+[C] Fig. 1."""
 
 
 def _text(value: float) -> str:

@@ -380,6 +380,13 @@ class MachineParameters(Frozen):
             raise ValueError("cabinet.moves: needs gravity above 0, which presses the feet down")
         return self
 
+    @property
+    def masses_on_drum(self) -> tuple[Unbalance, ...]:
+        """Return the parts of elements that are masses on the axis of the drum, such as liquid."""
+        on_drum = (e for e in self.elements.values() if isinstance(e, DrumElement))
+        masses = ((e.mass_on_drum, e.y) for e in on_drum)
+        return tuple(Unbalance(mass=mass, radius=0.0, y=y) for mass, y in masses if mass)
+
     def __repr__(self) -> str:
         """Return name, elements, loads and speed in one line; `model_dump()` has all numbers."""
         kinds = ("springs", "dampers", "telescopic_dampers", "bushings", "elements")

@@ -183,6 +183,18 @@ class Answer(Result):
             else:
                 content(folder / name)
 
+    def save(self, folder: Path | str, facts: Facts | None = None) -> None:
+        """Write the pages and all files to a folder, which is made if it is not there.
+
+        Args:
+            facts: How the result was computed; None if nothing more than the details is known.
+        """
+        place = Path(folder)
+        place.mkdir(parents=True, exist_ok=True)
+        self.write(place)
+        for name, text in self.pages(facts or Facts()).items():
+            (place / name).write_text(text, encoding="utf-8")
+
     def warnings(self) -> tuple[str, ...]:
         """Return warnings of the result for the terminal."""
         return self.warned

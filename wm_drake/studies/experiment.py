@@ -64,15 +64,15 @@ class CountedCases:
 
 
 def run_here(
-    machine: Machine,
-    measures: tuple[str, ...],
-    cases: Iterable[Case],
-    what: str,
-    workers: int | None = None,
+    machine: Machine, measures: tuple[str, ...], cases: Iterable[Case], what: str, **options: Any
 ) -> xr.Dataset:
-    """Run cases on the cores of this computer, without a ledger and a progress bar."""
+    """Run cases on the cores of this computer, without a ledger and a progress bar.
+
+    Args:
+        options: Other options of `simulate_many`.
+    """
     del what
-    return simulate_many(machine, cases, measures=measures, workers=workers)
+    return simulate_many(machine, cases, measures=measures, **options)
 
 
 def kept_in(ledger: Ledger, workers: int | None = None) -> Simulate:

@@ -156,9 +156,9 @@ def _with_sdf_number(parameters: Any, key: str) -> Any:
     if not key.startswith(("bodies.", "frames.")) or not isinstance(parameters, MachineParameters):
         return parameters
     from wm_drake.model.bodies import with_sdf_values
-    from wm_drake.model.build import build_machine
+    from wm_drake.model.drawn_machine import DrawnMachine
 
-    return with_sdf_values(build_machine(parameters).plant, parameters, [key])
+    return with_sdf_values(DrawnMachine(parameters).plant, parameters, [key])
 
 
 def pairs_of(entries: Sequence[str] | None, option: str) -> list[tuple[str, str]]:

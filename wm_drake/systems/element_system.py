@@ -1,9 +1,9 @@
 """One LeafSystem for elements of all kinds."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
-from pydrake.systems.framework import LeafSystem_
+from pydrake.systems.framework import BasicVector_, LeafSystem_
 
 from wm_drake.elements.kind import ElementKind
 from wm_drake.elements.motion import GENERALIZED_FORCE_SIZE, PLANT_STATE_SIZE
@@ -27,17 +27,22 @@ def ElementSystem_(T: type) -> Any:
         and the time derivative of its state. The plant state and the generalized force have one
         part for each tree of the plant that the element acts on, one after the other. The packed
         numbers are a numeric parameter of the Context. AutoDiffXd computes derivatives with respect
-        to state and numbers. A system holds no Context.
+        to state and numbers. In a default Context the state is `initial`. A system holds no Context.
         """  # noqa: E501
 
         __slots__ = NO_SLOTS
 
         def _construct(
-            self, kind: ElementKind, packed: FloatArray, state_size: int = 0, converter: Any = None
+            self,
+            kind: ElementKind,
+            packed: FloatArray,
+            initial: Sequence[float] | FloatArray = (),
+            converter: Any = None,
         ) -> None:
             LeafSystem_[T].__init__(self, converter=converter)
             # a scalar-converted copy is constructed from these
-            self.kind, self.state_size = kind, state_size
+            self.kind, self.initial = kind, initial
+            self.state_size = state_size = len(initial)
             self._evaluate = evaluator(kind.on_plant, T)
             self._sizes = kind.trees * GENERALIZED_FORCE_SIZE, kind.output_size, state_size
             self._plant_state = self.DeclareVectorInputPort(
@@ -45,7 +50,7 @@ def ElementSystem_(T: type) -> Any:
             )
             needs = {self._plant_state.ticket(), self.declare_numbers(T, packed)}
             if state_size:
-                state = self.DeclareContinuousState(state_size)
+                state = self.DeclareContinuousState(BasicVector_[T](initial))
                 needs.add(self.xc_ticket())
             outputs = {"generalized_force": (0, slice(0, self._sizes[0]))}
             outputs |= {name: (1, part) for name, part in kind.output_parts.items()}
@@ -56,7 +61,7 @@ def ElementSystem_(T: type) -> Any:
                 self.DeclareStateOutputPort("state", state)
 
         def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._construct(self, other.kind, other.packed, other.state_size, converter=converter)
+            Impl._construct(self, other.kind, other.packed, other.initial, converter=converter)
 
         def DoCalcTimeDerivatives(self, context: Any, derivatives: Any) -> None:
             """Write the time derivative of the element's state."""

@@ -15,6 +15,7 @@ from wm_drake.elements.motor import evaluate_controller, evaluate_motor
 from wm_drake.parameters.types import FloatArray
 from wm_drake.systems.callbacks import NO_SLOTS, callback
 from wm_drake.systems.scalars import Packed, define_system, empty, evaluator
+from wm_drake.systems.spin_profile_source import check_start
 
 
 class _Controller(Packed):
@@ -41,6 +42,12 @@ class _Controller(Packed):
             inputs = self._profile, self._reference, self._speed
             needs = {ticket, system.xc_ticket(), *(port.ticket() for port in inputs)}
         system.DeclareVectorOutputPort("demand", 1, callback(self._calc_demand), needs)
+        system.DeclareInitializationPublishEvent(callback(self._check_start))
+
+    def _check_start(self, context: Any) -> None:
+        if not self._reference.HasValue(context):
+            speeds = (port.Eval(context)[0] for port in (self._profile, self._speed))
+            check_start(context.get_time(), *speeds)
 
     def reset(self, context: Any) -> None:
         """Set the controller's own Context to its state before a run: no torque."""

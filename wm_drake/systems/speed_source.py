@@ -6,6 +6,7 @@ from pydrake.systems.framework import LeafSystem_
 
 from wm_drake.systems.callbacks import NO_SLOTS, callback
 from wm_drake.systems.scalars import define_system
+from wm_drake.systems.spin_profile_source import check_start
 
 REFLECTED_INERTIA = 1e8
 """Inertia of the drive at the drum joint. [kg m^2] Not physical: it enters only the diagonal of the
@@ -22,9 +23,12 @@ def SpeedSource_(T: type) -> Any:
 
             profile_acceleration (1) ──▶ [ SpeedSource ] ──▶ actuation (1) J alpha [N m]
             drum_acceleration (1)    ──▶ [             ]
+            profile_speed (1)        ──▶ [             ]
+            drum_speed (1)           ──▶ [             ]
 
         alpha is the value of the port `drum_acceleration` if one is connected or fixed there, else
-        that of `profile_acceleration`. [rad/s^2]
+        that of `profile_acceleration`. [rad/s^2] The speeds are for `check_start` alone, when a
+        simulation begins.
         """
 
         __slots__ = NO_SLOTS
@@ -33,11 +37,19 @@ def SpeedSource_(T: type) -> Any:
             LeafSystem_[T].__init__(self, converter=converter)
             self._profile = self.DeclareVectorInputPort("profile_acceleration", 1)
             self._acceleration = self.DeclareVectorInputPort("drum_acceleration", 1)
+            self._speeds = [
+                self.DeclareVectorInputPort(name, 1) for name in ("profile_speed", "drum_speed")
+            ]
             needs = {self._profile.ticket(), self._acceleration.ticket()}
             self.DeclareVectorOutputPort("actuation", 1, callback(self._calc_actuation), needs)
+            self.DeclareInitializationPublishEvent(callback(self._check_start))
 
         def _construct_copy(self, _: Any, converter: Any = None) -> None:
             Impl._construct(self, converter=converter)
+
+        def _check_start(self, context: Any) -> None:
+            if not self._acceleration.HasValue(context):
+                check_start(context.get_time(), *(port.Eval(context)[0] for port in self._speeds))
 
         def _calc_actuation(self, context: Any, output: Any) -> None:
             acceleration = (

@@ -3,10 +3,12 @@
 from typing import Any
 
 import numpy as np
+from pydrake.autodiffutils import AutoDiffXd
 from pydrake.common.value import Value
 from pydrake.systems.framework import AbstractParameterIndex, LeafSystem_
 
 from wm_drake.elements.spin_profile import drum_acceleration, drum_motion
+from wm_drake.errors import input_error
 from wm_drake.parameters import SpinProfile
 from wm_drake.systems.callbacks import NO_SLOTS, callback
 from wm_drake.systems.scalars import define_system
@@ -71,9 +73,30 @@ def SpinProfileSource_(T: type) -> Any:
     return SpinProfileSource
 
 
-def _number(time: Any) -> float:
-    """Return the value of a time, float or AutoDiffXd. [s]"""
-    return time if isinstance(time, float) else float(time.value())
+def check_start(time: Any, profile_speed: Any, drum_speed: Any) -> None:
+    """Check that the drum turns at time 0 if its spin profile starts above 0 rpm.
+
+    A default Context has no velocities: Drake does not let a system declare those of a plant.
+
+    Args:
+        time: Time of the Context. [s]
+        profile_speed, drum_speed: Speed of the profile and of the drum. [rad/s]
+
+    Raises:
+        InputError: the drum is at rest.
+    """
+    if _number(time) == 0.0 and _number(drum_speed) == 0.0 != _number(profile_speed):
+        raise input_error(
+            f"starts at {_number(profile_speed) * 30.0 / np.pi:.4g} rpm, and the drum is at rest: "
+            "a default Context has no velocities; call `set_up(..., context=context)` of the "
+            "machine with the root Context of the simulation",
+            key="profile",
+        )
+
+
+def _number(value: Any) -> float:
+    """Return the value of a number, float or AutoDiffXd."""
+    return float(value.value()) if isinstance(value, AutoDiffXd) else float(value)
 
 
 SpinProfileSource = SpinProfileSource_[None]

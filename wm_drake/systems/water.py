@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 from pydrake.common.value import Value
-from pydrake.systems.framework import AbstractParameterIndex, LeafSystem_
+from pydrake.systems.framework import AbstractParameterIndex, BasicVector_, LeafSystem_
 
 from wm_drake.elements.water import rate_of_water
 from wm_drake.parameters.types import FloatArray
@@ -23,23 +23,27 @@ def Water_(T: type) -> Any:
             drum_speed (1) ──▶ [ Water ] ──▶ left (k)
               parameter: packed numbers of each wet mass (abstract)
 
-        Masses beyond those of the load keep their state. Drake has masses as parameters of a
-        Context, not as functions of its state: `Setup.follow_water` sets them from this state.
+        By default all water is left. Masses beyond those of the load keep their state. Drake has
+        masses as parameters of a Context, not as functions of its state: `Setup.follow_water` sets
+        them from this state.
         """
 
         __slots__ = NO_SLOTS
 
-        def _construct(self, count: int, converter: Any = None) -> None:
+        def _construct(
+            self, count: int, packed: Sequence[FloatArray], converter: Any = None
+        ) -> None:
             LeafSystem_[T].__init__(self, converter=converter)
-            self.count = count  # a scalar-converted copy is constructed from it
+            # a scalar-converted copy is constructed from these
+            self.count, self.packed = count, tuple(packed)
             self._rate_of = evaluator(rate_of_water, T)
             self._drum_speed = self.DeclareVectorInputPort("drum_speed", 1)
-            self._index = self.DeclareAbstractParameter(Value[object](()))
-            state = self.DeclareContinuousState(count)
+            self._index = self.DeclareAbstractParameter(Value[object](self.packed))
+            state = self.DeclareContinuousState(BasicVector_[T](np.ones(count)))
             self.DeclareStateOutputPort("left", state)
 
         def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._construct(self, other.count, converter=converter)
+            Impl._construct(self, other.count, other.packed, converter=converter)
 
         def set_load(self, context: Any, packed: Sequence[FloatArray]) -> None:
             """Set the numbers of each wet mass in the system's own Context, with all its water."""

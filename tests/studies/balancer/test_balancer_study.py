@@ -248,7 +248,10 @@ def test_balls_help_at_speed_and_hurt_in_the_run_up(result):
 
 
 def test_the_candidates_run_with_the_same_loads(result):
-    """Check that liquid lowers both amplitudes a little, and balls that at the highest speed most."""
+    """Check that liquid helps at the highest speed, less than balls, and hurts in the run-up.
+
+    Below the resonances the liquid is on the side of the unbalance and adds to it.
+    """
     tables = result.tables()
     level, peak = (
         tables["candidates"][[f"{name}_{one}_mm" for one in (NONE, BALLS, LIQUID)]].to_numpy().T
@@ -257,7 +260,11 @@ def test_the_candidates_run_with_the_same_loads(result):
     assert (level[1] < 0.1 * level[0]).all()
     assert (level[1] < level[2]).all()
     assert (level[2] < level[0]).all()
-    assert (peak[2] < 1.1 * peak[0]).all()
+    assert (peak[0] < peak[2]).all()
+    assert (peak[2] < 2.0 * peak[0]).all()
+    lags = tables["lags"]
+    assert lags.lag.tolist() == pytest.approx([1.0 / 3.0, 1.0, 3.0])
+    assert lags.level_mm.max() < 1.02 * lags.level_mm.min()  # a steady whirl does not depend on it
     np.testing.assert_allclose(level[1], tables["loads"].level_free_mm)
 
 

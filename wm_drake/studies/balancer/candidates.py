@@ -15,6 +15,7 @@ from wm_drake.elements.ball_ring import BallRing
 from wm_drake.elements.liquid_ring import LiquidRing
 from wm_drake.parameters import MachineParameters, with_values
 from wm_drake.parameters.element_kinds import DrumElement
+from wm_drake.parameters.units import Share
 from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.balance import rings_of
 from wm_drake.simulation.measures.kind import Better
@@ -38,6 +39,11 @@ KINDS: Mapping[str, type[DrumElement]] = {BALLS: BallRing, LIQUID: LiquidRing}
 
 WORDS = {NONE: "no balancer", BALLS: "rings of balls", LIQUID: "rings of liquid"}
 """What each candidate has, in words."""
+
+LAG = Quantity("lag of the liquid, in parts of the file's", Share(), form="{:.2g}".format)
+LAGS = (1.0 / 3.0, 1.0, 3.0)
+"""Factors on the lag of the liquid, which is not published for any ring: the range in which its
+baffles may lie; own choice (`docs/theory/liquid-ring.md`)."""
 
 RESPONSES = {"peak": PEAK, "level": LEVEL}
 GOALS: Mapping[str, Better] = dict.fromkeys(RESPONSES, "smaller")
@@ -66,6 +72,29 @@ def with_rings(
     if not rings:
         rings, step = rings_in(other), min(step, other.step)
     return with_values(plain, {"elements": {**plain.elements, **rings}, "step": step})
+
+
+def with_lag(parameters: MachineParameters, factor: float) -> MachineParameters:
+    """Return the machine with another lag of the liquid in its rings."""
+    rings = {n: ring for n, ring in rings_of(parameters).items() if isinstance(ring, LiquidRing)}
+    lags = {f"elements.{name}.lag": factor * ring.lag for name, ring in rings.items()}
+    return with_values(parameters, lags)
+
+
+def by_lag(curves: Mapping[float, xr.Dataset]) -> xr.Dataset:
+    """Return the responses of one run over the factors on the lag of the liquid.
+
+    Args:
+        curves: By factor, as of `wm_drake.studies.balancer.study.curves_of`.
+    """
+    runs = responses_of({f"{factor:.2g}": each for factor, each in curves.items()}, [""])
+    values = {name: runs.sel(response=name).values[:, 0] for name in RESPONSES}
+    return xr.Dataset(
+        {
+            "lag": LAG.variable("lag_factor", list(curves)),
+            **{name: RESPONSES[name].variable("lag_factor", values[name]) for name in RESPONSES},
+        }
+    )
 
 
 def is_machine(parameters: MachineParameters, other: MachineParameters) -> bool:

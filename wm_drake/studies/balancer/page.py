@@ -46,7 +46,8 @@ def balancer_answer(
         data: `numbers`, as of `numbers_of` in `wm_drake.studies.balancer.study`; `loads`, as of
             `BalancerTrials.loads` there, with the amplitudes `without_rings` and `liquid` of the
             load with which rings are varied; `rings` and `releases`, as of the methods there;
-            `proposal`, as of `candidate_proposal` in `wm_drake.studies.balancer.candidates`.
+            `lags` and `proposal`, as of `by_lag` and `candidate_proposal` in
+            `wm_drake.studies.balancer.candidates`.
         runs: As of `responses_of` there.
     """
     numbers, loads, rings, releases = (
@@ -59,6 +60,7 @@ def balancer_answer(
         Part("Unbalance and its place", (loads_plot(loads),)),
         Part("Mass of the balls and damping", (rings_plot(loads, rings, numbers),)),
         Part("Which balancer to fit", (_candidates_table(runs),)),
+        Part("Lag of the liquid", (_lags_table(data["lags"], load),)),
         Part("Each load", (_loads_table(loads),)),
         Part("Each ball mass and damping", (_rings_table(rings, load),)),
         Part(
@@ -133,6 +135,17 @@ def _candidates_table(runs: xr.DataArray) -> LabelledTable:
         "Each load without a balancer, with free balls and with liquid.",
         across="candidate",
         words=WORDS,
+    )
+
+
+def _lags_table(lags: xr.Dataset, load: str) -> LabelledTable:
+    return LabelledTable(
+        "lags",
+        lags,
+        "Liquid by its lag",
+        f"Rings of liquid with {load}, over their lag: how fast baffles and walls stop liquid that "
+        "moves against the drum. It is not published for any ring, so these amplitudes are the "
+        "range of what the liquid may do.",
     )
 
 

@@ -2,6 +2,8 @@
 
 from typing import Any
 
+import xarray as xr
+
 from wm_drake.engines.compiled.step_check import check_step
 from wm_drake.errors import input_error
 from wm_drake.model.build import build_machine
@@ -14,12 +16,15 @@ from wm_drake.studies.answer import Answer
 from wm_drake.studies.balancer.candidates import (
     BALLS,
     KINDS,
+    LAGS,
     LIQUID,
     NONE,
     WORDS,
+    by_lag,
     candidate_proposal,
     is_machine,
     responses_of,
+    with_lag,
     with_rings,
 )
 from wm_drake.studies.balancer.options import BalancerOptions
@@ -103,6 +108,7 @@ class BalancerTask(Task):
         }
         at = number_of_base(loads)
         of_balls = loads.rename(free="amplitude", level_free="level")[["amplitude", "level"]]
+        of_lags = {f: self._with_lag(trials, loads.isel(run=[at]), f) for f in LAGS}
         names = [load_text(loads.isel(run=run)) for run in range(loads.sizes["run"])]
         runs = responses_of({NONE: curves[NONE], BALLS: of_balls, LIQUID: curves[LIQUID]}, names)
         loads = loads.assign(
@@ -114,9 +120,15 @@ class BalancerTask(Task):
             "loads": loads,
             "rings": trials.rings(loads.isel(run=at), self.ball_masses, self.dampings),
             "releases": trials.releases(loads.isel(run=at), self.release),
+            "lags": by_lag(of_lags),
             "proposal": candidate_proposal(runs, {kind: self._command(kind) for kind in KINDS}),
         }
         return balancer_answer(self.machine.parameters, data, runs)
+
+    def _with_lag(self, trials: BalancerTrials, load: xr.Dataset, factor: float) -> xr.Dataset:
+        """Return the curves of a load with rings of liquid of another lag."""
+        machine = build_machine(with_lag(self.candidates[LIQUID], factor))
+        return trials.of(machine, load, f"{WORDS[LIQUID]}, lag times {factor:.2g}")
 
     def _command(self, kind: str) -> str:
         """Return the command that runs the machine with rings of a kind; "" if there is none."""

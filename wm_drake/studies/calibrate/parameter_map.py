@@ -195,7 +195,7 @@ def parameter_map_of(machine: Machine, free: FreeFile) -> ParameterMap:
     """
     listed: dict[str, FreeQuantity | KnownQuantity] = {**free.quantities, **free.known}
     keys = list(dict.fromkeys(key for quantity in listed.values() for key in quantity.sets))
-    base = with_sdf_values(machine.plant, machine.parameters, keys)
+    base = with_sdf_values(machine.drawn.plant, machine.parameters, keys)
     known = {key: (value, unit) for key, value, unit in quantities(base)}
     problems: list[Problem] = []
     values = []

@@ -150,7 +150,7 @@ def sensor_points(machine: Machine, test: RecordedTest) -> dict[str, FloatArray]
     ]
     if problems:
         raise InputError(problems)
-    poses = FramePoses(machine.plant, machine.parameters)
+    poses = FramePoses(machine.drawn.plant, machine.parameters)
     at_frames = {name: poses("tub", frame)[0] for name, frame in frames.items()}
     points = {n: np.array(s.point) for n, s in test.sensors.items() if s.point is not None}
     return at_frames | points

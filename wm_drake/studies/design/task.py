@@ -43,7 +43,7 @@ class DesignTask(Task):
         task, profile = self.file, self.options.profile
         tolerances = load_tolerances(task.robust.tolerances) if task.robust else None
         keys = [key for key in self._keys(tolerances) if key.startswith(("frames.", "bodies."))]
-        full = with_sdf_values(machine.plant, machine.parameters, keys)
+        full = with_sdf_values(machine.drawn.plant, machine.parameters, keys)
         if tolerances is None or task.robust is None:
             design_files.check_loads(task, full)
             cases = selected_cases(full, list(task.loads), True, profile)

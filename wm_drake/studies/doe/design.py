@@ -88,6 +88,12 @@ def make_design(
         trials: Number of trials; the default is 1000 (d-optimal), 729 (orthogonal) or all (full).
         model: Model to estimate, key of `MODELS`.
         seed: Seed of a D-optimal design.
+
+    Example:
+        >>> import wm_drake as wm
+        >>> design = wm.make_design("d-optimal", ("a", "b", "c"), trials=12, model="main")
+        >>> design.levels.shape, design.coefficients, design.efficiency() > 90.0
+        ((12, 3), 7, True)
     """
     check_known(kind, DESIGNS, f"no design '{kind}'", key="design")
     check_known(model, MODELS, f"no model '{model}'", key="model")

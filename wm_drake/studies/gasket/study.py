@@ -58,6 +58,15 @@ class GasketTrials:
         """Measures of each run, as for `simulate_many`."""
         return measures_of(self.parameters, self.chosen)
 
+    def experiment(self, simulate: Simulate) -> Experiment:
+        """Return the runs of the machine with the loads.
+
+        Args:
+            simulate: Function that runs cases.
+        """
+        machine = build_machine(self.parameters)
+        return Experiment(machine, self.measures, simulate, tuple(self.loads))
+
     def responses(self, design: Design, experiment: Experiment) -> xr.Dataset:
         """Run all trials and return their responses, as of `screening.runs_of`.
 

@@ -8,7 +8,6 @@ from typing import Any
 import xarray as xr
 
 from wm_drake.errors import InputError, check_known, input_error, nearest_names, problems_at
-from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import (
     GASKET_FACTORS,
@@ -106,8 +105,7 @@ class GasketTask(Task):
 
     def run(self, executor: Executor) -> Answer:
         """Run the trials, level 0 with each treatment of tables, and the settings to check."""
-        trials, machine = self.trials, build_machine(self.trials.parameters)
-        experiment = Experiment(machine, trials.measures, executor.simulate, tuple(self.cases))
+        trials, experiment = self.trials, self.trials.experiment(executor.simulate)
         with executor.progress(self.design.trials * len(self.cases)):
             screening = run_screening(self.design, lambda d: trials.responses(d, experiment))
         models = models_of(screening)

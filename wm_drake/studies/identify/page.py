@@ -17,6 +17,7 @@ from wm_drake.studies.identify.fragment import FittedComponent, fragment
 from wm_drake.studies.identify.judgement import LACK
 from wm_drake.studies.identify.problem import motion_sentences
 from wm_drake.studies.rig.quantities import loop_quantities
+from wm_drake.studies.rig.section import section_plots
 from wm_drake.studies.rig.study import ENERGY, FREQUENCY
 
 PHASE = Quantity("phase", Unit("rad", "rad"))
@@ -46,6 +47,8 @@ def fit_answer(
         )
         for over in ("displacement", "velocity")
     ]
+    bench = law.model.bench(np.array([e.value for e in fit.estimates]))
+    plots += section_plots(bench)
     load = load_of(motions)
     loops = LabelledTable("loops", _samples(law, motions), is_in_json=False)
     search, values, correlations, _ = fit_parts(fit, load, fixed=law.model.fixed_numbers)

@@ -111,7 +111,7 @@ def _of_numbers(
         groups.setdefault(part, []).append(key)
     for part, keys in groups.items():
         # checks the names of the keys, too
-        parameters = with_sdf_values(machine.plant, machine.parameters, keys)
+        parameters = with_sdf_values(machine.drawn.plant, machine.parameters, keys)
         deviation = _deviations_of_numbers(parameters, candidate.accuracy, keys)
         if any(value_at(machine.parameters, key) is None for key in keys):
             continue  # only the SDF has it: nothing about it is in doubt

@@ -19,6 +19,7 @@ from wm_drake.studies.rig.figures import (
     time_figure,
 )
 from wm_drake.studies.rig.quantities import loop_quantities
+from wm_drake.studies.rig.section import section_plots
 from wm_drake.studies.rig.study import loop_data
 
 METHOD = (
@@ -134,6 +135,7 @@ def _plots(run: RigRun) -> list[Plot]:
                 "Figs. 7 and 14).",
             )
         )
+    plots += section_plots(run.bench)
     law = friction_law_figure(run)
     if law is not None:
         plots.append(

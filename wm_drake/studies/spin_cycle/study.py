@@ -169,13 +169,19 @@ def _flat(values: xr.DataArray) -> np.ndarray:
     return values.values.reshape(*values.shape[:2], -1)
 
 
+ALL = "all"
+"""Name of all cases of the table."""
+
+
 def cases_of_table(path: Path | None, names: Sequence[str] | None) -> list[UnbalanceCase]:
-    """Return the cases that `--cases` and `--case` select."""
+    """Return the cases that `--cases` and `--case` select; all of the table for `ALL`, or none."""
     table = load_unbalance_cases(existing_file(path, "--cases") if path else TABLE_9)
+    if not names or tuple(names) == (ALL,):
+        return table
     known = {case.name: case for case in table}
-    for name in names or []:
+    for name in names:
         check_known(name, known, f"unknown case '{name}'", where="--case")
-    return [known[name] for name in dict.fromkeys(names)] if names else table
+    return [known[name] for name in dict.fromkeys(names)]
 
 
 def measured_displacements(

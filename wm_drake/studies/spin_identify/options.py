@@ -18,7 +18,8 @@ class SpinIdentifyOptions(SpinCycleDataOptions):
     )
     case: tuple[str, ...] = option(
         (),
-        "Use only this case. Repeatable. Default: those of --cases, or 2, 5 and 29 of [A] Table 9.",
+        "Use only this case; 'all' are those of the table, 33 in [A] Table 9. Repeatable. Default: "
+        "those of --cases, or 2, 5 and 29 of [A] Table 9.",
         "NAME",
     )
     record: tuple[str, ...] = option(

@@ -73,7 +73,7 @@ class ToleranceTask(Task):
             load = parameters.loads[tolerances.load]
         keys = [key for quantity in tolerances.quantities.values() for key in quantity.keys]
         with problems_of_file(path):
-            full = with_sdf_values(machine.plant, parameters, keys)
+            full = with_sdf_values(machine.drawn.plant, parameters, keys)
             case = Case(tolerances.load or "laundry", load, spin)
             uncertain = uncertain_machine(full, tolerances, case)
             built = build_machine(uncertain.parameters)

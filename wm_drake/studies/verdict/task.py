@@ -53,7 +53,7 @@ class VerdictTask(Task):
         self.options, self.clearance = options, _length(options.clearance)
         weights = [name for name in sdf_names(machine.plant).links if COUNTERWEIGHT in name]
         keys = [f"bodies.{name}.mass" for name in weights]
-        full = with_sdf_values(machine.plant, machine.parameters, keys)
+        full = with_sdf_values(machine.drawn.plant, machine.parameters, keys)
         self.machine = build_machine(full)
         self.laundry = self._laundry(self.machine)
         self.cases = selected_cases(full, None, True, options.profile)
