@@ -150,6 +150,7 @@ class Runner:
         *,
         motions: Container[int] = (),
         compared: tuple[str, ...] = COMPARED,
+        most_steps: float = float("inf"),
     ) -> None:
         """Prepare for a machine.
 
@@ -162,11 +163,12 @@ class Runner:
                 sensors and shapes.
             compared: Keys of measures that are compared where runs are repeated, if there are no
                 `measures`.
+            most_steps: Largest number of steps of a run that is repeated.
         """
         self.parameters = parameters
         self.compared = [MEASURES[name] for name in compared if not measures]
         self.measures = [MEASURES[name] for name in measures]
-        self.histories, self.motions = histories, motions
+        self.histories, self.motions, self.most_steps = histories, motions, most_steps
         self.stopped = threading.Event()
         self._memory = threading.local()
         self._spare = [] if scenes is None else scenes
@@ -256,11 +258,19 @@ class Runner:
                 float(np.abs(run.largest[0]).max()),
             )  # fmt: skip
             accuracy, finer = judged(this, run.item.before, allowed(run.item))
-            if finer is not None and _has_place(run.item, finer):
+            if finer is not None and self._may_repeat(run.item, finer):
                 again.append(run.item.repeated(this, finer))
             else:
                 results.append(self._result(run, values, accuracy, "shapes" in needs))
         return results, again
+
+    def _may_repeat(self, item: WorkItem, finer: Refinement) -> bool:
+        """Return whether there are time and memory for a run that is repeated."""
+        step, period = item.numbers.stepping.halved(finer.step).step, item.numbers.period
+        profile = item.case.profile
+        if profile.duration / step > self.most_steps:
+            return False
+        return needed_memory(profile, step, period / 2**finer.period) <= available_memory()
 
     def _allowed(self, item: WorkItem) -> float:
         """Return the largest error that the machine of a work item allows."""
@@ -441,13 +451,6 @@ def _values_of(
         for measure, block in zip(measures, blocks, strict=True)
         for name, value in zip(measure.names, block, strict=True)
     }
-
-
-def _has_place(item: WorkItem, finer: Refinement) -> bool:
-    """Return whether the memory of this computer has place for a run that is repeated."""
-    stepping, period = item.numbers.stepping.halved(finer.step), item.numbers.period
-    needed = needed_memory(item.case.profile, stepping.step, period / 2**finer.period)
-    return needed <= available_memory()
 
 
 def _peaks(filtered: FloatArray) -> tuple[FloatArray, np.ndarray]:
