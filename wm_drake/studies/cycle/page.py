@@ -62,7 +62,7 @@ def _integration(course: xr.Dataset) -> str:
 
 def _course_table(course: xr.Dataset) -> LabelledTable:
     """Return the course for a file."""
-    words = {name: f"amplitude {name}" for name in course.sensor.values.tolist()}
+    words = {name: f"half swing {name}" for name in course.sensor.values.tolist()}
     return LabelledTable("course", course, across="sensor", words=words, is_in_json=False)
 
 
@@ -75,10 +75,10 @@ def summary(case: Case, course: xr.Dataset) -> str:
             f" and {text_of(last.mass)} at the end; its unbalance goes from "
             f"{text_of(first.unbalance)} to {text_of(last.unbalance)}"
         )
-    largest = course.isel(course.amplitude.argmax(...))
+    largest = course.isel(course.half_swing.argmax(...))
     sentences = [
         f"{text}.",
-        f"The largest amplitude is {text_of(largest.amplitude)}, at sensor "
+        f"The largest half swing is {text_of(largest.half_swing)}, at sensor "
         f"{largest.sensor.item()} at {text_of(largest.drum_speed)} after {text_of(largest.time)}.",
     ]
     if course.gap.notnull().any():
@@ -99,13 +99,13 @@ def summary(case: Case, course: xr.Dataset) -> str:
 
 
 def course_plot(course: xr.Dataset) -> Plot:
-    """Return speed, unbalance, amplitudes, gap and loads of the feet over the cycle."""
+    """Return speed, unbalance, half swings, gap and loads of the feet over the cycle."""
     time = shown(course.time)
     panels = [
         _panel(course, time, ("drum_speed",)),
         _panel(course, time, ("mass",), from_zero=True),
         _panel(course, time, ("unbalance",), from_zero=True),
-        _amplitudes(course, time),
+        _swings(course, time),
     ]
     if course.gap.notnull().any():
         panels.append(_panel(course, time, ("gap",), from_zero=True))
@@ -145,11 +145,11 @@ def _key(array: xr.DataArray, names: tuple[str, ...]) -> str:
     return quantity_of(array).words if len(names) > 1 else ""
 
 
-def _amplitudes(course: xr.Dataset, time: np.ndarray) -> fig.Panel:
-    """Return the amplitudes of all sensors over time."""
-    quantity = quantity_of(course.amplitude)
+def _swings(course: xr.Dataset, time: np.ndarray) -> fig.Panel:
+    """Return the half swings of all sensors over time."""
+    quantity = quantity_of(course.half_swing)
     marks = tuple(
-        fig.Line(time, shown(course.amplitude.sel(sensor=name)), color=color, key=f"sensor {name}")
+        fig.Line(time, shown(course.half_swing.sel(sensor=name)), color=color, key=f"sensor {name}")
         for name, color in zip(course.sensor.values.tolist(), _colours(course), strict=True)
     )
     x = fig.Axis(label=TIME.label, range=(0.0, float(time[-1])))
