@@ -14,6 +14,8 @@ def doubled(number, item):
     """Return twice a number with its place; a string is a fault: a signal, or a wrong key."""
     if item == "SIGKILL":
         os.kill(os.getpid(), signal.SIGKILL)
+    if item == "exit":
+        os._exit(1)
     if isinstance(item, str):
         raise input_error("not a number", key=item)
     return [(number, 2 * item)]

@@ -44,9 +44,10 @@ def test_error_of_a_case_arrives_with_its_problems(in_processes):
     assert raised.value.problems[0].key == "mass"
 
 
-def test_killed_worker_is_an_error(in_processes):
-    with pytest.raises(WmDrakeError, match="a worker process ended before its result"):
-        in_processes(["SIGKILL", 0.0])
+@pytest.mark.parametrize(("end", "cause"), [("SIGKILL", "by SIGKILL"), ("exit", "__main__")])
+def test_a_worker_that_ends_is_an_error_with_its_cause(in_processes, end, cause):
+    with pytest.raises(WmDrakeError, match=cause):
+        in_processes([end, 0.0])
 
 
 @pytest.fixture(scope="module")

@@ -239,7 +239,7 @@ def test_full_disk_is_reported_and_loses_nothing(path):
         [sys.executable, "-c", FULL, str(path)], capture_output=True, text=True, check=True
     )
     number, message = ended.stdout.split(maxsplit=1)
-    assert "is the disk full? Earlier results are kept" in message
+    assert f"is the disk full? Free some space. Its {number} results are kept" in message
     with open_ledger(path, IDENTITY, resume=True) as ledger:
         assert len(ledger) == int(number) > 10
         assert all(ledger.get(str(n)).values["x"][0] == n for n in range(int(number)))

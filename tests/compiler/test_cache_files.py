@@ -7,6 +7,7 @@ import subprocess
 import sys
 
 import pytest
+from read_only import with_read_only
 
 from wm_drake.compiler import cache_files, compilation
 
@@ -27,11 +28,11 @@ def run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("law")
     (folder / "spring.py").write_text(LAW, encoding="utf-8")
 
-    def run(cache, largest=resource.RLIM_INFINITY):
-        environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
+    def run(cache, largest=resource.RLIM_INFINITY, before=(), **variables):
+        environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache), **variables}
         environment["PYTHONPATH"] = os.pathsep.join(sys.path)
         ended = subprocess.run(
-            [sys.executable, folder / "spring.py"],
+            [*before, sys.executable, folder / "spring.py"],
             env=environment,
             capture_output=True,
             text=True,
@@ -96,6 +97,20 @@ def test_disk_that_is_full_leaves_the_cache_out(run, tmp_path):
     assert line == f"compiled code cannot be kept in {next(tmp_path.glob('*/*'))} (File too large)"
     assert run(tmp_path) == (["-6.0", "0"], [])
     assert run(tmp_path) == (["-6.0", "1"], [])
+
+
+def test_a_filled_cache_that_is_read_only_is_read(run, tmp_path):
+    cache, home = tmp_path / "cache", tmp_path / "home"
+    cache.mkdir()
+    before = with_read_only(cache)
+    assert run(cache) == (["-6.0", "0"], [])
+    assert run(cache, before=before, HOME=str(home)) == (["-6.0", "1"], [])
+    for path in cache.rglob("spring*"):
+        path.unlink()
+    assert run(cache, before=before, HOME=str(home)) == (["-6.0", "0"], [])  # written at home
+    assert run(cache, before=before, HOME=str(home)) == (["-6.0", "1"], [])
+    assert run(cache, before=before, HOME=str(cache)) == (["-6.0", "0"], [])  # nowhere to write
+    assert not list(cache.rglob("spring*"))
 
 
 def test_checkouts_of_the_same_sources_share_their_files(load, tmp_path, monkeypatch):

@@ -3,12 +3,14 @@
 import ast
 import re
 import resource
+import subprocess
 import sys
 from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from read_only import with_read_only
 
 import wm_drake
 from wm_drake.errors import InputError
@@ -114,6 +116,27 @@ def test_a_file_that_appears_meanwhile_stays(tmp_path):
         write_files({first: "1", second: "2"}, replace=False, check=appears)
     assert [path.name for path in tmp_path.iterdir()] == ["b.yaml"]
     assert second.read_text() == "of another process"
+
+
+REFUSED = """
+from pathlib import Path
+from wm_drake.errors import InputError
+from wm_drake.parameters.written_files import check_new
+from wm_drake.studies.result_folder import check_is_folder
+for check in (lambda: check_is_folder(Path("out")), lambda: check_new([Path("m")], replace=True)):
+    try:
+        check()
+    except InputError as error:
+        print(error)
+"""
+
+
+def test_a_read_only_file_system_is_named(tmp_path):
+    before = with_read_only(tmp_path)
+    command = [*before, "sh", "-c", 'cd "$0" && exec "$@"', tmp_path, sys.executable, "-c", REFUSED]
+    printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    reason = "cannot be written to: Read-only file system"
+    assert printed.splitlines() == [f"out: {reason}", f"m: {reason}"]
 
 
 INTO_TEMPORARY = {

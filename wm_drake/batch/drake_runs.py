@@ -16,6 +16,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
+from multiprocessing.process import BaseProcess
 from typing import Any
 
 from wm_drake.batch.runs import Advance, BatchJobs, BatchOptions, RunResult
@@ -119,14 +120,29 @@ def drake_pool(
     spawn = multiprocessing.get_context("spawn")
     stopped = spawn.Event()
     at_begin = machine.parameters, options, stopped
+    others, started = set(multiprocessing.active_children()), set[BaseProcess]()
     try:
         with ProcessPoolExecutor(workers, spawn, _begin, at_begin) as processes:
+            # Ctrl-C waits until they have begun: imports would end with tracebacks
+            before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+            processes.submit(os.getpid)  # starts all
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+            started = set(multiprocessing.active_children()) - others
             yield processes, ((_run, *job) for job in jobs), stopped.set
     except BrokenProcessPool:
-        raise WmDrakeError(
-            "a worker process ended before its result; a script that uses several workers needs "
-            '`if __name__ == "__main__":`'
-        ) from None
+        raise WmDrakeError(_why_ended(started)) from None
+
+
+def _why_ended(workers: Iterable[BaseProcess]) -> str:
+    """Return why a worker process ended before its result; the pool ends the others by SIGTERM."""
+    codes = [code for code in (w.exitcode for w in workers) if code not in (None, -signal.SIGTERM)]
+    if any(code < 0 for code in codes):
+        name = signal.Signals(-min(codes)).name
+        return f"a worker process was ended by {name}; if memory is short, take fewer workers"
+    return (
+        "a worker process ended before its result; a script that uses several workers needs "
+        '`if __name__ == "__main__":`'
+    )
 
 
 _RUNNER: list[DrakeRunner] = []
@@ -136,6 +152,7 @@ _RUNNER: list[DrakeRunner] = []
 def _begin(parameters: MachineParameters, options: BatchOptions, stopped: Any) -> None:
     """Build the machine of a worker process, which ends with its parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent stops it
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     threading.Thread(target=_end_with_parent, daemon=True).start()
     _RUNNER.append(DrakeRunner(build_machine(parameters), options, stopped))
 

@@ -23,7 +23,7 @@ import sqlite3
 import threading
 import zlib
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -140,7 +140,7 @@ class Ledger:
             rows.append(
                 (key, shapes, numbers, result.note, _checksum(key, shapes, numbers, result.note))
             )
-        with self._lock, _ledger_errors(self.path), self._connection:
+        with self._lock, _ledger_errors(self.path, self._connection), self._connection:
             self._connection.execute("BEGIN")
             self._connection.executemany(
                 "INSERT OR IGNORE INTO results (key, shapes, numbers, note, checksum) "
@@ -150,11 +150,11 @@ class Ledger:
 
     def mark_finished(self) -> None:
         """Mark the study as finished: the ledger can then be opened again without `resume`."""
-        with self._lock, _ledger_errors(self.path):
+        with self._lock, _ledger_errors(self.path, self._connection):
             self._connection.execute("INSERT OR REPLACE INTO header VALUES ('finished', 'yes')")
 
     def _query(self, statement: str, *values: str) -> list[Any]:
-        with self._lock, _ledger_errors(self.path):
+        with self._lock, _ledger_errors(self.path, self._connection):
             return self._connection.execute(statement, values).fetchall()
 
 
@@ -179,7 +179,7 @@ def open_ledger(
     connection = _connected(path)
     try:
         _check_header(path, connection, {"format": FORMAT} | dict(identity), resume, replace)
-        with _ledger_errors(path):
+        with _ledger_errors(path, connection):
             connection.execute("PRAGMA journal_mode = WAL")
             connection.execute("PRAGMA synchronous = NORMAL")
         yield Ledger(path, connection)
@@ -288,7 +288,7 @@ def _begin(connection: sqlite3.Connection, identity: dict[str, str]) -> None:
 
 def _empty(path: Path, connection: sqlite3.Connection, identity: dict[str, str]) -> None:
     """Delete all results of a ledger, and give it another identity."""
-    with _ledger_errors(path), connection:
+    with _ledger_errors(path, connection), connection:
         connection.execute("BEGIN")
         connection.execute("DELETE FROM results")
         connection.execute("DELETE FROM header")
@@ -296,25 +296,27 @@ def _empty(path: Path, connection: sqlite3.Connection, identity: dict[str, str])
 
 
 @contextmanager
-def _ledger_errors(path: Path) -> Iterator[None]:
+def _ledger_errors(path: Path, connection: sqlite3.Connection) -> Iterator[None]:
     """Convert errors of SQLite into a `LedgerError` with a message for the user."""
     try:
         yield
     except _SQLITE_ERRORS as error:
-        raise LedgerError(f"{path}: {_reason(error)}") from None
+        kept = 0
+        with suppress(*_SQLITE_ERRORS):  # no table yet, or it cannot be read
+            ((kept,),) = connection.execute("SELECT count(*) FROM results")
+        raise LedgerError(f"{path}: {_reason(error, kept)}") from None
 
 
-def _reason(error: Exception) -> str:
+def _reason(error: Exception, kept: int = 0) -> str:
+    """Return why a ledger cannot be used, and what can be done, with the number of its results."""
     name = getattr(error, "sqlite_errorname", "")
     if name.startswith(("SQLITE_BUSY", "SQLITE_LOCKED")):
         return (
             "is in use by another study that runs now; wait until it ends or choose another folder"
         )
     if name.startswith(("SQLITE_FULL", "SQLITE_IOERR")):
-        return (
-            f"cannot be written to ({error}): is the disk full? Earlier results are kept; "
-            "free some space, then go on with --resume"
-        )
+        results = f" Its {kept} results are kept; go on with --resume then." if kept else ""
+        return f"cannot be written to ({error}): is the disk full? Free some space.{results}"
     if name.startswith(("SQLITE_READONLY", "SQLITE_CANTOPEN", "SQLITE_PERM", "SQLITE_AUTH")):
         return f"cannot be written to ({error})"
     return f"is damaged ({error}); {_UNCHANGED}"

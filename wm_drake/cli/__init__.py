@@ -148,10 +148,18 @@ def main() -> None:
     try:
         with libraries_named():
             app()
+    except SystemExit as end:
+        error: BaseException | None = end
+        while error is not None and not isinstance(error, KeyboardInterrupt):
+            error = error.__cause__ or error.__context__
+        if error is None:
+            raise
+        typer.echo(str(error) or "interrupted", err=True)
+        sys.exit(130)
     except WmDrakeError as error:
         typer.echo(str(error), err=True)
     except OSError as error:  # a disk that is full, a folder that cannot be read
-        typer.echo(str(Problem(str(error.filename or "file"), "", reason_of(error))), err=True)
+        typer.echo(str(Problem(str(error.filename or ""), "", reason_of(error))), err=True)
     except MemoryError:
         typer.echo("out of memory", err=True)
     else:

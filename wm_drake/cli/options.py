@@ -24,17 +24,13 @@ MOST_NAMED = 6
 def command_of(study: Study) -> Callable[..., None]:
     """Return the function of the command of a study, with a signature that typer understands."""
     # slow to import, and not for commands without a study
-    from wm_drake.studies.run import StudyInterrupted, execute, options_of_driver, order_of
+    from wm_drake.studies.run import execute, options_of_driver, order_of
 
     def run(context: typer.Context, as_json: bool, **given: Any) -> None:
         chosen = {name: value for name, value in given.items() if _is_set(context, name)}
         chosen["out"] = given["out"]
         order = order_of(study, chosen, command_line())
-        try:
-            result, facts, files = execute(order)
-        except StudyInterrupted as interrupted:
-            typer.echo(str(interrupted), err=True)
-            raise typer.Exit(130) from None
+        result, facts, files = execute(order)
         _print(result, facts, as_json)
         if not as_json:
             say(f"Results in {given['out']}: {_listed(files)}")

@@ -28,26 +28,34 @@ class CheckedCacheFile(IndexDataCacheFile):
     """The index and the data files of one compiled function, each behind the hash of its content.
 
     A file that is damaged counts as missing; one that cannot be written is left out. Both are said
-    in one line on standard error, once in a process.
+    in one line on standard error, once in a process. What is missing is looked for in a second
+    folder, which is only read.
     """
 
+    read_only: str = ""
+
     def _load_index(self) -> dict[Any, str]:
-        stored_content = _read(Path(self._index_path))
-        if stored_content is None:
-            return {}
-        version, stamp, overloads = stored_content
-        fits = version == self._version and stamp == self._source_stamp
-        return overloads if fits else {}
+        found: dict[Any, str] = {}
+        for path in reversed(self._places(self._index_path)):
+            version, stamp, overloads = _read(path) or (None, None, {})
+            if version == self._version and stamp == self._source_stamp:
+                found |= overloads
+        return found
 
     def _save_index(self, overloads: dict[Any, str]) -> None:
         content = (self._version, self._source_stamp, overloads)
         self._write(self._index_path, self._dump(content))
 
     def _load_data(self, name: str) -> Any:
-        stored_content = _read(Path(self._data_path(name)))
-        if stored_content is None:
-            raise FileNotFoundError(name)  # what numba takes as "compile it"
-        return stored_content
+        for path in self._places(self._data_path(name)):
+            if (stored_content := _read(path)) is not None:
+                return stored_content
+        raise FileNotFoundError(name)  # what numba takes as "compile it"
+
+    def _places(self, path: str) -> list[Path]:
+        """Return the path of a file, and that in the folder which is only read."""
+        own = Path(path)
+        return [own, Path(self.read_only, own.name)] if self.read_only else [own]
 
     def _save_data(self, name: str, data: Any) -> None:
         self._write(self._data_path(name), self._dump(data))
@@ -94,8 +102,11 @@ class LawCache(FunctionCache):
     _impl_class = _LawCacheImpl
     _cache_file: IndexDataCacheFile
 
-    def __init__(self, function: Callable[..., Any]) -> None:
+    def __init__(self, function: Callable[..., Any], read_only: str = "") -> None:
         """Choose the files of a function.
+
+        Args:
+            read_only: Folder of compiled code that is only read; "" for none.
 
         Raises:
             RuntimeError, OSError: the folder cannot be written to.
@@ -107,6 +118,8 @@ class LawCache(FunctionCache):
             files._source_stamp,
         )
         self._cache_file = CheckedCacheFile(folder, self._impl.filename_base, stamp)
+        if read_only:
+            self._cache_file.read_only = str(Path(read_only, Path(folder).name))
 
 
 def _shared(folder: Path, function: Callable[..., Any]) -> tuple[str, str] | None:
@@ -138,4 +151,5 @@ def _read(path: Path) -> Any:
 @functools.cache
 def say_once(text: str) -> None:
     """Write a line on standard error, once in a process."""
-    sys.stderr.write(f"{text}\n")
+    if sys.stderr is not None:  # None: it is closed
+        sys.stderr.write(f"{text}\n")

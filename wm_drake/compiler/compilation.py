@@ -11,9 +11,11 @@ Rules for the source: choose between values with ``where``, and take functions f
 modules become constants of the compiled code: they must be in files that `_cache_folder` hashes.
 """
 
+import atexit
 import functools
 import hashlib
 import os
+import shutil
 import tempfile
 import types
 from collections.abc import Callable
@@ -36,8 +38,11 @@ _COMPILED_ROOMS = {"compiler", "laws", "parameters", "elements"}
 for example, are the packed order of its numbers."""
 
 
-def _cache_folder() -> str:
-    """Return the folder of compiled code that belongs to exactly these sources; "" for none.
+def _cache_folders() -> tuple[str, str]:
+    """Return where compiled code of exactly these sources is written, and a folder only to read.
+
+    Each is "" if there is none. A folder that cannot be written to but has code, such as that of a
+    cluster's image, is read; new code goes to the home of the user then, or stays for this process.
 
     numba checks only the file of the function that it compiles: after an edit of a called law, its
     cached callers would keep the old one. The folder is named by the hash of all sources that
@@ -49,16 +54,33 @@ def _cache_folder() -> str:
         room = source.relative_to(_PACKAGE).parts[0]
         if room in _COMPILED_ROOMS or "wm_drake.compiler" in text or "numba" in text:
             digest.update(text.encode())
+    name, chosen = digest.hexdigest()[:16], os.environ.get("NUMBA_CACHE_DIR")
     try:
-        home = Path(os.environ.get("NUMBA_CACHE_DIR") or Path.home() / ".cache" / "wm_drake")
-        folder = home / digest.hexdigest()[:16]
+        own = Path.home() / ".cache" / "wm_drake" / name
+    except RuntimeError:
+        own = None
+    folder = Path(chosen) / name if chosen else own
+    reason = "the user has no home folder" if folder is None else _fault_of(folder)
+    if not reason:
+        return str(folder), ""
+    if folder is not None and folder.is_dir():
+        if own is None or _fault_of(own):
+            temporary = tempfile.mkdtemp(prefix="wm_drake-")
+            atexit.register(shutil.rmtree, temporary, ignore_errors=True)
+            return temporary, str(folder)
+        return str(own), str(folder)
+    say_once(f"compiled code is not kept ({reason}); set NUMBA_CACHE_DIR to a folder for it")
+    return "", ""
+
+
+def _fault_of(folder: Path) -> str:
+    """Return why no file can be written to a folder, which is made; "" if one can."""
+    try:
         folder.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()
-    except (OSError, RuntimeError) as error:  # RuntimeError: the user has no home
-        reason = getattr(error, "strerror", None) or "the user has no home folder"
-        say_once(f"compiled code is not kept ({reason}); set NUMBA_CACHE_DIR to a folder for it")
-        return ""
-    return str(folder)
+    except OSError as error:
+        return error.strerror or str(error)
+    return ""
 
 
 def law(function: Callable[..., Any]) -> Any:
@@ -89,7 +111,7 @@ def _compiled(function: Callable[..., Any], **options: Any) -> Any:
     chosen_by_user = config.CACHE_DIR
     config.CACHE_DIR = CACHE_FOLDER
     try:
-        compiled._cache = LawCache(function)
+        compiled._cache = LawCache(function, READ_ONLY_FOLDER)
     except (RuntimeError, OSError):  # the folder cannot be written to any more
         return compiled
     finally:
@@ -148,5 +170,5 @@ def for_one_run(loop: Any, **parts: Any) -> Any:
     return numba.njit(pipeline_class=TextCompiler, **options)(function)
 
 
-CACHE_FOLDER = _cache_folder()
-"""Folder of compiled code of exactly these sources; "" if none can be written."""
+CACHE_FOLDER, READ_ONLY_FOLDER = _cache_folders()
+"""Folders of compiled code of exactly these sources: to write, and only to read; "" if none."""

@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from wm_drake.compiler.compilation import CACHE_FOLDER
+from wm_drake.compiler.compilation import CACHE_FOLDER, READ_ONLY_FOLDER
 
 _DIGEST = hashlib.sha256().digest_size
 _PACKAGE = Path(__file__).parents[1]
@@ -34,10 +34,11 @@ def kept(key: str, compute: Callable[[], bytes]) -> bytes:
     if not CACHE_FOLDER:
         return compute()
     path = Path(CACHE_FOLDER) / f"{hashlib.sha256(key.encode()).hexdigest()[:32]}.kept"
-    with contextlib.suppress(OSError):
-        stored = path.read_bytes()
-        if hashlib.sha256(stored[_DIGEST:]).digest() == stored[:_DIGEST]:
-            return stored[_DIGEST:]
+    for folder in filter(None, (CACHE_FOLDER, READ_ONLY_FOLDER)):
+        with contextlib.suppress(OSError):
+            stored = Path(folder, path.name).read_bytes()
+            if hashlib.sha256(stored[_DIGEST:]).digest() == stored[:_DIGEST]:
+                return stored[_DIGEST:]
     content = compute()
     part = path.with_suffix(f".{os.getpid()}")
     with contextlib.suppress(OSError):

@@ -14,7 +14,6 @@ import platform as host
 import shutil
 import subprocess
 import sys
-import tempfile
 import time
 import uuid
 import zipfile
@@ -40,7 +39,7 @@ from wm_drake.export.object_code import (
 )
 from wm_drake.export.options import FmuOptions
 from wm_drake.parameters import MachineParameters
-from wm_drake.parameters.written_files import check_new, write_files
+from wm_drake.parameters.written_files import check_new, temporary_folder, write_files
 from wm_drake.simulation.outputs import variables_of
 
 WRAPPER = Path(__file__).parent / "c" / "fmu.c"
@@ -234,8 +233,7 @@ def _library(contents: Mapping[str, bytes], platform: Platform, compiler: list[s
     Raises:
         InputError: the compiler fails.
     """
-    with tempfile.TemporaryDirectory() as folder:
-        place = Path(folder)
+    with temporary_folder() as place:
         for name, content in contents.items():
             (place / name).write_bytes(content)
         library = place / f"{IDENTIFIER}{platform.suffix}"

@@ -5,7 +5,6 @@ process on a cycle of files. So all this is checked here.
 """
 
 import re
-import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,6 +16,7 @@ from wm_drake.model.sdf_elements import element_problems, problem_at
 from wm_drake.model.sdf_text import Node, SdfTextError, read_sdf
 from wm_drake.parameters.inertia import fault_of_mass_properties, inertia_matrix
 from wm_drake.parameters.text_files import read_text
+from wm_drake.parameters.written_files import temporary_folder
 
 MOST_FILES = 50
 """Largest number of files that an SDF consists of."""
@@ -64,8 +64,7 @@ def readable(path: Path, roots: dict[Path, Node]) -> Iterator[tuple[Path, Path]]
     if len(roots) == 1:
         yield path, path.parent
         return
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
+    with temporary_folder() as folder:
         for file, root in roots.items():
             copy = folder / file.relative_to(path.parent)
             copy.parent.mkdir(parents=True, exist_ok=True)

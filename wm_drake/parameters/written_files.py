@@ -8,8 +8,8 @@ import os
 import secrets
 import shutil
 import tempfile
-from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from wm_drake.errors import InputError, input_error, reason_of
@@ -101,6 +101,18 @@ def write_files(
         for part in parts.values():
             with suppress(OSError):
                 part.unlink(missing_ok=True)
+
+
+@contextmanager
+def temporary_folder() -> Iterator[Path]:
+    """Yield a folder that is removed after the block; a full disk is an error that names it."""
+    with tempfile.TemporaryDirectory(prefix="wm_drake-") as name:
+        try:
+            yield Path(name)
+        except OSError as error:
+            if error.filename is not None:  # such as a program that cannot be started
+                raise
+            raise unwritable(Path(name), error) from None
 
 
 def _real(path: Path) -> Path:

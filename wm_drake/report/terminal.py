@@ -36,6 +36,6 @@ class Console(rich.console.Console):
     def __init__(self, *, stderr: bool = False, **options: Any) -> None:
         """Choose the width from the stream."""
         stream = sys.stderr if stderr else sys.stdout
-        if not stream.isatty() and "COLUMNS" not in os.environ:
+        if not (stream and stream.isatty()) and "COLUMNS" not in os.environ:
             options.setdefault("width", _UNLIMITED)
         super().__init__(stderr=stderr, markup=False, emoji=False, quiet=is_quiet(), **options)

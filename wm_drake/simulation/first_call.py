@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wm_drake.compiler.compilation import CACHE_FOLDER
+from wm_drake.compiler.compilation import CACHE_FOLDER, READ_ONLY_FOLDER
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.engines.compiled.linear import is_followed
 from wm_drake.engines.compiled.packing import initial_state, pack
@@ -38,7 +38,7 @@ def compile_in_two_processes(parameters: MachineParameters) -> None:
         parameters: The machine that is about to run.
     """
     started = Path(CACHE_FOLDER, "second_process")
-    if not CACHE_FOLDER or (os.cpu_count() or 1) < 2:
+    if READ_ONLY_FOLDER or not CACHE_FOLDER or (os.cpu_count() or 1) < 2:
         return
     try:
         machine = pickle.dumps(parameters)
