@@ -26,9 +26,9 @@ from wm_drake.batch.ledger import open_ledger
 from wm_drake.model.bodies import sdf_path
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import MachineParameters, load_machine, machine_file_with, machine_path
-from wm_drake.parameters.free import FreeFile, load_free
 from wm_drake.parameters.measured import EXPERIMENT, measured_amplitudes
 from wm_drake.parameters.published import published_results
+from wm_drake.parameters.vary_file import VaryFile, load_vary
 from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.progress import progress_bar, progress_bars
 from wm_drake.studies.calibrate.prediction import FITS, Prediction, predict
@@ -51,7 +51,7 @@ HELD_OUT = (("counter",), ("middle",), ("back", "front"))
 """Loads that are held out together, one group per prediction."""
 
 PLAN = SearchPlan(starts=1, iterations=1, deviation=0.04)
-"""The start of the free file is the end of a wide search; it is only evaluated."""
+"""The start of the vary file is the end of a wide search; it is only evaluated."""
 
 DEVIATIONS = {
     "effect": 0.03,
@@ -108,12 +108,12 @@ def main() -> None:
 
 def _searched(
     arguments: argparse.Namespace,
-) -> tuple[FreeFile, SearchPlan, tuple[tuple[str, ...], ...]]:
+) -> tuple[VaryFile, SearchPlan, tuple[tuple[str, ...], ...]]:
     """Return free quantities, plan of the search, and groups of loads that are held out."""
-    free = load_free(Path(__file__).with_name(f"{REFERENCE}_free.yaml"))
+    free = load_vary(Path(__file__).with_name(f"{REFERENCE}_free.yaml"))
     if arguments.quick:
-        few = dict(list(free.quantities.items())[:3])
-        return FreeFile(quantities=few), SearchPlan(starts=1, iterations=1), (("back", "front"),)
+        few = dict(list(free.vary.items())[:3])
+        return VaryFile(vary=few), SearchPlan(starts=1, iterations=1), (("back", "front"),)
     return free, PLAN, HELD_OUT if arguments.predict else ()
 
 
@@ -225,7 +225,7 @@ def _lines_of_study(best: Solution) -> list[str]:
 def _write(calibration: Calibration) -> None:
     solved = solved_machine(calibration.solutions[0])
     path, model = machine_path(solved.name), sdf_path(solved.model)
-    keys = dict.fromkeys(value.key for value in calibration.parameter_map.values)
+    keys = dict.fromkeys(key for key, _, _ in calibration.parameter_map.varying.origins())
     kept = [key for key in keys if not key.startswith(("bodies.", "frames."))]
     texts = {
         model: sdf_with(model.read_text(encoding="utf-8"), solved),

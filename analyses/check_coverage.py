@@ -21,8 +21,8 @@ from wm_drake.batch.ledger import open_ledger
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import load_machine
-from wm_drake.parameters.free import FreeFile, load_free
 from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.vary_file import VaryFile, load_vary
 from wm_drake.studies.calibrate.computed import Evaluation
 from wm_drake.studies.calibrate.options import CalibrateOptions
 from wm_drake.studies.calibrate.parameter_map import ParameterMap, parameter_map_of
@@ -50,7 +50,7 @@ def main() -> None:
     starts = 1 if arguments.quick else CalibrateOptions.model_fields["starts"].default
     seeds = range(1 if arguments.quick else arguments.seeds)
     machine = build_machine(load_machine("reference"))
-    free = _few(load_free(Path(__file__).with_name("reference_free.yaml")))
+    free = _few(load_vary(Path(__file__).with_name("reference_free.yaml")))
     parameter_map = parameter_map_of(machine, free)
     inside, worse = [], []
     for seed in seeds:
@@ -78,12 +78,10 @@ def main() -> None:
         arguments.out.write_text(text + "\n", encoding="utf-8")
 
 
-def _few(free: FreeFile) -> FreeFile:
-    """Return a free file of `QUANTITIES`, each searched from its expected value."""
-    quantities = {
-        name: free.quantities[name].model_copy(update={"start": None}) for name in QUANTITIES
-    }
-    return FreeFile(quantities=quantities)
+def _few(free: VaryFile) -> VaryFile:
+    """Return a vary file of `QUANTITIES`, each searched from its expected value."""
+    quantities = {name: free.vary[name].model_copy(update={"start": None}) for name in QUANTITIES}
+    return VaryFile(vary=quantities)
 
 
 def _planted(
@@ -102,7 +100,7 @@ def _planted(
 
 
 def _calibrated(
-    machine: Machine, free: FreeFile, targets: Targets, plan: SearchPlan
+    machine: Machine, free: VaryFile, targets: Targets, plan: SearchPlan
 ) -> Calibration:
     with tempfile.TemporaryDirectory() as folder:
         identity = identity_of(machine, free, targets, plan)

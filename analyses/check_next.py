@@ -55,11 +55,11 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="one measurement and one seed")
     parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--machine", default="reference")
-    parser.add_argument("--tolerances", default="laundry_and_parts")
+    parser.add_argument("--vary", default="laundry_and_parts")
     parser.add_argument("--out", type=Path, help="also write the result to this file")
     given = parser.parse_args()
     seeds, count = (1, 1) if given.quick else (given.seeds, FIRST)
-    model = _model(given.machine, given.tolerances, 32 if given.quick else 256)
+    model = _model(given.machine, given.vary, 32 if given.quick else 256)
     names = singles_of(model)["name"].values.tolist()[:count]
     known = [m.name for m in model.question.measurements]
     before = half_widths(model.after(()))[0]
@@ -94,9 +94,9 @@ def main() -> None:
         given.out.write_text(text + "\n", encoding="utf-8")
 
 
-def _model(machine: str, tolerances: str, samples: int) -> Model:
+def _model(machine: str, vary: str, samples: int) -> Model:
     """Return the model of the study."""
-    options = NextOptions(machine=machine, tolerances=tolerances)
+    options = NextOptions(machine=machine, vary=vary)
     task = NextTask(options, build_machine(load_machine(machine)))
     question = question_of(Here(), task.knowledge, task.measurements, task.answers, task.cases)
     return model_of(question, samples, options.seed)

@@ -33,7 +33,7 @@ from wm_drake.studies.calibrate.records import GAIN_SD, TILT_SD, RecordModel
 from wm_drake.studies.compare.pairs import paired, predicted_signals
 from wm_drake.studies.compare.recordings import TestRecording
 from wm_drake.studies.experiment import Experiment, record_here
-from wm_drake.studies.fitting.sought import SoughtNumbers, sought_of
+from wm_drake.studies.fitting.sought import SoughtNumbers, sought_in
 from wm_drake.studies.tolerance.shares import share_of
 
 UNKNOWNS = ("damper_types.friction.friction_force", "loads.middle.unbalances.0.mass")
@@ -90,7 +90,7 @@ def _line(name: str, rows: pd.DataFrame) -> str:
 def _found(machine: Machine, seed: int, by: Any) -> FloatArray:
     """Return for each unknown whether its interval holds the planted value, error, half-width."""
     parameters, generator = machine.parameters, np.random.default_rng(seed)
-    sought = tuple(sought_of(parameters, [name]) for name in UNKNOWNS)
+    sought = sought_in(parameters, UNKNOWNS)
     truth = np.array([s.guess for s in sought]) * np.exp(generator.uniform(-SPAN, SPAN, 2))
     planted = with_values(parameters, dict(zip(UNKNOWNS, truth.tolist(), strict=True)))
     sensors = {name: recorded_test_of(parameters).sensors[name] for name in SENSORS}

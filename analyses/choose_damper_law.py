@@ -23,7 +23,7 @@ from wm_drake.model.build import build_machine
 from wm_drake.parameters import load_machine, machine_path
 from wm_drake.parameters.damper_laws import DAMPER_LAWS
 from wm_drake.parameters.files import read_yaml, yaml_text
-from wm_drake.parameters.free import FreeFile
+from wm_drake.parameters.vary_file import VaryFile
 from wm_drake.report.progress import progress_bar
 from wm_drake.studies.calibrate.solutions import Solution
 from wm_drake.studies.calibrate.study import calibrate, identity_of
@@ -108,14 +108,14 @@ def prior_mean(prior: str) -> str:
 def quantity_of(name: str) -> dict[str, Any]:
     """Return bounds, prior and source of a number of a damper."""
     known = {**OF_SPONGE, **OF_FREE_STROKE}
-    entry = known.get(name) or read_yaml(FREE)["quantities"][VELOCITY]
+    entry = known.get(name) or read_yaml(FREE)["vary"][VELOCITY]
     return {key: entry[key] for key in ("bounds", "prior", "source")}
 
 
 def free_tree_of(law: str) -> dict[str, Any]:
-    """Return the free file of the reference machine with the numbers of a law, as a tree."""
+    """Return the vary file of the reference machine with the numbers of a law, as a tree."""
     tree: dict[str, Any] = read_yaml(FREE)
-    quantities = tree["quantities"]
+    quantities = tree["vary"]
     del quantities[VELOCITY]
     if law not in DASHPOT:
         del quantities["damper_damping"]
@@ -125,9 +125,9 @@ def free_tree_of(law: str) -> dict[str, Any]:
     return tree
 
 
-def free_of(law: str) -> FreeFile:
+def free_of(law: str) -> VaryFile:
     """Return the free quantities of the reference machine with the numbers of a law."""
-    return FreeFile.model_validate(free_tree_of(law))
+    return VaryFile.model_validate(free_tree_of(law))
 
 
 def row_of(law: str, best: Solution) -> dict[str, Any]:
@@ -165,7 +165,7 @@ def main() -> None:
             targets = adams_targets(load_machine(REFERENCE))
             if arguments.quick:
                 few = ("damper_friction", "damper_damping", "motor_mass")
-                free = FreeFile(quantities={name: free.quantities[name] for name in few})
+                free = VaryFile(vary={name: free.vary[name] for name in few})
                 targets = targets.without("middle", "back", "front")
             identity = identity_of(machine, free, targets, plan)
             kept = (arguments.out or path).with_name(f"{law}.sqlite")

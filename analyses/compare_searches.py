@@ -16,8 +16,7 @@ import numpy as np
 import pandas as pd
 
 from wm_drake import build_machine, load_machine, progress_bar
-from wm_drake.parameters import SpinProfile
-from wm_drake.parameters.designs import load_design
+from wm_drake.parameters import SpinProfile, load_vary, varying
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.design.problem import MachineDesigns, machine_designs
@@ -54,12 +53,12 @@ def main() -> None:
     parser.add_argument("--evaluations", type=int, default=1024)
     parser.add_argument("--seeds", type=int, default=3)
     arguments = parser.parse_args()
-    parameters, task = load_machine("reference"), load_design("gasket")
+    parameters, file = load_machine("reference"), load_vary("gasket")
     profile, count, seeds = parameters.profile, arguments.evaluations, arguments.seeds
     if arguments.quick:
         profile, count, seeds = SpinProfile(time=(0.0, 2.0), speed=(0.0, 9.0)), 96, 1
-    loads = [Case(name, parameters.loads[name], profile) for name in task.loads]
-    designs = machine_designs(parameters, task, loads)
+    loads = [Case(name, parameters.loads[name], profile) for name in file.loads]
+    designs = machine_designs(varying(parameters, file.entries()), file, loads)
     experiment = Experiment(build_machine(parameters), ("extremes", "gap"))
     rows = []
     with progress_bar(len(SEARCHES) * seeds * count) as progress:

@@ -11,12 +11,15 @@ import subprocess
 import tempfile
 from collections import Counter
 from collections.abc import Iterable, Mapping
+from itertools import repeat
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 UNIT = re.compile(r"_(mm|rpm|Hz|hz|deg|percent|kg|gm|k?N|k?Nm|Nmm|mJ|MPa|ms|g|m|s|\w*N\w*_per_m*)$")
 FACTORS = {"MM_PER_M", "GM_PER_KGM", "MPA_PER_PA", "MS_PER_S", "RPM_PER_RAD_S"}
 FACTORS |= {f(n) for n in (1e3, 1e-3, 1e6, 1e-6, 100.0, 60.0, 30.0) for f in (str, "{:g}".format)}
+METHODS = (".attrs.get", ".attrs.update", ".attrs.pop")
+OTHER_MARKS = {"Area", "Bars", "Cells", "Span", "Text", "band", "boxes", "segments"}
 Code = Mapping[str, list[ast.AST]]  # nodes of the syntax of each module, by its name
 
 
@@ -70,12 +73,62 @@ def _counts(code: Code) -> Iterable[tuple[str, int]]:
     yield "texts that are names with a unit", sum(bool(UNIT.search(text)) for text in texts)
     yield "lines of studies with a unit factor", len({(m, n.lineno) for m, n in factors})
     yield "modules of studies in circles of imports", len(_in_circles(studies))
+    for name in ("SHARE", "MASS", "CHANGE"):
+        yield f"quantities named {name}", sum(map(_is_quantity, every, repeat(name)))
+    yield "quantities with the words 'smallest gap'", sum(map(_has_words, every))
+    yield "decisions by the words of a quantity", sum(map(_reads_words, every))
+    lines = {(m, at) for m in studies for n in studies[m] if (at := _line_of_attributes(n))}
+    yield "lines of studies with attributes of datasets", len(lines)
+    yield "figures of lines and points, mark by mark", sum(map(_draws_lines, every))
+
+
+def _is_quantity(node: ast.AST, name: str) -> bool:
+    """Return whether a statement gives a quantity, or its unit, a name at the top of a module."""
+    if not isinstance(node, ast.Assign) or name not in map(ast.unparse, node.targets):
+        return False
+    return bool(re.match(r"(Quantity|Unit)\(|[A-Z_]+\.named\(", ast.unparse(node.value)))
+
+
+def _has_words(node: ast.AST) -> bool:
+    """Return whether a quantity is made whose words are 'smallest gap'."""
+    text = ast.unparse(node) if isinstance(node, ast.Call) else ""
+    return text.startswith("Quantity('smallest gap'")
+
+
+def _reads_words(node: ast.AST) -> bool:
+    """Return whether words of a quantity are compared with a text."""
+    tests = ("words.startswith", "words.endswith")
+    if isinstance(node, ast.Call):
+        return ast.unparse(node.func).endswith(tests)
+    of_words = isinstance(node, ast.Compare) and ast.unparse(node.left).endswith(".words")
+    return of_words and isinstance(node.comparators[0], ast.Constant)
+
+
+def _line_of_attributes(node: ast.AST) -> int:
+    """Return the line in which attributes of a dataset are written or read by name; 0 if none."""
+    is_used = (
+        (isinstance(node, ast.Attribute) and node.attr == "assign_attrs")
+        or (isinstance(node, ast.keyword) and node.arg == "attrs")
+        or (isinstance(node, ast.Subscript) and ast.unparse(node.value).endswith(".attrs"))
+        or (isinstance(node, ast.AugAssign) and ast.unparse(node.target).endswith(".attrs"))
+        or (isinstance(node, ast.Attribute) and ast.unparse(node).endswith(METHODS))
+    )
+    return getattr(node, "lineno", 0) if is_used else 0
+
+
+def _draws_lines(node: ast.AST) -> bool:
+    """Return whether a function makes a panel of lines and points, each by hand."""
+    if not isinstance(node, ast.FunctionDef):
+        return False
+    calls = (ast.unparse(n.func) for n in ast.walk(node) if isinstance(n, ast.Call))
+    made = {name.removeprefix("fig.") for name in calls}
+    return "Panel" in made and bool(made & {"Line", "Points"}) and not made & OTHER_MARKS
 
 
 def _results(code: Code) -> set[str]:
-    """Return the classes that inherit from `Result`, directly or not, but `Answer`."""
+    """Return the classes that inherit from `Result` or `Answer`, directly or not."""
     classes = [n for nodes in code.values() for n in nodes if isinstance(n, ast.ClassDef)]
-    found = {"Result"}
+    found = {"Result", "Answer"}
     while more := {c.name for c in classes if found & {*map(ast.unparse, c.bases)}} - found:
         found |= more
     return found - {"Result", "Answer"}

@@ -35,7 +35,7 @@ PLOTS = "plots.json"
 """File beside the pictures with the titles of the plots of each page."""
 
 FREE = """\
-quantities:
+vary:
   friction:
     bounds: (10, 60) N
     prior: (30, 10) N
@@ -139,7 +139,7 @@ ENTRIES = (
     Entry(
         "calibrate",
         "Calibrated to measured amplitudes",
-        "wm-drake calibrate --free free.yaml --starts 1",
+        "wm-drake calibrate --vary free.yaml --starts 1",
         files=(("free.yaml", FREE),),
     ),
     Entry(

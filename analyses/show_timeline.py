@@ -38,7 +38,7 @@ IMPORTS, OTHER = "imports", "other"
 PARTS = {
     "machine": ("wm_drake.studies.run:_machine_of",),
     "runs": ("wm_drake.studies.executor:Executor.simulate", "wm_drake.batch.runs:Runner.run"),
-    "page": ("wm_drake.studies.study:Result.pages",),
+    "page": ("wm_drake.studies.answer:Answer.pages",),
     "files": ("wm_drake.studies.run:_written",),
 }
 """Functions whose time is that of a part."""

@@ -45,14 +45,14 @@ STUDIES = (
     ("study", "spin-cycle", "--case", "1", "--case", "2"),
     ("study", "spin-identify", "--quick"),
     ("study", "tolerance", "--quick", "--samples", "64"),
-    ("calibrate", "--quick", "--free", "free.yaml"),
+    ("calibrate", "--quick", "--vary", "free.yaml"),
     ("verdict", "--quick"),
     ("study", "balancer", "--quick"),
     ("study", "gasket-geometry", "--quick", "--drawings", "6", "--fresh", "2", "--load", "middle"),
 )
 """Studies with a ledger, all that can be resumed, in small sizes; they are killed."""
 
-FREE = """quantities:
+FREE = """vary:
   spring:
     bounds: (1, 20) N/mm
     prior: (7.5, 2) N/mm

@@ -35,8 +35,8 @@ from wm_drake.parameters import (
     measured_changes,
     published_results,
 )
-from wm_drake.parameters.free import FreeFile
 from wm_drake.parameters.measured import EXPERIMENT
+from wm_drake.parameters.vary_file import VaryFile
 from wm_drake.report.quantity import quantity_of, shown
 from wm_drake.studies.calibrate.study import SearchPlan, calibrate, identity_of
 from wm_drake.studies.calibrate.targets import targets_of
@@ -197,7 +197,7 @@ def damping_line(machine: MachineParameters, is_quick: bool) -> list[str]:
     table = measured_amplitudes(machine)
     rows = table[(table.gasket == "yes") & (table.source == ADAMS_SOURCE)]
     targets = targets_of(machine, rows.assign(source=EXPERIMENT))
-    free = FreeFile.model_validate({"quantities": FREE_DAMPING})
+    free = VaryFile.model_validate({"vary": FREE_DAMPING})
     built = build_machine(machine)
     plan = SearchPlan(
         starts=1, iterations=1 if is_quick else 0, deviation=DEVIATION, resolution=0.0

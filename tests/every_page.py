@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-FREE = """quantities:
+FREE = """vary:
   friction: {bounds: "(10, 60) N", prior: "(30, 10) N", sets: damper_types.friction.friction_force, source: test}
   radius: {bounds: "(230, 250) mm", prior: "(240, 5) mm", sets: loads.middle.unbalances.0.radius, source: test}
 """
@@ -70,7 +70,7 @@ KINDS = {
     ),
     "identify_static": _one("sections.html", "identify", "gasket", "--static", "radial=r.csv", "axial=a.csv"),
     "calibration": _one(
-        "sections.html", "calibrate", "--machine", "short.yaml", "--free", "free.yaml",
+        "sections.html", "calibrate", "--machine", "short.yaml", "--vary", "free.yaml",
         "--targets", "measured.csv", "--starts", "1", "--iterations", "3",
         "--leave-out", "back",
     ),
@@ -130,7 +130,7 @@ KINDS = {
     ),
     "verdict": _one("sections.html", "verdict", "short.yaml", "--samples", "16", "--profile", "short_cycle.yaml"),
     "next": _one(
-        "sections.html", "study", "next", "--free", "free.yaml", "--samples", "32", "--budget", "2",
+        "sections.html", "study", "next", "--vary", "free.yaml", "--samples", "32", "--budget", "2",
         "--profile", "short_cycle.yaml",
     ),
     "design": _one("sections.html", "study", "design", "gasket", "--evaluations", "48", "--population", "16", "--profile", "short_cycle.yaml"),

@@ -225,7 +225,7 @@ def write_commands_page(folder, text):
         if re.search(rf"\b{name}", text):
             write(folder / name)
     (folder / "tolerances.yaml").write_text(
-        "load: middle\nquantities:\n  friction: {keys: [damper_types.friction.friction_force], "
+        "loads: middle\nvary:\n  friction: {keys: [damper_types.friction.friction_force], "
         "distribution: uniform, low: 35 N, high: 45 N}\n",
         encoding="utf-8",
     )

@@ -122,7 +122,7 @@ record channels spin/record_middle.nc
 record orders spin/record_middle.nc --out orders
 record compare spin/record_middle.nc --load middle --channels 'Xr=displacement(Xr)' --out compare
 calibrate spin/record_middle.nc --load middle --channels 'Xr=displacement(Xr)' --unknown 'damper_types.friction.friction_force=(30, 40) N' --quick --out record_calibrate
-calibrate --machine short.yaml --free free.yaml --targets measured.csv --quick --out calibrate
+calibrate --machine short.yaml --vary free.yaml --targets measured.csv --quick --out calibrate
 verdict short.yaml --samples 16 --out verdict
 export fmu --load middle --out machine.fmu
 export page --load middle --out machine.html
@@ -134,7 +134,7 @@ study gasket --quick --response D --profile short_cycle.yaml --out gasket
 study gasket-damping --mesh 20 --record middle=spin/record_middle.nc --out gasket_damping
 study gasket-geometry --quick --profile short_cycle.yaml --out gasket_geometry
 study modes --quick --out modes
-study next short.yaml --quick --free free.yaml --out next
+study next short.yaml --quick --vary free.yaml --out next
 study response --quick --load middle --out response
 study spin-cycle --quick --profile eight_regions.yaml --out spin_cycle
 study spin-identify --quick --case 2 --unknown 'gasket.stiffness_y=(1, 4) N/mm' --profile short_cycle.yaml --out spin_identify

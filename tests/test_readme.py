@@ -18,17 +18,16 @@ from wm_drake.errors import LIBRARIES
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import SpinProfile, load_component, load_machine, quantities
 from wm_drake.parameters.candidates import load_candidates
-from wm_drake.parameters.designs import load_design
-from wm_drake.parameters.free import FreeFile, load_free
 from wm_drake.parameters.gasket_drawing import load_gasket_drawing
+from wm_drake.parameters.limits import load_limits
 from wm_drake.parameters.recorded_sensors import load_recorded_test
-from wm_drake.parameters.tolerances import load_limits, load_tolerances
 from wm_drake.parameters.variation import number_at
+from wm_drake.parameters.vary_file import VaryFile, load_vary
 from wm_drake.simulation.measures import measure
 from wm_drake.simulation.runs import simulate
 from wm_drake.studies.calibrate.parameter_map import parameter_map_of
 
-PAGES = [README, *HOW_TO]
+PAGES = [README, *HOW_TO, CHECKOUT / "docs" / "reference" / "vary-file.md"]
 SHORT = SpinProfile(time=(0.0, 6.0), speed=(0.0, 12.0))
 
 
@@ -186,12 +185,13 @@ MACHINES = [  # page, index of the block, a number in it by key path
 OTHERS = [
     (page("accelerometers"), 0, load_recorded_test),
     (page("bench-to-machine"), 0, load_component),
-    (page("calibrate"), 0, load_free),
-    (page("designs"), 0, load_design),
+    (page("calibrate"), 0, load_vary),
+    (page("designs"), 0, load_vary),
     (page("gasket-drawing"), 0, load_gasket_drawing),
     (page("gasket-drawing"), 1, load_gasket_drawing),
     (page("measure-next"), 0, load_candidates),
-    (page("tolerances"), 0, load_tolerances),
+    (page("tolerances"), 0, load_vary),
+    (CHECKOUT / "docs" / "reference" / "vary-file.md", 0, load_vary),
     (page("tolerances"), 1, load_limits),
 ]
 
@@ -224,7 +224,7 @@ def test_every_yaml_block_is_one_of_those_above():
 
 
 def test_the_example_of_a_free_file_fits_the_reference_machine(tmp_path, machine):
-    parameter_map = parameter_map_of(machine, load_free(written(tmp_path, page("calibrate"))))
+    parameter_map = parameter_map_of(machine, load_vary(written(tmp_path, page("calibrate"))))
     frames = parameter_map.parameters_at(parameter_map.expected).frames
     assert (
         frames["damper_left_housing"].position[0]
@@ -234,12 +234,12 @@ def test_the_example_of_a_free_file_fits_the_reference_machine(tmp_path, machine
 
 
 def test_the_example_of_a_relation_is_that_of_a_ring(machine):
-    free = load_free(CHECKOUT / "analyses" / "reference_free.yaml")
+    free = load_vary(CHECKOUT / "analyses" / "reference_free.yaml")
     (text,) = blocks(page("calibrate"), "yaml")[1:]
     names = ("gasket_torsion", "gasket_radial")
-    few = FreeFile.model_validate(
+    few = VaryFile.model_validate(
         {
-            "quantities": {name: free.quantities[name] for name in names},
+            "vary": {name: free.vary[name] for name in names},
             "relations": yaml.safe_load(text)["relations"],
         }
     )
@@ -250,7 +250,7 @@ def test_the_example_of_a_relation_is_that_of_a_ring(machine):
 
 
 def test_the_free_file_of_the_calibration_fits_the_reference_machine(machine):
-    free = load_free(CHECKOUT / "analyses" / "reference_free.yaml")
+    free = load_vary(CHECKOUT / "analyses" / "reference_free.yaml")
     parameter_map = parameter_map_of(machine, free)
     made = parameter_map.parameters_at(parameter_map.start)
     tilt, axial = (

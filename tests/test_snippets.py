@@ -46,8 +46,8 @@ NOT_RUN = {  # beginning of a command, and why this test does not run it
     "wm-drake study tolerance laundry --samples 8192": "minutes: the tutorial will-it-hit runs 128",
     "wm-drake study design mine.yaml --evaluations 5000": "minutes: test_readme reads the file",
     "wm-drake study gasket-damping --mesh 0.05": "minutes: --mesh 4 is in the gallery",
-    "wm-drake study next --free free.yaml": "the tutorial measure-next runs it with a short machine",
-    "wm-drake calibrate --free free.yaml --resume": "continues what was interrupted: test_cli_calibrate",
+    "wm-drake study next --vary free.yaml": "the tutorial measure-next runs it with a short machine",
+    "wm-drake calibrate --vary free.yaml --resume": "continues what was interrupted: test_cli_calibrate",
 }
 HOURS = (  # commands of more than some five seconds of processor time; the marker `hours` runs them
     "wm-drake verdict", "wm-drake gasket curves folded",

@@ -17,8 +17,8 @@ from wm_drake.batch.ledger import open_ledger
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import load_machine
-from wm_drake.parameters.free import FreeFile, load_free
 from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.vary_file import VaryFile, load_vary
 from wm_drake.studies.calibrate.computed import Evaluation
 from wm_drake.studies.calibrate.parameter_map import ParameterMap, parameter_map_of
 from wm_drake.studies.calibrate.study import calibration_problem, identity_of
@@ -54,7 +54,7 @@ class FitByRuns:
     """
 
     machine: Machine
-    free: FreeFile
+    free: VaryFile
     ledger_path: Path
 
     def costs(self, points: FloatArray) -> FloatArray:
@@ -112,13 +112,13 @@ def shipped_point(parameter_map: ParameterMap) -> FloatArray:
     """Return the free quantities of the shipped machine, with its gasket alike in x and z.
 
     Args:
-        parameter_map: That of a free file of the net. A quantity that the file of the shipped
+        parameter_map: That of a vary file of the net. A quantity that the file of the shipped
             machine does not have is at its expected value, as the numbers of another damper law.
 
     Returns:
         (quantity,) [SI]
     """
-    shipped = parameter_map_of(build_machine(load_machine(REFERENCE)), load_free(FREE))
+    shipped = parameter_map_of(build_machine(load_machine(REFERENCE)), load_vary(FREE))
     values = dict(zip(shipped.names, shipped.start.tolist(), strict=True))
     values["gasket_vertical"] = values["gasket_radial"]
     pairs = zip(parameter_map.names, parameter_map.expected.tolist(), strict=True)

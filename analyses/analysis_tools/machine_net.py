@@ -27,17 +27,11 @@ from wm_drake.batch import simulate_many
 from wm_drake.errors import InputError
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
-from wm_drake.parameters import (
-    GASKET_FACTORS,
-    MachineParameters,
-    at_levels,
-    levels_of,
-    load_factors,
-    load_machine,
-)
+from wm_drake.parameters import MachineParameters, load_machine
 from wm_drake.parameters.files import read_yaml
-from wm_drake.parameters.free import FreeFile
 from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.vary_file import VaryFile, gasket_entries
+from wm_drake.parameters.varying import varying
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.calibrate.parameter_map import ParameterMap, parameter_map_of
 from wm_drake.studies.calibrate.response_targets import ComputedResponses
@@ -63,19 +57,19 @@ profile:
 """Runs of the net: with steps of 5 ms, which change peaks by about 1 %."""
 
 
-def free_of_net(law: str) -> FreeFile:
+def free_of_net(law: str) -> VaryFile:
     """Return the free quantities of the net for a damper law."""
     tree, wide = free_tree_of(law), read_yaml(PRIORS)
-    quantities: dict[str, Any] = tree["quantities"]
+    quantities: dict[str, Any] = tree["vary"]
     sets = quantities["gasket_radial"]["sets"]
     of_z = {key: sets.pop(key) for key in [*sets] if "stiffness_z" in key}
     quantities["gasket_vertical"] = {"sets": of_z}
-    for name, changes in wide["quantities"].items():
+    for name, changes in wide["vary"].items():
         quantities[name] |= changes
     for quantity in quantities.values():
         quantity.pop("start", None)
     tree["relations"] |= wide["relations"]
-    return FreeFile.model_validate(tree)
+    return VaryFile.model_validate(tree)
 
 
 def machine_of_net(law: str, addition: str = "") -> Machine:
@@ -93,7 +87,7 @@ class Net:
         """Build the machines: one with curves for a gasket, one with constant stiffnesses."""
         self.machine = machine_of_net(law, SHORT)
         self.map: ParameterMap = parameter_map_of(self.machine, free_of_net(law))
-        self.factors = load_factors(GASKET_FACTORS)
+        self.factors = gasket_entries()
         self.linear = build_machine(self._trial(self.machine.parameters, ()))
         self.shape = Shape(self.map.names)
 
@@ -127,7 +121,7 @@ class Net:
         """Return a machine with constant stiffnesses of the gasket, some factors at a level."""
         chosen = dict(levels)
         row = [chosen.get(name, 0) for name in self.factors]
-        return at_levels(parameters, levels_of(parameters, self.factors, "linear"), row)
+        return varying(parameters, self.factors, tables="linear").at_levels(row)
 
     def scored(self, points: FloatArray) -> Scored:
         """Return machines (machine, quantity) with the first part of their scores, by runs.

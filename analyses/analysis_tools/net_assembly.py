@@ -137,7 +137,7 @@ class Assembly:
                 found[key] = np.tile(row, (count, 1))
         if np.isnan(points).all():
             return found
-        for free in self.map.values:
+        for free in self.map.varying.sums:
             values = free.constant + points @ free.factors
             if free.component is None:
                 found[free.key] = values

@@ -15,8 +15,8 @@ from analysis_tools.steady_motion import Cases, steady_motions
 from analysis_tools.study_targets import StudyRuns, StudyTarget
 from wm_drake.elements.damper_law import packed_damper_law
 from wm_drake.model.machine import Machine
-from wm_drake.parameters import GASKET_FACTORS, load_factors
 from wm_drake.parameters.types import ComplexArray, FloatArray
+from wm_drake.parameters.vary_file import gasket_entries
 from wm_drake.studies.calibrate.computed import Computed
 from wm_drake.studies.calibrate.parameter_map import ParameterMap
 
@@ -52,7 +52,7 @@ class SteadyNet:
         self.parameter_map, self.shape, self.targets = parameter_map, shape, shape.targets
         self.assembly = Assembly(machine, parameter_map)
         self._runs = StudyRuns(machine)
-        self._factors = load_factors(GASKET_FACTORS)
+        self._factors = gasket_entries()
         (self._damper,) = parameter_map.base.damper_types.values()
         levels = np.zeros((len(CASES), len(self._factors)), dtype=int)
         for row, trial in enumerate(MIDDLE_TRIALS, start=4):

@@ -9,10 +9,10 @@ import numpy as np
 
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
-from wm_drake.parameters import FactorLevels, MachineParameters, at_levels, levels_of, load_factors
-from wm_drake.parameters.factors import GASKET_FACTORS
+from wm_drake.parameters import MachineParameters, Varying, varying
 from wm_drake.parameters.published import CONSTANT, OF_RESPONSE, published_results
 from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.vary_file import gasket_entries
 from wm_drake.simulation.measures.responses import known_responses
 from wm_drake.studies.calibrate.response_targets import ResponseRuns, ResponseTarget
 from wm_drake.studies.doe.coding import Levels
@@ -39,20 +39,19 @@ class StudyRuns(ResponseRuns):
     Stiffness tables are replaced by the slopes of their first 20 %, as in [B] section 4.
     """
 
-    factors: ClassVar[tuple[str, ...]] = tuple(load_factors(GASKET_FACTORS))
+    factors: ClassVar[tuple[str, ...]] = tuple(gasket_entries())
     levels: ClassVar[Levels] = orthogonal_levels(len(factors), TRIALS)
     """Names of the factors, and levels (trial, factor)."""
 
     def __init__(self, machine: Machine) -> None:
         """Build the machine with all factors at their middle level."""
-        parameters = machine.parameters
-        middle = at_levels(parameters, _factors(parameters), [0] * self.levels.shape[1])
+        middle = _factors(machine.parameters).at_levels([0] * self.levels.shape[1])
         super().__init__(build_machine(middle))
 
     def trials(self, parameters: MachineParameters) -> Iterable[MachineParameters]:
         """Return the machines of all trials."""
         factors = _factors(parameters)
-        return (at_levels(parameters, factors, row.tolist()) for row in self.levels)
+        return (factors.at_levels(row.tolist()) for row in self.levels)
 
     def statistic(self, target: ResponseTarget, runs: FloatArray) -> FloatArray:
         """Return mean, effect or contribution [%] of each machine from its runs (machine, trial).
@@ -71,8 +70,8 @@ class StudyRuns(ResponseRuns):
         return np.asarray(100.0 * of_factor / np.square(runs - mean[:, None]).mean(axis=1))
 
 
-def _factors(parameters: MachineParameters) -> tuple[FactorLevels, ...]:
-    return levels_of(parameters, load_factors(GASKET_FACTORS), "linear")
+def _factors(parameters: MachineParameters) -> Varying:
+    return varying(parameters, gasket_entries(), tables="linear")
 
 
 @dataclass(frozen=True)

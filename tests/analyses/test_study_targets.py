@@ -10,13 +10,11 @@ from linear_fits import fit_at
 from wm_drake.batch import simulate_many
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import (
-    at_levels,
-    levels_of,
-    load_factors,
     load_machine,
     measured_amplitudes,
+    varying,
 )
-from wm_drake.parameters.factors import GASKET_FACTORS
+from wm_drake.parameters.vary_file import gasket_entries
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.calibrate.prediction import Prediction
 from wm_drake.studies.calibrate.response_targets import ComputedResponses
@@ -56,8 +54,8 @@ def test_a_mean_over_the_design_is_that_of_its_trials(short, tmp_path):
     computed = ComputedResponses(Experiment(short, ()), targets)(
         [short.parameters, short.parameters]
     )
-    p, factors = short.parameters, levels_of(short.parameters, load_factors(GASKET_FACTORS))
-    trials = [at_levels(p, factors, row.tolist()) for row in orthogonal_levels(8, 27)]
+    p, factors = short.parameters, varying(short.parameters, gasket_entries(), tables="linear")
+    trials = [factors.at_levels(row.tolist()) for row in orthogonal_levels(8, 27)]
     cases = [Case("middle", p.loads["middle"], p.profile, parameters=trial) for trial in trials]
     table = simulate_many(build_machine(trials[0]), cases, measures=("extremes",))
     assert computed[0] == pytest.approx(
@@ -73,7 +71,7 @@ def test_effects_and_contributions_of_a_design_are_targets(short, tmp_path):
     assert [target.of for target in targets] == of
     assert [target.deviation for target in targets] == [0.10, 0.03, 0.03, 0.10, 0.10, 0.10]
     design = StudyRuns(short)
-    level = design.levels[:, list(load_factors(GASKET_FACTORS)).index("K_Lx")].astype(float)
+    level = design.levels[:, list(gasket_entries()).index("K_Lx")].astype(float)
     other = design.levels[:, 0].astype(float)
     runs = (40.0 + 20.0 * level - 3.0 * level**2 + 2.0 + 4.0 * other)[None]
     found = [float(design.statistic(target, runs)[0]) for target in targets]

@@ -3,7 +3,7 @@
 import pytest
 
 import wm_drake as wm
-from wm_drake.studies.study import Facts
+from wm_drake.studies.facts import Facts
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 

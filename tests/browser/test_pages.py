@@ -9,20 +9,21 @@ from accessibility import serious_faults
 from hand_made_records import case_result, spin_result
 
 from wm_drake import build_machine
-from wm_drake.parameters import GASKET_FACTORS, levels_of, load_factors, load_machine
+from wm_drake.parameters import load_machine, varying
 from wm_drake.parameters.units import Unit
+from wm_drake.parameters.vary_file import gasket_entries
 from wm_drake.report.figure import MARK, MEASURED, Axis, Figure, Line, Panel, Rule, Span, in_grid
 from wm_drake.report.page import picture, render
 from wm_drake.report.quantity import Quantity, shown
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.doe.design import make_design
+from wm_drake.studies.facts import Facts
 from wm_drake.studies.gasket.page import gasket_answer
 from wm_drake.studies.gasket.screening import at, run_screening, runs_of
 from wm_drake.studies.gasket.study import GasketTrials
 from wm_drake.studies.gasket.surface import models_of, predicted
 from wm_drake.studies.machine_show.page import machine_answer
 from wm_drake.studies.spin.page import spin_answer
-from wm_drake.studies.study import Facts
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
@@ -37,10 +38,10 @@ def machine():
 
 @pytest.fixture(scope="module")
 def screening(machine):
-    levels = levels_of(machine, load_factors(GASKET_FACTORS))
+    factors = varying(machine, gasket_entries())
     loads = ("middle", "counter")
     cases = [Case(name, machine.loads[name], machine.profile, True) for name in loads]
-    trials = GasketTrials(machine, levels, cases)
+    trials = GasketTrials(factors, cases)
     quantities = {
         "Dx": Quantity("displacement x", Unit("m", "mm")),
         "Fz": Quantity("force z", Unit("N", "N")),
@@ -58,7 +59,7 @@ def screening(machine):
         more = {name: 1.2 * values for name, values in one.items()}
         return runs_of({"middle": one, "counter": more}, quantities)
 
-    names = tuple(level.name for level in levels)
+    names = factors.names
     design = make_design("d-optimal", names, trials=200, model="main+2fi", seed=1)
     return run_screening(design, evaluate), trials
 

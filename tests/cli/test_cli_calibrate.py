@@ -14,7 +14,7 @@ from wm_drake.simulation.measures import measure
 from wm_drake.simulation.runs import simulate
 
 SHORT = "extends: reference\nname: short\nmeasured: []\nprofile: {time: '(0, 12) s', speed: '(40, 270) rpm'}\n"
-FREE = """quantities:
+FREE = """vary:
   friction: {bounds: "(10, 60) N", prior: "(30, 10) N", sets: damper_types.friction.friction_force, source: test}
   radius:
     bounds: (230, 250) mm
@@ -28,7 +28,7 @@ SENSORS = ["Xr", "Yr", "Zr", "Xf", "Yf", "Zf"]
 
 @pytest.fixture
 def folder(tmp_path):
-    """Return a folder with a machine, a free file, and amplitudes for another friction force."""
+    """Return a folder with a machine, a vary file, and amplitudes for another friction force."""
     (tmp_path / "short.yaml").write_text(SHORT)
     (tmp_path / "free.yaml").write_text(FREE)
     machine = build_machine(load_machine(tmp_path / "short.yaml"))
@@ -47,7 +47,7 @@ def folder(tmp_path):
     return tmp_path
 
 
-COMMAND = "calibrate --machine short.yaml --free free.yaml --targets measured.csv --starts 1"
+COMMAND = "calibrate --machine short.yaml --vary free.yaml --targets measured.csv --starts 1"
 
 
 @pytest.mark.usefixtures("folder")

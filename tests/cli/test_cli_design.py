@@ -10,7 +10,7 @@ pytest.importorskip("pymoo")
 
 PROFILE = "time: (0, 1) s\nspeed: (0, 60) rpm\n"
 TASK = """loads: [middle]
-variables:
+vary:
   k: {keys: [spring_types.suspension.stiffness], low: 50 %, high: 150 %}
   m: {keys: [bodies.motor.mass], low: 90 %, high: 110 %}
 objectives:

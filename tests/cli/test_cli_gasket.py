@@ -88,7 +88,7 @@ def test_own_design_factor_file_and_one_worker_give_the_same(study_without_page,
         "C_L: {keys: [gasket.damping_x, gasket.damping_y, gasket.damping_z]}\n"
         f"{FRICTION}: {{keys: [{FRICTION}], low: 20 N, high: 30 N}}\n"
     )
-    command = "study gasket --factors factors.yaml --design full --profile p.yaml --workers 1"
+    command = "study gasket --vary factors.yaml --design full --profile p.yaml --workers 1"
     assert wm_drake(command, "--out", "other").code == 0
     assert tables("other") == tables()
 

@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 
 PROFILE = "time: (0, 1) s\nspeed: (0, 300) rpm\n"
-TOLERANCES = """load: middle
-quantities:
+TOLERANCES = """loads: middle
+vary:
   mass: {keys: [loads.middle.unbalances.0.mass], distribution: uniform, low: 1 kg, high: 12 kg}
   radius: {keys: [loads.middle.unbalances.0.radius], distribution: uniform, low: 95 %, high: 105 %}
 """

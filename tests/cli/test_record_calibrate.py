@@ -33,7 +33,7 @@ def plant(changes, seed=1, repeats=3, angle=0.0, stem="run", of_load="middle"):
     record, points = simulate(machine, case), machine.set_up().accelerometer_points
     generator = np.random.default_rng(seed)
     frames = parameters.accelerometer_frames()
-    lines = ["load: middle\nsensors:\n"]
+    lines = ["loads: middle\nsensors:\n"]
     signals = {}
     for number, name in enumerate(SENSORS, 1):
         tilt = TILT * generator.choice([-1.0, 1.0], 3) / np.sqrt(3.0)
@@ -126,7 +126,7 @@ def test_a_wrong_structure_is_called_wrong(calibrate, what, by):
 def test_wrong_unknowns_are_refused(calibrate, unknown, message):
     Path("run.csv").write_text("time [s],Xr [mm]\n0,1\n1,2\n")
     Path("p.yaml").write_text(PROFILE)
-    Path("test.yaml").write_text("load: middle\nsensors: {Xr: {axis: x, frame: sensor_Xr}}\n")
+    Path("test.yaml").write_text("loads: middle\nsensors: {Xr: {axis: x, frame: sensor_Xr}}\n")
     error = calibrate(["run.csv"], "--unknown", unknown, code=2)
     assert message in error
     assert len(error.strip().splitlines()) == 1
@@ -140,7 +140,7 @@ def test_noise_is_refused(calibrate):
     write_mdf(Path("run.mf4"), time, noise)
     frames = parameters.accelerometer_frames()
     places = [f"  {n}: {{frame: {frames[n[:2]]}, axis: {n[-1]}}}\n" for n in SENSORS]
-    Path("test.yaml").write_text(f"load: middle\nsensors:\n{''.join(places)}")
+    Path("test.yaml").write_text(f"loads: middle\nsensors:\n{''.join(places)}")
     Path("p.yaml").write_text(PROFILE)
     error = calibrate(["run.mf4"], "--unknown", FRICTION, code=2)
     assert error.startswith("run.mf4: no sensor shows the turning drum")
@@ -181,7 +181,7 @@ def test_records_of_two_loads_are_fitted_together(calibrate):
 
 
 FREE = """
-quantities:
+vary:
   friction:
     bounds: (20, 60) N
     prior: (34, 6) N
@@ -198,7 +198,7 @@ def test_quantities_of_a_free_file_and_a_record_of_a_named_load(calibrate):
     text = Path("test.yaml").read_text()
     Path("test.yaml").write_text(text.replace("load: middle", "load: counter"))
     Path("free.yaml").write_text(FREE)
-    result = calibrate([f"middle={files[0]}"], "--free", "free.yaml", "--by", "order")
+    result = calibrate([f"middle={files[0]}"], "--vary", "free.yaml", "--by", "order")
     found = result["estimates"][0]
     assert found["unknown"] == "friction"
     assert found["value"] == pytest.approx(truth, rel=0.06)
@@ -212,16 +212,16 @@ def test_quantities_of_a_free_file_and_a_record_of_a_named_load(calibrate):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ((), "--unknown: records need either --unknown KEYS[=RANGE] or --free FILE"),
+        ((), "--unknown: records need either --unknown NAME[=VALUES] or --vary FILE"),
         (("--unknown", FRICTION, "--targets", "a.csv"), "--targets: is about targets"),
         (("--unknown", FRICTION, "--by", "history", "--speed", "measured"), "--by: history needs"),
-        (("--free", "free.yaml"), "free.yaml: spring_preload and spring_elongation"),
+        (("--vary", "free.yaml"), "free.yaml: spring_preload and spring_elongation"),
     ],
 )
 def test_options_that_do_not_fit_records_are_refused(calibrate, words, message):
     Path("run.csv").write_text("time [s],Xr [mm]\n0,1\n1,2\n")
     Path("p.yaml").write_text(PROFILE)
-    Path("test.yaml").write_text("load: middle\nsensors: {Xr: {axis: x, frame: sensor_Xr}}\n")
+    Path("test.yaml").write_text("loads: middle\nsensors: {Xr: {axis: x, frame: sensor_Xr}}\n")
     Path("free.yaml").write_text(f"spring_preload: {{prior: '(100, 20) N', source: test}}\n{FREE}")
     error = calibrate(["run.csv"], *words, code=2)
     assert message in error
@@ -231,8 +231,8 @@ def test_options_that_do_not_fit_records_are_refused(calibrate, words, message):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("--free", "free.yaml", "--by", "order"), "--by: is about records"),
-        ((), "--free: is missing"),
+        (("--vary", "free.yaml", "--by", "order"), "--by: is about records"),
+        ((), "--vary: is missing"),
     ],
 )
 def test_options_that_do_not_fit_targets_are_refused(wm_drake, words, message):

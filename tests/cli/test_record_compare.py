@@ -52,7 +52,7 @@ def compare(wm_drake):
     return command
 
 
-def write_test(speed="speed: {channel: Drum}\n", load="load: middle\n", **changes):
+def write_test(speed="speed: {channel: Drum}\n", load="loads: middle\n", **changes):
     """Write profile and test; `changes` replaces words of the test."""
     frames = load_machine("reference").accelerometer_frames()
     lines = [
@@ -266,7 +266,7 @@ def test_a_wrong_test_is_refused(compare, laboratory, text, message):
     write_csv(
         "run.csv", time[:300], {"a": (channels["Acc 1"][0][:300], "g"), "Drum": (rpm[:300], "rpm")}
     )
-    Path("test.yaml").write_text(f"load: middle\n{text}\n")
+    Path("test.yaml").write_text(f"loads: middle\n{text}\n")
     error = compare("run.csv", "--test", "test.yaml", code=2)
     assert message in error
     assert error.startswith("test.yaml")

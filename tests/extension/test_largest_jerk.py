@@ -20,13 +20,13 @@ name: short
 profile: {time: "(0, 1.5) s", speed: "(60, 200) rpm"}
 """
 TOLERANCES = """about: friction
-load: middle
-quantities:
+loads: middle
+vary:
   friction: {keys: [damper_types.friction.friction_force], distribution: uniform, low: 15 N, high: 25 N}
 """
 LIMITS = "limits:\n  - {quantity: largest_jerk_Xr, at_most: 1000 m/s^3, allowed_share: 50 %}\n"
 DESIGN = """loads: [middle]
-variables:
+vary:
   friction: {keys: [damper_types.friction.friction_force], low: 15 N, high: 25 N}
 objectives:
 - {quantity: largest_jerk_Xr, goal: smaller, over: worst}

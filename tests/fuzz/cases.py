@@ -16,11 +16,9 @@ from ruamel.yaml import YAML
 
 from wm_drake.model.bodies import SDF_FOLDER
 from wm_drake.parameters.components import COMPONENTS_FOLDER
-from wm_drake.parameters.designs import DESIGNS
-from wm_drake.parameters.factors import GASKET_FACTORS
 from wm_drake.parameters.files import CYCLES_FOLDER, MACHINES_FOLDER
 from wm_drake.parameters.gasket_drawing import GASKETS
-from wm_drake.parameters.tolerances import TOLERANCES
+from wm_drake.parameters.vary_file import VARY_FILES
 
 
 @dataclass
@@ -198,7 +196,7 @@ NUMBERS = [
     "-9223372036854775809", "1e300", "1e-300", "0x10", "[/b]", "a" * 2000,
 ]  # fmt: skip
 OPTIONS = [
-    ("calibrate --free FREE", ["--starts", "--iterations", "--seed", "--deviation", "--resolution", "--workers", "--weight", "--limit", "--leave-out", "--method"]),
+    ("calibrate --vary FREE", ["--starts", "--iterations", "--seed", "--deviation", "--resolution", "--workers", "--weight", "--limit", "--leave-out", "--method"]),
     ("study gasket --trials 200", ["--seed", "--workers", "--design", "--model", "--tables", "--factor", "--load"]),
     ("study gasket", ["--trials"]),
     ("study spin-cycle", ["--workers", "--engine", "--profile", "--case"]),
@@ -217,7 +215,7 @@ OPTIONS = [
     ("study modes", ["--amplitude", "--load"]),
     ("study response", ["--from", "--to", "--points", "--harmonics", "--rate", "--load", "--workers"]),
     ("record orders record.csv", ["--highest", "--unit"]),
-    ("calibrate --free FREE", ["--targets"]),
+    ("calibrate --vary FREE", ["--targets"]),
 ]  # fmt: skip
 VALUED = {
     "--weight": ["middle=", "=", "middle:Xf=", "nowhere="],
@@ -311,16 +309,16 @@ SHIPPED = {
     "profile": CYCLES_FOLDER / "profile_run_up.yaml",
     "regions": CYCLES_FOLDER / "profile_spin_cycle.yaml",
     "component": COMPONENTS_FOLDER / "mstv_damper.yaml",
-    "factors": GASKET_FACTORS,
-    "tolerance": TOLERANCES.path("laundry"),
-    "design file": DESIGNS.path("gasket"),
+    "factors": VARY_FILES.path("gasket"),
+    "tolerance": VARY_FILES.path("laundry"),
+    "design file": VARY_FILES.path("gasket"),
     "drawing": GASKETS.path("folded"),
 }
 TEXTS = {
     "limits": "limits:\n- {quantity: gap, at_least: 0 mm, allowed_share: 0.1 %}\n",
     "load": "unbalances:\n- {mass: 400 g, radius: 240 mm, y: 0 mm, phase: 10 deg}\n",
     "free": (
-        "quantities:\n  spring:\n    bounds: (1, 20) N/mm\n    prior: (7.5, 2) N/mm\n"
+        "vary:\n  spring:\n    bounds: (1, 20) N/mm\n    prior: (7.5, 2) N/mm\n"
         "    sets: {spring_types.suspension.stiffness: '1'}\n    source: guess\n"
     ),
 }
@@ -365,10 +363,10 @@ def commands(file: str) -> dict[str, list[str]]:
         "regions": ["study", "spin-cycle", "--case", "1", "--profile", file],
         "load": ["spin", "--load", file],
         "component": ["rig", "damper", "--component", file, "-f", "1 Hz", "-a", "1 mm"],
-        "factors": ["study", "gasket", "--trials", "200", "--factors", file],
+        "factors": ["study", "gasket", "--trials", "200", "--vary", file],
         "design": ["study", "gasket", "--model", "main", "--factor", "C_L", "--design", file],
-        "free": ["calibrate", "--free", file],
-        "targets": ["calibrate", "--free", "free.yaml", "--targets", file],
+        "free": ["calibrate", "--vary", file],
+        "targets": ["calibrate", "--vary", "free.yaml", "--targets", file],
         "cases": ["study", "spin-cycle", "--cases", file],
         "rms": ["study", "spin-cycle", "--case", "1", "--measured", file],
         "acceleration": ["study", "spin-cycle", "--case", "1", "--accelerations", "."],

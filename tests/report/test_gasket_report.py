@@ -7,13 +7,15 @@ import pytest
 from pages import without_scripts
 
 from wm_drake.errors import InputError
-from wm_drake.parameters import GASKET_FACTORS, levels_of, load_factors
+from wm_drake.parameters import varying
 from wm_drake.parameters.units import Unit
+from wm_drake.parameters.vary_file import gasket_entries
 from wm_drake.report.arrangement import arrange
 from wm_drake.report.formatting import three_digits
 from wm_drake.report.quantity import Quantity, shown
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.doe.design import make_design
+from wm_drake.studies.facts import Facts
 from wm_drake.studies.gasket import figures
 from wm_drake.studies.gasket.findings import load_findings, warnings
 from wm_drake.studies.gasket.page import gasket_answer
@@ -22,7 +24,6 @@ from wm_drake.studies.gasket.study import GasketTrials
 from wm_drake.studies.gasket.surface import models_of
 from wm_drake.studies.gasket.tables import factors_table
 from wm_drake.studies.gasket.words import Words
-from wm_drake.studies.study import Facts
 
 NAMES = ("C_L", "C_T", "K_Lx", "K_Ly")
 RESPONSES = [letter + axis for letter in "DFM" for axis in "xyz"]
@@ -72,9 +73,9 @@ def trials(reference):
 
 
 def trials_of(machine, names):
-    known = load_factors(GASKET_FACTORS)
+    known = gasket_entries()
     case = Case("middle", machine.loads["middle"], machine.profile)
-    return GasketTrials(machine, levels_of(machine, {name: known[name] for name in names}), [case])
+    return GasketTrials(varying(machine, {name: known[name] for name in names}), [case])
 
 
 def page_of(screening, trials):
@@ -173,10 +174,10 @@ def test_spread_shows_all_points_of_all_loads(screening, words):
 def test_factor_table_has_every_level_and_its_unit(trials, words):
     rows = factors_table(trials, words).frame().set_index("key")
     for factor in trials.factors:
-        for key, numbers in factor.numbers.items():
-            assert rows.loc[key, "unit"] == factor.units[key].label
-            levels = [factor.units[key].from_si(number) for number in numbers]
-            assert rows.loc[key, ["-1", "0", "1"]].tolist() == pytest.approx(levels)
+        for number in factor.numbers:
+            assert rows.loc[number.key, "unit"] == number.unit.label
+            levels = [number.unit.from_si(level) for level in factor.levels_of(number)]
+            assert rows.loc[number.key, ["-1", "0", "1"]].tolist() == pytest.approx(levels)
 
 
 @pytest.mark.parametrize("model", ["main", "main+2fi"])

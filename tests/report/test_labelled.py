@@ -11,7 +11,7 @@ from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.quantity import SPEED, Quantity, quantity_of, shown, text_of
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.studies.answer import Answer, Part
-from wm_drake.studies.study import Facts
+from wm_drake.studies.facts import Facts
 
 LENGTH = Quantity("gap", Unit("m", "mm"), 1)
 STIFFNESS = Quantity("stiffness", Unit("N/m", "N/mm"))
@@ -118,5 +118,5 @@ def test_a_long_table_is_in_files_only_and_a_warning_on_page_and_terminal():
     answer = Answer("Title", "The answer.", None, (Part("", (table,)),), warned=("Careful.",))
     assert answer.as_json() == {"title": "Title", "answer": "The answer."}
     assert list(answer.tables()) == ["gaps"]
-    assert answer.warnings() == ("Careful.",)
+    assert answer.warned == ("Careful.",)
     assert "Careful." in answer.page(Facts())

@@ -8,7 +8,7 @@ from wm_drake.parameters.units import Unit
 from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.quantity import SPEED, Quantity
 from wm_drake.studies.answer import Answer, Part
-from wm_drake.studies.study import Facts
+from wm_drake.studies.facts import Facts
 
 LENGTH = Quantity("gap", Unit("m", "mm"), 1)
 CASES = [

@@ -21,7 +21,7 @@ def test_set_takes_percents_and_distances(key, text, factor, distance):
     machine = wm.load_machine("reference")
     changed = number_at(changed_parameters(machine, [f"{key}={text}"]), key).nominal
     if key.startswith(("bodies", "frames")):  # only the SDF has it
-        plant = wm.build_machine(machine).plant
+        plant = wm.build_machine(machine).drawn.plant
         point = plant.GetFrameByName("detergent_point").GetFixedPoseInBodyFrame().translation()
         in_sdf = {"bodies": plant.GetBodyByName("drum").default_mass(), "frames": point[0]}
         before = in_sdf[key.partition(".")[0]]

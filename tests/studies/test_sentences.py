@@ -5,9 +5,9 @@ import pytest
 import xarray as xr
 from made_up_runs import made_up
 
-from wm_drake.parameters import load_machine
+from wm_drake.parameters import load_machine, varying
 from wm_drake.parameters.first_machine import FirstMachine, FirstNumbers
-from wm_drake.parameters.tolerances import Tolerances, load_tolerances
+from wm_drake.parameters.vary_file import VaryFile, load_vary
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.measures.responses import Response
@@ -33,9 +33,8 @@ def tolerances(machine, tree, gap):
         table = {"smallest_gap": ("run", np.array([gap(case) for case in cases]))}
         return xr.Dataset(table)
 
-    uncertain = uncertain_machine(
-        machine, tree, Case("middle", machine.loads["middle"], machine.profile)
-    )
+    case = Case("middle", machine.loads["middle"], machine.profile)
+    uncertain = uncertain_machine(varying(machine, tree.entries(without=())), tree, case)
     trials = ToleranceTrials(uncertain, (GAP,), made_up(run), ToleranceSettings(256, 256, 0))
     return trials, trials.samples()
 
@@ -51,7 +50,7 @@ def of_load(machine, *keys):
         }
         for key, size in keys
     }
-    tree = Tolerances.model_validate({"load": "middle", "quantities": quantities})
+    tree = VaryFile.model_validate({"loads": "middle", "vary": quantities})
     trials, samples = tolerances(machine, tree, lambda case: (
         0.03 + case.load.unbalances[0].y
         + 1e-5 * case.parameters.spring_types["suspension"].stiffness
@@ -76,10 +75,10 @@ def test_nobody_can_tighten_a_load(machine):
     ],
 )  # fmt: skip
 def test_loads_are_compared_with_the_laundry_that_was_drawn(machine, mass, words):
-    tree = load_tolerances("laundry").model_dump()
-    tree["laundry"]["mass"]["high"] = mass
+    tree = load_vary("laundry").model_dump()
+    tree["vary"]["laundry.mass"]["high"] = mass
     gaps = xr.DataArray(np.full(4, 0.01), {"load": list(machine.loads)})
-    text = about_loads(*tolerances(machine, Tolerances.model_validate(tree), lambda _: 0.02), gaps)
+    text = about_loads(*tolerances(machine, VaryFile.model_validate(tree), lambda _: 0.02), gaps)
     assert words in text
     assert "often" not in text
 

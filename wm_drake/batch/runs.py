@@ -139,7 +139,13 @@ BatchJobs: TypeAlias = Iterator[tuple[Any, ...]]
 
 
 class Runner:
-    """Runs work items in any thread. Each thread reuses memory of its own from batch to batch."""
+    """Runs work items in any thread. Each thread reuses memory of its own from batch to batch.
+
+    Attributes:
+        most_steps: Largest number of steps of a run that is repeated.
+    """
+
+    most_steps = float("inf")
 
     def __init__(
         self,
@@ -150,7 +156,6 @@ class Runner:
         *,
         motions: Container[int] = (),
         compared: tuple[str, ...] = COMPARED,
-        most_steps: float = float("inf"),
     ) -> None:
         """Prepare for a machine.
 
@@ -163,12 +168,11 @@ class Runner:
                 sensors and shapes.
             compared: Keys of measures that are compared where runs are repeated, if there are no
                 `measures`.
-            most_steps: Largest number of steps of a run that is repeated.
         """
         self.parameters = parameters
         self.compared = [MEASURES[name] for name in compared if not measures]
         self.measures = [MEASURES[name] for name in measures]
-        self.histories, self.motions, self.most_steps = histories, motions, most_steps
+        self.histories, self.motions = histories, motions
         self.stopped = threading.Event()
         self._memory = threading.local()
         self._spare = [] if scenes is None else scenes
@@ -228,11 +232,10 @@ class Runner:
             key.profile, key.stepping.step, key.period, key.layout.control_period
         )
         packed = self._lanes("packed", [item.packed for item in work_items])
-        sums = self._array("sums", SUMS_SIZE)
-        samples = self._samples(key, schedule, work_items, packed, sums, progress)
+        samples = self._samples(key, schedule, work_items, packed, progress)
         if samples is None:
             return [], []
-        estimates, allowed = estimates_of(sums), self._allowed
+        estimates, allowed = estimates_of(self._array("sums", SUMS_SIZE)), self._allowed
         is_compared = any(
             item.before or of_run.steps > allowed(item) or of_run.samples > LARGEST_LOSS
             for item, of_run in zip(work_items, estimates, strict=False)
@@ -282,7 +285,6 @@ class Runner:
         schedule: Schedule,
         work_items: list[WorkItem],
         packed: FloatArray,
-        sums: FloatArray,
         progress: Callable[[float], None],
     ) -> FloatArray | None:
         """Return the samples of runs side by side (rows, state and rates, lanes).
@@ -291,7 +293,6 @@ class Runner:
             key, work_items, progress: As for `run`.
             schedule: Steps of the runs.
             packed: Packed numbers of all lanes.
-            sums: Sums of the errors of all lanes, written.
 
         Returns:
             None if `stopped` was set meanwhile.
@@ -299,7 +300,8 @@ class Runner:
         rows = len(schedule.time)
         size = len(work_items[0].begin) + key.layout.states.begins.rates
         state = self._lanes("begin", [item.begin for item in work_items])
-        samples, sums[:] = self._array("samples", rows * size), 0.0
+        samples, sums = self._array("samples", rows * size), self._array("sums", SUMS_SIZE)
+        sums[:] = 0.0
         relaxation = None
         if key.stepping.integrator == "midpoint":
             matrices = [item.numbers.stepping.relaxation for item in work_items]
@@ -350,7 +352,7 @@ class Runner:
             samples,
             by_point.transpose(1, 0, 2),
             extremes.reshape(-1, WIDTH),
-            *self._forces_of_mounts(key, samples.ravel(), rows, size, packed, needs),
+            *self._forces_of_mounts(key, samples, packed, needs),
             lengths.reshape(-1, WIDTH),
             filtered.transpose(1, 0, 2),
             *_peaks(filtered),
@@ -373,13 +375,7 @@ class Runner:
         return filtered_lanes(moved, key.period, band, self._array)
 
     def _forces_of_mounts(
-        self,
-        key: BatchKey,
-        samples: FloatArray,
-        rows: int,
-        size: int,
-        p: FloatArray,
-        needs: set[Need],
+        self, key: BatchKey, samples: FloatArray, p: FloatArray, needs: set[Need]
     ) -> tuple[FloatArray, FloatArray]:
         """Return the sums and the wrenches on the cabinet of `measure_mounts_lanes`.
 
@@ -388,13 +384,16 @@ class Runner:
         """
         sums: FloatArray = np.empty(0)
         cabinet: FloatArray = np.empty(0)
+        rows, size = samples.shape[:2]
         if {"mounts", "feet"} & needs:
             mounts, bounds = key.layout.mounts, (LARGEST_ANGLE, LARGEST_DISPLACEMENT)
             count = len(mount_names(self.parameters))
             sums = self._array("sums", sums_size(count))
             if "feet" in needs:
                 cabinet = self._array("cabinet", rows * WRENCH_SIZE)
-            measure_mounts_lanes(samples, rows, size, bounds, p, mounts, count, cabinet, sums)
+            measure_mounts_lanes(
+                samples.ravel(), rows, size, bounds, p, mounts, count, cabinet, sums
+            )
         return sums.reshape(-1, WIDTH), cabinet.reshape(-1, WRENCH_SIZE, WIDTH)
 
     def _result(

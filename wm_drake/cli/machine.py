@@ -70,8 +70,8 @@ def _check(file: str, strict: bool, draw: Callable[[str], None] | None) -> None:
     parameters = load_parameters(file, None)
     machine, unusual = built_with_problems(file, parameters)
     if draw is not None:
+        from wm_drake.studies.facts import Facts
         from wm_drake.studies.machine_show.page import machine_answer
-        from wm_drake.studies.study import Facts
 
         shown = machine_answer(machine, [str(problem) for problem in unusual])
         draw(shown.page(Facts(command_line(), perf_counter() - begin)))

@@ -6,7 +6,7 @@ import types
 import typing
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from pydantic import BaseModel
@@ -15,7 +15,11 @@ from pydantic.fields import FieldInfo
 from wm_drake.cli.common import JsonOption, folder_of
 from wm_drake.report.provenance import command_line
 from wm_drake.report.terminal import Console, say
-from wm_drake.studies.study import Facts, Result, Study
+from wm_drake.studies.facts import Facts
+from wm_drake.studies.study import Study
+
+if TYPE_CHECKING:  # slow to import, and not for commands without a study
+    from wm_drake.studies.answer import Answer
 
 MOST_NAMED = 6
 """Largest number of result files that are named on the terminal."""
@@ -34,12 +38,11 @@ def command_of(study: Study) -> Callable[..., None]:
         _print(result, facts, as_json)
         if not as_json:
             say(f"Results in {given['out']}: {_listed(files)}")
-        for text in result.warnings():
+        for text in result.warned:
             say(f"warning: {text}", err=True)
-        failures = result.failures()
-        for text in failures:
+        for text in result.diverged:
             typer.echo(text, err=True)
-        if failures:
+        if result.diverged:
             raise typer.Exit(1)
 
     keyword = inspect.Parameter.KEYWORD_ONLY
@@ -126,7 +129,7 @@ def _limits(field: FieldInfo) -> dict[str, float]:
     }
 
 
-def _print(result: Result, facts: Facts, as_json: bool) -> None:
+def _print(result: "Answer", facts: Facts, as_json: bool) -> None:
     """Print a result as one JSON object, or as tables and sentences."""
     if as_json:
         shown = {"runs": facts.runs, **result.as_json(), "wall_s": facts.wall_s}

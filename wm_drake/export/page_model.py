@@ -6,9 +6,9 @@ with the reason.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -42,7 +42,21 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.displacements import band_pass
 from wm_drake.simulation.mounts import mount_names, sums_size
 
-Candidates = Mapping[str, tuple[float, float, float]]
+
+class MovedNumber(NamedTuple):
+    """Value of a number that may enter the compiled functions, and the ends of its range. [SI]"""
+
+    value: float
+    low: float
+    high: float
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Ends of its range. [SI]"""
+        return self.low, self.high
+
+
+Candidates = Mapping[str, MovedNumber]
 """Value, smallest and largest value of each number that might change, by key path. [SI]"""
 MOST_UNBALANCES = 8
 """Largest number of point masses of a load in a page."""
@@ -93,9 +107,9 @@ class _Chosen:
         self.refused: dict[str, str] = {}
         self.slopes: dict[str, FloatArray] = {}
         self.bodies: dict[str, FloatArray] = {}
-        for key, (value, *ends) in candidates.items():
+        for key, candidate in candidates.items():
             try:
-                self._add(key, value, ends)
+                self._add(key, candidate)
             except InputError as error:
                 self.refused[key] = error.problems[0].message
         if contents.setup.parameters.gasket is not None:
@@ -103,7 +117,7 @@ class _Chosen:
             self.slopes[GASKET] = contents.start - without
         self._leave_out_mixed()
 
-    def _add(self, key: str, value: float, ends: Sequence[float]) -> None:
+    def _add(self, key: str, candidate: MovedNumber) -> None:
         table, name, *_ = [*key.split("."), ""]
         if key.startswith(RESIDUAL):
             return
@@ -114,7 +128,7 @@ class _Chosen:
             else:
                 self.bodies[name] = constants
             return
-        slopes = self.contents.slopes(key, value, ends)
+        slopes = self.contents.slopes(key, candidate.value, candidate.ends)
         if slopes is None:
             self.refused[key] = OTHERWISE
         elif not np.any(slopes) and not key.startswith("springs"):
@@ -124,19 +138,19 @@ class _Chosen:
 
     def value_of(self, key: str) -> float:
         """Return the value of a number as exported. [SI]"""
-        return 1.0 if key == GASKET else self.candidates[key][0]
+        return 1.0 if key == GASKET else self.candidates[key].value
 
     def _leave_out_mixed(self) -> None:
         """Leave out numbers whose effects do not add up when all change at once."""
         moved = {
-            key: value + 0.3 * (high - value)
-            for key, (value, _, high) in self.candidates.items()
+            key: candidate.value + 0.3 * (candidate.high - candidate.value)
+            for key, candidate in self.candidates.items()
             if key in self.slopes
         }
         contents = self.contents
         expected = contents.start
         for key, value in moved.items():
-            expected = expected + self.slopes[key] * (value - self.candidates[key][0])
+            expected = expected + self.slopes[key] * (value - self.candidates[key].value)
         actual = contents.rows(contents.set_up(moved))
         size = np.abs(actual) + np.abs(contents.start)
         wrong = np.abs(actual - expected) > 10.0 * TOLERANCE * size
@@ -318,7 +332,7 @@ def without_wrong(
             continue
         try:
             right = all(
-                is_packed_alike(model, set_up, contents, {key: end}) for end in candidates[key][1:]
+                is_packed_alike(model, set_up, contents, {key: end}) for end in candidates[key].ends
             )
             reason = OTHERWISE
         except InputError as error:

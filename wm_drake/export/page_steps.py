@@ -28,7 +28,7 @@ def other_steps(
     """
     steps, limits = list[dict[str, Any]](), dict[str, list[float]]()
     for key in (key for key in places if key in candidates):
-        value, *ends = candidates[key]
+        value, ends = candidates[key].value, candidates[key].ends
         limits[key] = [-FARTHEST, FARTHEST]
 
         def stepping_at(number: float, key: str = key) -> Stepping | None:

@@ -5,7 +5,7 @@ import json
 import math
 import re
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from wm_drake.compiler.kept import all_sources, kept
 from wm_drake.engines.compiled.multistep import STEPS_BEFORE
@@ -17,6 +17,7 @@ from wm_drake.export.page_kernel import AFTERWARDS, FIRST, MEANWHILE, page_code
 from wm_drake.export.page_model import (
     UNBALANCE_FIELDS,
     Candidates,
+    MovedNumber,
     PageModel,
     page_model,
     without_wrong,
@@ -49,16 +50,30 @@ from wm_drake.simulation.displacements import (
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.mounts import mount_names
 
+
+class _Source(NamedTuple):
+    """Where the answer of a worker has the first value of a measure.
+
+    Attributes:
+        array: Array of the answer.
+        after: Count of the plan after whose values it begins; "" at the begin of the array.
+        first: Index from there on.
+    """
+
+    array: str
+    after: str = ""
+    first: int = 0
+
+
 SOURCES = {
-    "amplitude": ("sizes", 0),
-    "smallest_gap": ("gap", 0),
-    "detergent_displacement": ("extremes", 0),
-    "gasket_force": ("extremes", 0),
-    "gasket_moment": ("extremes", 3),
-    "mount_force_peak": ("mounts", 0),
+    "amplitude": _Source("sizes"),
+    "smallest_gap": _Source("gap"),
+    "detergent_displacement": _Source("extremes", after="sensors"),
+    "gasket_force": _Source("extremes", after="points"),
+    "gasket_moment": _Source("extremes", after="points", first=3),
+    "mount_force_peak": _Source("mounts"),
 }
-"""Measures that the compiled machine has: name of the variable, array of a worker's answer and
-index in it, from the sensors or the points on."""
+"""Where the measures are that the compiled machine has, by the names of their variables."""
 LARGEST_TURNS = {
     "multistep": LARGEST_TURN,
     "midpoint": LARGEST_TURN_OF_MIDPOINT,
@@ -81,12 +96,7 @@ def page_data(parameters: MachineParameters) -> dict[str, Any]:
 
 
 def _page_data(parameters: MachineParameters) -> dict[str, Any]:
-    with SecondProcess() as second:
-        return _with_code(parameters, second)
-
-
-def _with_code(parameters: MachineParameters, second: SecondProcess) -> dict[str, Any]:
-    """Return all that the page knows; two processes compile its code."""
+    """Return all that the page knows."""
     opened = OpenMachine(parameters, build_machine(parameters), Scene(parameters))
     candidates = _candidates(opened)
     setup, profile = opened.machine.set_up(None), parameters.profile
@@ -97,27 +107,19 @@ def _with_code(parameters: MachineParameters, second: SecondProcess) -> dict[str
     def move(values: Mapping[str, float]) -> MachineParameters:
         changed = parameters
         for key, value in values.items():
-            changed = opened.moved_by(changed, key, value - candidates[key][0])
+            changed = opened.moved_by(changed, key, value - candidates[key].value)
         return changed
 
     contents = Contents(opened.machine, move, profile, depths)
-    of_run = page_model(contents, {}).plan  # before it is known what may change
-    second.compile(of_run)
     _check_length(profile.duration / contents.stepping.step)
-    model = page_model(contents, candidates)
-    code = page_code(model.plan, FIRST)
-    set_up = function_here("wm_set_up", code["wm_set_up"])
-    model = without_wrong(model, set_up, contents, candidates)
-    moved, limits = other_steps(contents, candidates, model.places)
-    code |= page_code(of_run, AFTERWARDS)
-    second.wait()
-    code |= page_code(of_run, MEANWHILE)
+    compiled = _compiled(contents, candidates)
+    model = compiled.model
     return {
         "program": program(),
         "tree": machine_tree(parameters),
-        "machine": _machine(opened, model.places, model.refused, limits),
-        "model": _model(contents, model, moved),
-        "wasm": base64.b64encode(_wasm(model.plan, code)).decode(),
+        "machine": _machine(opened, model.places, model.refused, compiled.limits),
+        "model": _model(contents, model, compiled.moved),
+        "wasm": base64.b64encode(_wasm(model.plan, compiled.code)).decode(),
         "loads": _loads(parameters, model.of_load),
         "profile": {"time": profile.time, "speed": profile.speed},
         "band": contents.band,
@@ -137,6 +139,41 @@ def _with_code(parameters: MachineParameters, second: SecondProcess) -> dict[str
             "replay": {"span": REPLAY_SPAN, "rate": REPLAY_RATE},
         },
     }
+
+
+class _Compiled(NamedTuple):
+    """The compiled machine of a page.
+
+    Attributes:
+        model: The machine, with the numbers that may change.
+        moved, limits: Steps and limits of these numbers, from `other_steps`.
+        code: Object code of each function.
+    """
+
+    model: PageModel
+    moved: Sequence[Mapping[str, Any]]
+    limits: Mapping[str, Sequence[float]]
+    code: Mapping[str, str]
+
+
+def _compiled(contents: Contents, candidates: Candidates) -> _Compiled:
+    """Compile the functions of a page in two processes.
+
+    The functions of a run are the same whatever may change. The second process begins with them,
+    while this one finds which of the candidates the function of the set-up follows.
+    """
+    with SecondProcess() as second:
+        of_run = page_model(contents, {}).plan
+        second.compile(of_run)
+        every = page_model(contents, candidates)
+        code = page_code(every.plan, FIRST)
+        set_up = function_here("wm_set_up", code["wm_set_up"])
+        model = without_wrong(every, set_up, contents, candidates)
+        moved, limits = other_steps(contents, candidates, model.places)
+        code |= page_code(of_run, AFTERWARDS)
+        second.wait()
+        code |= page_code(of_run, MEANWHILE)
+    return _Compiled(model, moved, limits, code)
 
 
 def _model(
@@ -197,7 +234,8 @@ def _candidates(opened: OpenMachine) -> Candidates:
         if slider.needs or key.startswith(NOT_HERE):
             continue
         si = 1.0 / slider.unit.from_si(1.0)
-        candidates[key] = float(slider.number.nominal or 0.0), slider.low * si, slider.high * si
+        value = float(slider.number.nominal or 0.0)
+        candidates[key] = MovedNumber(value, slider.low * si, slider.high * si)
     return candidates
 
 
@@ -299,13 +337,13 @@ def _rows(opened: OpenMachine, measure: str, count: Any) -> list[dict[str, Any]]
     for variable in MEASURES[measure].variables:
         if variable.studio is None or variable.name not in SOURCES:
             continue
-        array, first = SOURCES[variable.name]
-        if array == "extremes":
-            first += count.sensors if variable.name.startswith("detergent") else count.points
+        source = SOURCES[variable.name]
+        first = source.first + (getattr(count, source.after) if source.after else 0)
         heads = heads_of(opened.parameters, opened.parameters.profile, variable)
         factor = variable.unit.from_si(1.0)
         rows += [
-            head | {"from": [array, first + k], "factor": factor} for k, head in enumerate(heads)
+            head | {"from": [source.array, first + k], "factor": factor}
+            for k, head in enumerate(heads)
         ]
     return rows
 

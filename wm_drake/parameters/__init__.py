@@ -1,9 +1,9 @@
 """Read and check what a user writes: machine, component, load, spin profile, study files.
 
 Enters: YAML and CSV files, and text with units. Leaves: frozen types in SI units
-(`MachineParameters`, `Component`, `Load`, `SpinProfile`, `Factor`, `MeasuredLoop`) or an
-`InputError` that names file, line and key. `with_value` is the one way to change a number, a
-`Variation` declares numbers that change together.
+(`MachineParameters`, `Component`, `Load`, `SpinProfile`, `VaryFile`, `MeasuredLoop`) or an
+`InputError` that names file, line and key. `with_value` is the one way to change a number, an
+`Entry` declares one that varies, and a `Varied` is that for one machine.
 May import: `laws`, `compiler` and `errors`; no pydrake.
 """
 
@@ -30,18 +30,6 @@ from wm_drake.parameters.elements import (
     TelescopicDamper,
     TorqueTable,
 )
-from wm_drake.parameters.factors import (
-    GASKET_FACTORS,
-    TABLES,
-    Factor,
-    FactorLevels,
-    at_levels,
-    at_places,
-    factor_of_text,
-    levels_of,
-    load_factors,
-    place_of,
-)
 from wm_drake.parameters.files import (
     load_load,
     load_machine,
@@ -66,12 +54,13 @@ from wm_drake.parameters.machine import (
 from wm_drake.parameters.measured import measured_amplitudes, measured_changes
 from wm_drake.parameters.published import PublishedResults, PublishedTerm, published_results
 from wm_drake.parameters.spin import Load, SpinProfile, Unbalance
-from wm_drake.parameters.variation import Change, Variation, apply, variation_of
+from wm_drake.parameters.variation import Change
+from wm_drake.parameters.vary import Entry
+from wm_drake.parameters.vary_file import VaryFile, load_vary
+from wm_drake.parameters.varying import Varied, Varying, varying
 
 __all__ = [
     "DAMPER_LAWS",
-    "GASKET_FACTORS",
-    "TABLES",
     "Bearing",
     "BodyOverride",
     "Bushing",
@@ -84,8 +73,7 @@ __all__ = [
     "DamperType",
     "Drive",
     "EndBushing",
-    "Factor",
-    "FactorLevels",
+    "Entry",
     "ForceTable",
     "FrameOverride",
     "FreeStrokeDamper",
@@ -107,24 +95,20 @@ __all__ = [
     "TelescopicDamper",
     "TorqueTable",
     "Unbalance",
-    "Variation",
-    "apply",
-    "at_levels",
-    "at_places",
-    "factor_of_text",
-    "levels_of",
+    "Varied",
+    "VaryFile",
+    "Varying",
     "load_component",
-    "load_factors",
     "load_load",
     "load_machine",
     "load_profile",
+    "load_vary",
     "located",
     "machine_file_with",
     "machine_path",
     "machine_yaml",
     "measured_amplitudes",
     "measured_changes",
-    "place_of",
     "published_results",
     "quantities",
     "read_loop",
@@ -132,7 +116,7 @@ __all__ = [
     "shipped_components",
     "shipped_machines",
     "source_of",
-    "variation_of",
+    "varying",
     "with_value",
     "with_values",
 ]

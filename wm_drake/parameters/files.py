@@ -337,12 +337,20 @@ def _tree_of(text: str) -> Any:
 
 def read_yaml(path: Path) -> CommentedMap:
     """Return the mapping in a YAML file, with every plain scalar except null as text."""
-    text = read_text(path, largest=LARGEST_YAML)
+    return yaml_of_text(read_text(path, largest=LARGEST_YAML), str(path))
+
+
+def yaml_of_text(text: str, path: str) -> CommentedMap:
+    """Return the mapping in a YAML text, with every plain scalar except null as text.
+
+    Args:
+        path: Path of its file, for messages.
+    """
     try:
         tree = deepcopy(_tree_of(text))
     except YAMLError as error:
         mark = getattr(error, "problem_mark", None)
-        where = f"{path}:{mark.line + 1}" if mark else str(path)
+        where = f"{path}:{mark.line + 1}" if mark and path else path
         raise input_error(
             f"is not YAML: {' '.join(str(getattr(error, 'problem', None) or error).split())}",
             where=where,
@@ -352,7 +360,7 @@ def read_yaml(path: Path) -> CommentedMap:
             "is empty; allowed is a mapping of keys to values"
             if tree is None
             else "is not a mapping",
-            where=str(path),
+            where=path,
         )
     return tree
 

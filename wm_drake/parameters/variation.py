@@ -1,11 +1,7 @@
-"""Variations: numbers of a machine that change together.
-
-A factor is a variation with levels, an uncertain quantity one with a distribution, a design
-variable one with a range, an unknown of a fit one with bounds, a slider one with two ends.
-"""
+"""Numbers of a machine that change: how a text changes one, and what it is then."""
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
@@ -15,7 +11,7 @@ from pydantic import BaseModel
 
 from wm_drake.errors import Problem, input_error
 from wm_drake.parameters.elements import CurveTable
-from wm_drake.parameters.keys import field_at, unit_of, with_values
+from wm_drake.parameters.keys import field_at, unit_of
 from wm_drake.parameters.machine import MachineParameters
 from wm_drake.parameters.units import Share, Unit
 
@@ -26,10 +22,10 @@ _RANGE = re.compile(r"\(([^(),]+),([^(),]+)\)(.*)")
 
 
 class Change(StrEnum):
-    """How the value of a variation changes a number of the machine."""
+    """How a value changes a number of the machine."""
 
     VALUE = "value"
-    """The value takes the place of the number. [SI]"""
+    """The value takes the place of the number; of a table, it is the nominal stiffness. [SI]"""
     PERCENT = "percent"
     """The value is a factor of the number; of a table, a factor of its forces. [1]"""
     DISTANCE = "distance"
@@ -70,7 +66,7 @@ class Number:
         """Return what `value` makes of this number: a number, a table, or the column of one."""
         original = self.original
         if change is Change.VALUE:
-            return value
+            return self.at(value)
         if isinstance(original, CurveTable):
             return original.scaled(value)
         if isinstance(original, tuple):
@@ -84,97 +80,48 @@ class Number:
             return self.original.scaled(value / self.nominal)
         return value
 
+    def si(self, change: Change, value: float) -> float:
+        """Return the number that `value` makes of this one, in SI; of a table, its stiffness."""
+        if change is Change.VALUE:
+            return value
+        assert self.nominal is not None  # `common_form` has checked it
+        return value * self.nominal if change is Change.PERCENT else self.nominal + value
+
     def resolved(self, text: str) -> float:
         """Return the value that a text means here, in SI; of a table it is a stiffness."""
         change, value = change_of(text, self.unit, self.key)
-        if change is Change.VALUE:
-            return value
-        if self.nominal is None:
+        if change is not Change.VALUE and self.nominal is None:
             raise input_error(
                 f"is in the SDF but not in the machine file, so '{text}' is unknown; write a value "
                 "with a unit",
                 key=self.key,
             )
-        return value * self.nominal if change is Change.PERCENT else self.nominal + value
+        return self.si(change, value)
 
 
-@dataclass(frozen=True)
-class Variation:
-    """Numbers of a machine that change together.
-
-    Attributes:
-        numbers: The numbers; none for a quantity that is not in the machine file.
-        change: How a value changes them.
-        unit: Unit for reading of a value.
-    """
-
-    name: str
-    numbers: tuple[Number, ...]
-    change: Change
-    unit: Unit
-    about: str = ""
-
-    @property
-    def keys(self) -> tuple[str, ...]:
-        """Key paths of the numbers."""
-        return tuple(number.key for number in self.numbers)
-
-    @property
-    def nominal(self) -> float:
-        """Value at which the machine is as it was; that of the first number if they differ."""
-        if self.change is Change.VALUE:
-            return float(self.numbers[0].nominal or 0.0)
-        return 1.0 if self.change is Change.PERCENT else 0.0
-
-    def changes(self, value: float) -> dict[str, Any]:
-        """Return new values of the machine by key path."""
-        return {number.key: number.changed(self.change, value) for number in self.numbers}
-
-
-def apply(
-    parameters: MachineParameters, variations: Iterable[Variation], values: Iterable[float]
-) -> MachineParameters:
-    """Return the machine with a value of each variation.
+def common_form(
+    numbers: Sequence[Number], texts: Mapping[str, str]
+) -> tuple[Change, dict[str, float]]:
+    """Return the form of texts, which is the same for all numbers, and their values by name.
 
     Args:
-        values: One value for each. [1 for PERCENT, else SI]
-    """
-    changes: dict[str, Any] = {}
-    for variation, value in zip(variations, values, strict=True):
-        changes |= variation.changes(value)
-    return with_values(parameters, changes)
-
-
-def variation_of(
-    parameters: MachineParameters,
-    name: str,
-    keys: Sequence[str],
-    texts: Mapping[str, str],
-    about: str = "",
-) -> tuple[Variation, dict[str, float]]:
-    """Return a variation and its values, given as texts of one form.
-
-    Args:
-        keys: Key paths of its numbers.
         texts: Values such as low and high: "95 %", "9 N/mm", or "nominal + 2 mm".
 
     Raises:
-        InputError: the machine does not have a key, or a text is not a value of it.
+        InputError: a text is not a value of a number, or the texts have different forms.
     """
-    numbers = tuple(number_at(parameters, key) for key in keys)
+    change, values = Change.VALUE, dict[str, float]()
     for number in numbers:
         change, values = changes_of(texts, number.unit, number.key)
         if change is not Change.VALUE and number.nominal is None:
-            raise input_error(
-                "has no number of a machine; write values with a unit", key=number.key
-            )
+            message = "has no number of a machine; write values with a unit"
+            raise input_error(message, key=number.key)
         if change is Change.PERCENT and number.nominal == 0.0:
             message = "is 0, so percents of it are 0; write values with a unit"
             raise input_error(message, key=number.key)
-        if number.is_table and change is not Change.PERCENT:
-            raise input_error("is a table; write values in percent", key=number.key)
-    unit = Share() if change is Change.PERCENT else numbers[0].unit
-    return Variation(name, numbers, change, unit, about), values
+        if change is Change.DISTANCE and number.is_table:
+            raise input_error("is a table; write percents or a stiffness", key=number.key)
+    return change, values
 
 
 def changes_of(texts: Mapping[str, str], unit: Unit, key: str) -> tuple[Change, dict[str, float]]:
@@ -231,11 +178,11 @@ def range_of(text: str) -> tuple[str, str] | None:
 
 
 def owned_twice(groups: Mapping[str, Sequence[str]], kind: str) -> list[Problem]:
-    """Return a problem for each key that two variations change.
+    """Return a problem for each key that two groups contain.
 
     Args:
-        groups: Key paths by name of the variation.
-        kind: What the variations are, for the message.
+        groups: Key paths by name of the group.
+        kind: What the groups are, for the message.
     """
     problems, owner = [], dict[str, str]()
     for name, keys in groups.items():

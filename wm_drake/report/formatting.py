@@ -35,11 +35,6 @@ def three_digits(value: float) -> str:
     )
 
 
-def percent(value: float) -> str:
-    """Return a difference in whole percent, with its sign; NaN becomes a dash."""
-    return f"{signed(value)} %" if math.isfinite(value) else MISSING
-
-
 def signed(value: float) -> str:
     """Return a difference as a whole number with its sign; NaN becomes a dash."""
     return f"+{number(value, 0)}" if math.isfinite(value) and round(value) > 0 else number(value, 0)

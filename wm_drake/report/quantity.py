@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import PureNumber, Unit
-from wm_drake.report.formatting import MISSING, number, significant
+from wm_drake.parameters.units import PureNumber, Share, Unit
+from wm_drake.report.formatting import MISSING, number, signed, significant
 
 if TYPE_CHECKING:  # slow to import, and not needed for declarations
     import xarray as xr
@@ -75,9 +75,10 @@ class Quantity:
         text = self.reading.shown.replace("*", "").replace("/", "_per_").replace("%", "percent")
         return f"_{text.replace('^', '')}" if text else ""
 
-    def named(self, words: str) -> "Quantity":
-        """Return the same quantity with other words."""
-        return replace(self, words=words)
+    def named(self, words: str, **digits: Any) -> "Quantity":
+        """Return the same quantity with other words, and with other `decimals` or `form`."""
+        plain = {"decimals": None, "form": None} if digits else {}
+        return replace(self, words=words, **{**plain, **digits})
 
     def values(self, array: Any) -> FloatArray:
         """Return SI values in the unit for reading."""
@@ -140,6 +141,10 @@ class Quantity:
         variable.attrs |= {ALONG: along, EACH: each}
         return variable
 
+    def on(self, array: "xr.DataArray") -> "xr.DataArray":
+        """Return an array that carries this quantity."""
+        return array.assign_attrs(self.attributes())
+
     def attributes(self) -> dict[Hashable, Any]:
         """Return the attributes of a variable that carries this quantity.
 
@@ -191,10 +196,20 @@ def _of_measure(name: str) -> Quantity | None:
     return None if known is None else Quantity(known.kind, known.unit, known.studio)
 
 
+def each_of(array: "xr.DataArray") -> "Mapping[str, Quantity]":
+    """Return the quantity of each label of a variable, as of `Quantity.of_each`."""
+    each: Mapping[str, Quantity] = array.attrs[EACH]
+    return each
+
+
 def named(array: "xr.DataArray", words: str) -> "xr.DataArray":
     """Return a variable with other words."""
-    quantity: Quantity = array.attrs["quantity"]
-    return array.assign_attrs(quantity.named(words).attributes())
+    return quantity_of(array).named(words).on(array)
+
+
+def hidden(data: "xr.Dataset", *names: str) -> "xr.Dataset":
+    """Return data in which page and terminal leave out some variables; files have them."""
+    return data.assign({name: data[name].assign_attrs({HIDDEN: True}) for name in names})
 
 
 def shown(array: "xr.DataArray") -> FloatArray:
@@ -228,3 +243,6 @@ def text_of(array: "xr.DataArray") -> str:
 SPEED = Quantity("drum speed", Unit("rad/s", "rpm"), 0)
 TIME = Quantity("time", Unit("s", "s"), 2)
 STEP = Quantity("step", Unit("s", "ms"), form="{:g}".format)
+MASS = Quantity("mass", Unit("kg", "kg"))
+SHARE = Quantity("share", Share(), 0)
+CHANGE = Quantity("change", Share(), form=signed)

@@ -131,14 +131,14 @@ def judged(
         error = min(error, apart) if run.holds(accuracy) else apart
     holds = run.holds(accuracy) or (before is not None and error <= accuracy)
     left = MOST_HALVINGS - run.halvings
-    found = Accuracy(error, float(holds), run.step, float(run.halvings))
+    accuracy_of_run = Accuracy(error, float(holds), run.step, float(run.halvings))
     if holds or not left:
-        return found, None
+        return accuracy_of_run, None
     halvings, period = MOST_AT_ONCE, int(run.estimates.samples > LARGEST_LOSS)
     if not run.diverged:
         ratio = max(run.estimates.steps / accuracy, 1.0)
         halvings = max(math.ceil(math.log(ratio, FALLS_BY) - 0.5), period, 1)
-    return found, Refinement(min(halvings, MOST_AT_ONCE, left), period)
+    return accuracy_of_run, Refinement(min(halvings, MOST_AT_ONCE, left), period)
 
 
 def difference(before: Attempt, run: Attempt) -> float:

@@ -14,7 +14,7 @@ from wm_drake.compiler.vectors import rotation_from_rpy
 from wm_drake.parameters.recorded_sensors import RecordedSensor
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.outputs import point_displacements
-from wm_drake.simulation.records import Record, sample_period
+from wm_drake.simulation.records import Record, rest_pose_of, sample_period
 from wm_drake.simulation.vibration import point_accelerations, tub_motion_of
 
 OVERSAMPLED = 20.0
@@ -47,7 +47,7 @@ def recorded_signal(record: Record, sensor: RecordedSensor, point: FloatArray) -
         (n,) at the samples of the record, in SI units of the quantity.
     """
     motion, acceleration = tub_motion_of(record)
-    rest = np.asarray(record.attrs["rest_pose"], dtype=float)
+    rest = rest_pose_of(record)
     if sensor.quantity == "displacement":
         vectors = point_displacements(motion, point[None], rest)[:, 0]
     elif sensor.quantity == "velocity":

@@ -17,6 +17,7 @@ from wm_drake.errors import input_error
 from wm_drake.model.machine import Setup
 from wm_drake.parameters import Load, SpinProfile
 from wm_drake.parameters.cabinet import Cabinet
+from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.written_files import write_files
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.mounts import mount_names
@@ -93,6 +94,16 @@ def sample_period(record: Record) -> float:
     """Return the time between the samples of a record; 1 if it has fewer than two samples. [s]"""
     time = record.time.values
     return float(time[1] - time[0]) if len(time) > 1 else 1.0
+
+
+def why_diverged(record: Record) -> str:
+    """Return time and reason if the run of a record diverged, else ""."""
+    return str(record.attrs["diverged"])
+
+
+def rest_pose_of(record: Record) -> FloatArray:
+    """Return the rest pose of the tub, to which the poses of a record are relative."""
+    return np.asarray(record.attrs["rest_pose"], dtype=float)
 
 
 def load_of_record(record: Record) -> Load:

@@ -7,17 +7,19 @@ them; it declares no class of its own.
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import pandas as pd
 import xarray as xr
 
+from wm_drake.errors import check_known
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.reading import READING, read_in
 from wm_drake.report.figure import Figure
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.studies.study import Facts, Result
+from wm_drake.studies.facts import PAGE, Facts
 
 if TYPE_CHECKING:
     from rich.table import Table as TerminalTable
@@ -77,7 +79,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Answer(Result):
+class Answer:
     """Result of a study.
 
     Attributes:
@@ -112,7 +114,6 @@ class Answer(Result):
     script: Path | None = None
     live: str = ""
     units: str = field(default_factory=READING.get)
-    float_format: ClassVar[str] = "%.9g"
 
     def labelled(self) -> dict[str, LabelledTable]:
         """Return the tables by name."""
@@ -170,11 +171,57 @@ class Answer(Result):
     def pages(self, facts: Facts) -> Mapping[str, str]:
         """Return the page, and those of other answers, by the names of their files."""
         others = {name: answer.page(facts) for name, answer in self.others.items()}
-        return {**super().pages(facts), **others}
+        return {PAGE: self.page(facts), **others}
+
+    def to_dataframe(self, name: str = "") -> pd.DataFrame:
+        """Return a table of the result.
+
+        Args:
+            name: Name of the table, as in `tables()`; the first one if empty.
+
+        Example:
+            >>> import wm_drake as wm
+            >>> result = wm.run_study("drive", load=["middle"], quick=True, quiet=True)
+            >>> result.to_dataframe("map").equals(result.tables()["map"])
+            True
+        """
+        tables = self.tables()
+        return tables[_chosen(name, list(tables), "table")]
+
+    def pictures(self) -> dict[str, Figure]:
+        """Return the figures of the page by the texts that describe them."""
+        from wm_drake.report.publication import collected
+
+        with collected() as drawn:
+            self.pages(Facts())
+        return {title: figure for figure, title in drawn}
+
+    def plot(self, title: str = "") -> Any:
+        """Return a figure of the page, drawn with matplotlib; a notebook shows it.
+
+        Args:
+            title: First words of its text, as in `pictures()`; the first figure if empty.
+
+        Raises:
+            InputError: there is no such figure.
+        """
+        from wm_drake.report.drawing import matplotlib_of
+
+        figures = self.pictures()
+        full = next((text for text in figures if title and text.startswith(title)), title)
+        return matplotlib_of(figures[_chosen(full, list(figures), "figure")])
+
+    def _repr_html_(self) -> str:
+        """Return the tables for a notebook, long ones shortened in the middle."""
+        return "".join(
+            f"<h4>{escape(name)}</h4>{table.to_html(max_rows=MOST_ROWS, index=False)}"
+            for name, table in self.tables().items()
+        )
 
     def write(self, folder: Path) -> None:
         """Write the tables as CSV, and the other files."""
-        super().write(folder)
+        for name, table in self.tables().items():
+            table.to_csv(folder / f"{name}.csv", index=False, float_format="%.9g")
         for name, content in self.files.items():
             if isinstance(content, str):
                 (folder / name).write_text(content, encoding="utf-8")
@@ -195,13 +242,16 @@ class Answer(Result):
         for name, text in self.pages(facts or Facts()).items():
             (place / name).write_text(text, encoding="utf-8")
 
-    def warnings(self) -> tuple[str, ...]:
-        """Return warnings of the result for the terminal."""
-        return self.warned
 
-    def failures(self) -> tuple[str, ...]:
-        """Return the lines for which the exit code is 1."""
-        return self.diverged
+MOST_ROWS = 12
+"""Largest number of rows of a table in a notebook; `to_dataframe` has all."""
+
+
+def _chosen(name: str, known: Sequence[str], kind: str) -> str:
+    """Return the name of a table or figure of a result; the first one if the name is empty."""
+    if name or not known:
+        check_known(name, known, f"no {kind} '{name}'", key=kind)
+    return name or known[0]
 
 
 def pictures_first(parts: Sequence[Part]) -> tuple[Part, ...]:

@@ -33,7 +33,7 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.cases import Case, load_of
 from wm_drake.simulation.measures.responses import Response
-from wm_drake.simulation.records import Record
+from wm_drake.simulation.records import Record, why_diverged
 from wm_drake.simulation.steps import checked_step
 
 Simulate: TypeAlias = Callable[..., xr.Dataset]
@@ -186,7 +186,7 @@ class Experiment:
         values = np.full((math.prod(shape), size), np.nan)
 
         def keep(number: int, record: Record) -> None:
-            if not record.attrs["diverged"]:
+            if not why_diverged(record):
                 values[number] = measure(record)
 
         self.record(self.machine, CountedCases(cases, len(values)), keep, what)
@@ -267,7 +267,7 @@ def response_of(data: xr.Dataset, response: Response) -> xr.DataArray:
     """Return one response of runs, in SI; it carries its quantity."""
     variable = response.variable
     at = dict(zip(variable.dims, response.place, strict=True))
-    return data[variable.name].isel(at, drop=True).assign_attrs(quantity_of(response).attributes())
+    return quantity_of(response).on(data[variable.name].isel(at, drop=True))
 
 
 def quantity_of(response: Response) -> Quantity:

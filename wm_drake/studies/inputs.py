@@ -124,22 +124,23 @@ def _set(parameters: "Tree", name: str, text: str) -> dict[str, Any]:
     The name is a key path, or a symbol of [B] such as C_L, whose numbers change together. The text
     is a value, or relative to the machine: percents of its number, or nominal + a distance.
     """
-    from wm_drake.parameters import GASKET_FACTORS, MachineParameters, load_factors
-    from wm_drake.parameters.variation import Change, change_of, number_at, variation_of
+    from wm_drake.parameters import MachineParameters
+    from wm_drake.parameters.variation import Change, change_of, common_form, number_at
+    from wm_drake.parameters.vary_file import gasket_entries
 
     if not isinstance(parameters, MachineParameters):
         return {name: _value(text)}
-    factor = None if "." in name else load_factors(GASKET_FACTORS).get(name)
+    entry = None if "." in name else gasket_entries().get(name)
     with problems_at("--set", name):
-        if factor is None:
-            if not _RELATIVE.match(text):
-                return {name: _value(text)}
-            change, _ = change_of(text, number_at(parameters, name).unit, name)
-            if change is Change.VALUE:  # percents of a share are values
-                return {name: text}
-        keys = factor.keys if factor else (name,)
-        variation, values = variation_of(parameters, name, keys, {name: text})
-    return variation.changes(values[name])
+        if entry is None and not _RELATIVE.match(text):
+            return {name: _value(text)}
+        keys = entry.keys if entry else (name,)
+        numbers = [number_at(parameters, key) for key in keys]
+        change, _ = change_of(text, numbers[0].unit, name)
+        if change is Change.VALUE:  # in place of a table too; percents of a share are values
+            return dict.fromkeys(keys, text)
+        change, values = common_form(numbers, {name: text})
+    return {number.key: number.changed(change, values[name]) for number in numbers}
 
 
 _RELATIVE = re.compile(r"\s*nominal\b|[^(]*%\s*$")

@@ -20,9 +20,8 @@ import numpy as np
 import xarray as xr
 
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Share
-from wm_drake.report.formatting import signed, three_digits
-from wm_drake.report.quantity import Quantity
+from wm_drake.report.formatting import three_digits
+from wm_drake.report.quantity import CHANGE, Quantity
 from wm_drake.simulation.measures.kind import Better
 from wm_drake.simulation.measures.responses import GAP
 
@@ -139,9 +138,6 @@ class Aim:
 BEFORE, AFTER = "before", "after"
 """Labels of runs of the machine as it is, and with the proposed change."""
 
-CHANGE = Quantity("change", Share(), form=signed)
-SHARE = Quantity("share", Share(), 0)
-
 
 def compared(values: xr.DataArray, goals: Mapping[str, Better]) -> xr.Dataset:
     """Return each response that has a goal before and after a change, of its worst load.
@@ -162,8 +158,8 @@ def compared(values: xr.DataArray, goals: Mapping[str, Better]) -> xr.Dataset:
         values = values.isel(load=(signs * values).fillna(np.inf).argmax("load"))
     for setting in values.setting.values.tolist():
         one = values.sel(setting=setting, drop=True)
-        responses[setting] = one.drop_vars("load", errors="ignore")
-        responses[setting].attrs |= Quantity(f"{setting}, by a run", form=three_digits).attributes()
+        quantity = Quantity(f"{setting}, by a run", form=three_digits)
+        responses[setting] = quantity.on(one.drop_vars("load", errors="ignore"))
         if "load" in one.coords:
             responses[f"load_{setting}"] = ("response", one["load"].values)
     if AFTER in responses:

@@ -6,10 +6,10 @@ import xarray as xr
 
 from wm_drake.report.formatting import listed
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import quantity_of, text_of
+from wm_drake.report.quantity import SHARE, quantity_of, text_of
 from wm_drake.simulation.measures.responses import GAP
 from wm_drake.studies.answer import Part
-from wm_drake.studies.proposal import AFTER, BEFORE, MOST_LOSS, SHARE
+from wm_drake.studies.proposal import AFTER, BEFORE, MOST_LOSS
 
 LINE = "Line to copy"
 """Words before the command that runs what is proposed."""

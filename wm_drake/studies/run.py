@@ -17,6 +17,7 @@ from wm_drake.errors import InputError, InputNotice, Problem, check_known, input
 from wm_drake.report.provenance import command_line
 from wm_drake.report.terminal import QUIET, say
 from wm_drake.studies.executor import Executor
+from wm_drake.studies.facts import PAGE, Facts
 from wm_drake.studies.inputs import (
     build_checked,
     changed_parameters,
@@ -36,11 +37,8 @@ from wm_drake.studies.result_folder import (
 )
 from wm_drake.studies.study import (
     ENGINE,
-    PAGE,
     STUDIES,
-    Facts,
     OptionModel,
-    Result,
     Study,
     option,
 )
@@ -49,6 +47,7 @@ if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     from wm_drake.batch.ledger import Ledger
     from wm_drake.model.machine import Machine
     from wm_drake.parameters import MachineParameters
+    from wm_drake.studies.answer import Answer
 
 RUNS_KEPT = (
     "all runs are kept, so repeat the command to write the results without running them again"
@@ -121,7 +120,7 @@ class Order:
         return (chosen,) if isinstance(chosen, str) else chosen
 
 
-def run_study(name: str, machine: Any = None, *, quiet: bool = False, **options: Any) -> Result:
+def run_study(name: str, machine: Any = None, *, quiet: bool = False, **options: Any) -> "Answer":
     """Run a study and return its result.
 
     Args:
@@ -191,11 +190,11 @@ def options_of_driver(study: Study) -> type[RunOptions]:
     return ClusterOptions if study.has_cluster else LedgerOptions
 
 
-def execute(order: Order) -> tuple[Result, Facts, tuple[str, ...]]:
+def execute(order: Order) -> tuple["Answer", Facts, tuple[str, ...]]:
     """Run a study.
 
     Returns:
-        Result, how it was computed, and the names of the files that were written.
+        Answer, how it was computed, and the names of the files that were written.
 
     Raises:
         InputError: the input is wrong, or the folder must not or cannot be written to.
@@ -207,7 +206,7 @@ def execute(order: Order) -> tuple[Result, Facts, tuple[str, ...]]:
         return _executed(order)
 
 
-def _executed(order: Order) -> tuple[Result, Facts, tuple[str, ...]]:
+def _executed(order: Order) -> tuple["Answer", Facts, tuple[str, ...]]:
     begin, study, options = time.perf_counter(), order.study, order.options
     machines = tuple(_machine_of(order, name) for name in order.machines)
     machine = machines[0] if len(machines) == 1 else None
@@ -291,7 +290,7 @@ def _stepping(machine: "Machine | None") -> tuple[float, str]:
     return checked_step(machine.parameters, None), checked_integrator(machine.parameters, None)
 
 
-def _written(result: Result, facts: Facts, out: Path | None, run: CommandRun) -> tuple[str, ...]:
+def _written(result: "Answer", facts: Facts, out: Path | None, run: CommandRun) -> tuple[str, ...]:
     if out is None:
         return ()
     with result_folder(out, run, RUNS_KEPT if run.identity else "") as folder:

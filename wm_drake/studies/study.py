@@ -27,24 +27,18 @@ of libraries and bisections are written as plain functions, and tests make up th
 
 import pkgutil
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from html import escape
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from wm_drake.engines import DEFAULT_ENGINE
-from wm_drake.errors import check_known
 from wm_drake.registry import Registry
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
-    import pandas as pd
-    from rich.table import Table
-
     from wm_drake.parameters import MachineParameters
-    from wm_drake.report.figure import Figure
+    from wm_drake.studies.answer import Answer
     from wm_drake.studies.executor import Executor
 
 
@@ -110,159 +104,6 @@ LIVE: Any = option(
 SEED: Any = option(0, "Seed of all random numbers.", "N", ge=0, le=2**32 - 1)
 
 
-PAGE = "report.html"
-"""Name of the file of the main page."""
-
-
-@dataclass(frozen=True)
-class Facts:
-    """How a result was computed.
-
-    Attributes:
-        command: Command line or Python call.
-        wall_s: Duration. [s]
-        warnings: Warnings of the machine, without those of the result.
-        step: Largest step, as the machine has it; runs may take shorter ones. 0 without a machine,
-            or with several. [s]
-        integrator: Integrator of the compiled engine, as the machine has it.
-        steps: Steps that the runs took and the error that remains; "" without runs.
-        engine: Name of the engine; "" without runs.
-        runs: Number of runs.
-    """
-
-    command: str = ""
-    wall_s: float = 0.0
-    warnings: tuple[str, ...] = ()
-    step: float = 0.0
-    integrator: str = ""
-    steps: str = ""
-    runs: int = 0
-    engine: str = ""
-
-    def rows(self) -> list[tuple[str, str]]:
-        """Return the facts as pairs of word and text, for the end of a page."""
-        from wm_drake.batch import sources_version
-        from wm_drake.report.quantity import STEP
-        from wm_drake.simulation.records import versions
-
-        step = f"{STEP.text(self.step)}, integrator {self.integrator}"
-        step = step if self.engine in ("", DEFAULT_ENGINE) else STEP.text(self.step)
-        return [
-            *([("Engine", self.engine)] if self.engine else []),
-            *([("Largest step", step)] if self.step else []),
-            *([("Steps taken", self.steps)] if self.steps else []),
-            ("Versions", ", ".join(f"{name} {text}" for name, text in versions().items())),
-            ("Sources", sources_version()),
-            ("Command", self.command),
-        ]
-
-
-MOST_ROWS = 12
-"""Largest number of rows of a table in a notebook; `to_dataframe` has all."""
-
-
-def _chosen(name: str, known: Sequence[str], kind: str) -> str:
-    """Return the name of a table or figure of a result; the first one if the name is empty."""
-    if name or not known:
-        check_known(name, known, f"no {kind} '{name}'", key=kind)
-    return name or known[0]
-
-
-class Result(ABC):
-    """Result of a study."""
-
-    float_format: ClassVar[str | None] = "%.6g"
-    """Format of numbers in CSV files; None for all digits."""
-
-    float_formats: ClassVar[Mapping[str, str]] = {}
-    """Other formats, by the names of tables."""
-
-    @abstractmethod
-    def tables(self) -> "Mapping[str, pd.DataFrame]":
-        """Return the tables of the result by the name of their CSV file, without suffix."""
-
-    @abstractmethod
-    def as_json(self) -> dict[str, Any]:
-        """Return the result for JSON; None stands for NaN."""
-
-    @abstractmethod
-    def terminal(self) -> "Iterable[Table | str]":
-        """Return tables and sentences for the terminal."""
-
-    @abstractmethod
-    def page(self, facts: Facts) -> str:
-        """Return the main page as text of one self-contained file."""
-
-    def pages(self, facts: Facts) -> Mapping[str, str]:
-        """Return the pages by the names of their files; a study with several pages extends this."""
-        return {PAGE: self.page(facts)}
-
-    def to_dataframe(self, name: str = "") -> "pd.DataFrame":
-        """Return a table of the result.
-
-        Args:
-            name: Name of the table, as in `tables()`; the first one if empty.
-
-        Example:
-            >>> import wm_drake as wm
-            >>> result = wm.run_study("drive", load=["middle"], quick=True, quiet=True)
-            >>> result.to_dataframe("map").equals(result.tables()["map"])
-            True
-        """
-        tables = self.tables()
-        return tables[_chosen(name, list(tables), "table")]
-
-    def pictures(self) -> "dict[str, Figure]":
-        """Return the figures of the page by the texts that describe them."""
-        from wm_drake.report.publication import collected
-
-        with collected() as drawn:
-            self.pages(Facts())
-        return {title: figure for figure, title in drawn}
-
-    def plot(self, title: str = "") -> Any:
-        """Return a figure of the page, drawn with matplotlib; a notebook shows it.
-
-        Args:
-            title: First words of its text, as in `pictures()`; the first figure if empty.
-
-        Raises:
-            InputError: there is no such figure.
-        """
-        from wm_drake.report.drawing import matplotlib_of
-
-        figures = self.pictures()
-        full = next((text for text in figures if title and text.startswith(title)), title)
-        return matplotlib_of(figures[_chosen(full, list(figures), "figure")])
-
-    def _repr_html_(self) -> str:
-        """Return the tables for a notebook, long ones shortened in the middle."""
-        return "".join(
-            f"<h4>{escape(name)}</h4>{table.to_html(max_rows=MOST_ROWS, index=False)}"
-            for name, table in self.tables().items()
-        )
-
-    def texts(self) -> Mapping[str, str]:
-        """Return other files of text, such as machines, by the names of the files."""
-        return {}
-
-    def write(self, folder: Path) -> None:
-        """Write the tables as CSV, and `texts`; a study that writes other files extends this."""
-        for name, table in self.tables().items():
-            digits = self.float_formats.get(name, self.float_format)
-            table.to_csv(folder / f"{name}.csv", index=False, float_format=digits)
-        for name, text in self.texts().items():
-            (folder / name).write_text(text, encoding="utf-8")
-
-    def warnings(self) -> Sequence[str]:
-        """Return warnings of the result for the terminal."""
-        return ()
-
-    def failures(self) -> Sequence[str]:
-        """Return a line for each run that diverged; if there are any, the exit code is 1."""
-        return ()
-
-
 class Task(ABC):
     """A study with checked options, ready to run."""
 
@@ -276,7 +117,7 @@ class Task(ABC):
         return {}
 
     @abstractmethod
-    def run(self, executor: "Executor") -> Result:
+    def run(self, executor: "Executor") -> "Answer":
         """Run the study; `executor.simulate` runs cases and returns the table of their measures."""
 
 

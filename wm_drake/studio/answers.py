@@ -60,19 +60,17 @@ MICRO, MILLI = 1e-6, 1e-3
 
 def picture_runner_of(machine: OpenMachine) -> Runner:
     """Return the runner of the pictures of a machine: the first run of a batch has a motion."""
-    return Runner(
-        machine.parameters,
-        ("amplitudes", "gap"),
-        histories=False,
-        motions={0},
-        most_steps=SLIDER_STEPS,
-    )
+    runner = Runner(machine.parameters, ("amplitudes", "gap"), histories=False, motions={0})
+    runner.most_steps = SLIDER_STEPS
+    return runner
 
 
 def runner_of(machine: OpenMachine) -> Runner:
     """Return the runner of the numbers of a machine: the first run of a batch has a history."""
     measures = shown_measures(machine.parameters)
-    return Runner(machine.parameters, measures, histories={0}, most_steps=SLIDER_STEPS)
+    runner = Runner(machine.parameters, measures, histories={0})
+    runner.most_steps = SLIDER_STEPS
+    return runner
 
 
 def picture(machine: OpenMachine, runner: Runner, state: PageState) -> dict[str, Any]:

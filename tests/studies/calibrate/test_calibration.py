@@ -13,10 +13,10 @@ from wm_drake.errors import InputError
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import load_machine, measured_amplitudes
 from wm_drake.parameters.files import yaml_text
-from wm_drake.parameters.free import Measured, load_free
+from wm_drake.parameters.vary_file import load_vary
 from wm_drake.report.labelled import LabelledTable
 from wm_drake.studies.calibrate.computed import Evaluation
-from wm_drake.studies.calibrate.parameter_map import parameter_map_of
+from wm_drake.studies.calibrate.parameter_map import parameter_map_of, read_parameter_map
 from wm_drake.studies.calibrate.prediction import predict
 from wm_drake.studies.calibrate.results import amplitudes_of, predictions_of, quantities_of
 from wm_drake.studies.calibrate.solutions import Solution, distinct, solved_machine
@@ -25,7 +25,7 @@ from wm_drake.studies.calibrate.targets import Targets, targets_of
 from wm_drake.studies.experiment import Experiment, kept_in
 
 FREE = """
-quantities:
+vary:
   friction:
     bounds: (10, 60) N
     prior: (30, 10) N
@@ -76,7 +76,12 @@ def short(tmp_path_factory):
 def free_file(tmp_path, text=FREE):
     path = Path(tmp_path) / "free.yaml"
     path.write_text(text)
-    return load_free(path)
+    return load_vary(path)
+
+
+def mapped(machine, tmp_path, text):
+    path = Path(tmp_path) / "free.yaml"
+    return read_parameter_map(machine, path, free_file(tmp_path, text))
 
 
 def planted(
@@ -120,29 +125,10 @@ def test_machine_with_explicit_values_is_that_of_the_sdf(short, tmp_path):
     assert masses[0] == masses[1]
 
 
-FAULTS = {
-    "no bounds": (FREE.replace("    bounds: (10, 60) N\n", ""), "quantities.friction.bounds: is missing"),
-    "one bound": (FREE.replace("(10, 60) N", "10 N"), "is not two numbers with a unit"),
-    "falling bounds": (FREE.replace("(10, 60) N", "(60, 10) N"), "lower bound must be below the upper"),
-    "prior outside": (FREE.replace("(30, 10) N", "(70, 10) N"), "the expected value is outside the bounds"),
-    "prior of no width": (FREE.replace("(30, 10) N", "(30, 0) N"), "standard deviation must be above 0"),
-    "prior in another dimension": (FREE.replace("(30, 10) N", "(30, 10) kg"), "the prior is in kg, the bounds in N"),
-    "unknown unit": (FREE.replace("(10, 60) N", "(10, 60) Nn"), "unit 'Nn' is not known"),
-    "unknown word": (FREE + "    colour: red\n", "unknown key 'colour'"),
-    "nothing free": ("quantities: {}\n", "quantities"),
-    "preload that is no force": (PRELOAD.replace(") N", ") kg") + FREE, "the numbers are in kg; a preload needs a unit such as N"),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("fault", FAULTS)
-def test_faulty_free_file_is_refused_with_its_line(fault, tmp_path):
-    text, message = FAULTS[fault]
-    with pytest.raises(InputError, match=r"free\.yaml") as refused:
-        free_file(tmp_path, text)
-    assert message in str(refused.value)
-
-
 MISFITS = {
+    "no bounds": (FREE.replace("    bounds: (10, 60) N\n", ""), "vary.friction: a fit needs low and high; add"),
+    "prior outside": (FREE.replace("(30, 10) N", "(70, 10) N"), "the expected value is outside the bounds"),
+    "preload that is no force": (PRELOAD.replace(") N", ") kg") + FREE, "is not a pair of numbers such as '(2, 1) N'"),
     "unknown key": (FREE.replace("friction_force", "fricton_force"), "is not a number of the machine (did you mean"),
     "unknown frame": (FREE.replace("damper_left_housing", "damper_lft_housing"), "no frame 'damper_lft_housing'"),
     "unknown body": (FREE.replace("bodies.motor.mass", "bodies.motr.mass"), "no link 'motr'"),
@@ -159,8 +145,9 @@ MISFITS = {
 def test_free_file_that_does_not_fit_the_machine_is_refused(misfit, short, tmp_path):
     text, message = MISFITS[misfit]
     with pytest.raises(InputError) as refused:
-        parameter_map_of(short, free_file(tmp_path, text))
+        mapped(short, tmp_path, text)
     assert message in str(refused.value)
+    assert "free.yaml" in str(refused.value)
 
 
 def measured(rows):
@@ -211,10 +198,10 @@ def test_point_without_a_machine_is_nan_and_does_not_change_others(short, tmp_pa
 def test_point_whose_step_is_too_long_is_nan_and_the_first_start_is_refused(short, tmp_path):
     path = tmp_path / "free.yaml"
     path.write_text(
-        "quantities: {damping: {bounds: '(0, 300) N*s/mm', prior: '(200, 40) N*s/mm', source: test,"
+        "vary: {damping: {bounds: '(0, 300) N*s/mm', prior: '(200, 40) N*s/mm', source: test,"
         " sets: damper_types.friction.damping}}\n"
     )
-    parameter_map = parameter_map_of(short, load_free(path))
+    parameter_map = parameter_map_of(short, load_vary(path))
     evaluation = Evaluation(Experiment(short, ()), parameter_map, one_case(short))
     values = evaluation(np.array([[50.0], [200e3], [100.0]]))
     assert np.isfinite(values.amplitude).all(axis=(1, 2)).tolist() == [True, False, True]
@@ -222,7 +209,7 @@ def test_point_whose_step_is_too_long_is_nan_and_the_first_start_is_refused(shor
     targets = planted(short, parameter_map, [50.0], loads=(("middle", True),))
     plan = SearchPlan(starts=1, iterations=1)
     with pytest.raises(InputError, match="is too long for the tub"):
-        calibrate(Experiment(short, ()), load_free(path), targets, plan)
+        calibrate(Experiment(short, ()), load_vary(path), targets, plan)
 
 
 def test_point_that_only_the_gasket_holds_is_nan_for_loads_without_it(short, tmp_path):
@@ -232,7 +219,7 @@ def test_point_that_only_the_gasket_holds_is_nan_for_loads_without_it(short, tmp
         f"hook_{number}": {"value": f"{spring.p_WH[1]} m", "sets": key, "source": "test"}
         for number, (key, spring) in enumerate(hooks.items())
     }
-    tree = {"quantities": {"forward": {**quantity, "source": "test"}}, "known": known}
+    tree = {"vary": {"forward": {**quantity, "source": "test"}}, "known": known}
     parameter_map = parameter_map_of(short, free_file(tmp_path, yaml_text(tree)))
     with_gasket = one_case(short)
     without = replace(with_gasket, loads=(("middle", False),))
@@ -399,13 +386,12 @@ def test_known_machine_is_recovered_within_its_standard_deviations(recovered):
 
 def test_start_values_of_the_free_file_are_not_used_for_predictions(short, recovered, tmp_path):
     truth, free, targets, plan, calibration, predictions, _ = recovered
-    quantities = {
-        name: quantity.model_copy(
-            update={"start": Measured(values=(float(value),), unit=quantity.unit, is_list=False)}
-        )
-        for (name, quantity), value in zip(free.quantities.items(), truth, strict=True)
+    units = {"friction": "N", "lean": "m", "motor": "kg"}
+    started = {
+        name: entry.model_copy(update={"start": f"{value!r} {units[name]}"})
+        for (name, entry), value in zip(free.vary.items(), truth.tolist(), strict=True)
     }
-    started = free.model_copy(update={"quantities": quantities})
+    started = free.model_copy(update={"vary": started})
     assert np.array_equal(parameter_map_of(short, started).start, truth)
     identity = identity_of(short, started, targets, plan)
     with open_ledger(tmp_path / "ledger.sqlite", identity) as ledger:
@@ -517,14 +503,14 @@ def test_known_quantities_enter_like_free_ones(short, tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (KNOWN.replace("slope", "friction") + FREE, "'friction' is both free and known"),
-        (KNOWN.replace("3 N/mm", "3 kg") + FREE, "known.slope.sets: 'gasket.stiffness_x.force'"),
+        (KNOWN.replace("slope", "friction") + FREE, "'friction' is in vary and in known"),
+        (KNOWN.replace("3 N/mm", "3 kg") + FREE, "known.slope: 'gasket.stiffness_x.force'"),
         (KNOWN.replace("3 N/mm", "(3, 4) N/mm") + FREE, "it must be one number with a unit"),
     ],
 )
 def test_wrong_known_quantities_are_refused(short, tmp_path, text, message):
     with pytest.raises(InputError) as refused:
-        parameter_map_of(short, free_file(tmp_path, text))
+        mapped(short, tmp_path, text)
     assert message in str(refused.value)
 
 

@@ -7,8 +7,8 @@ from wm_drake.batch import simulate_many
 from wm_drake.errors import InputError
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import load_machine
-from wm_drake.parameters.free import load_free
 from wm_drake.parameters.measured import measured_amplitudes, measured_responses
+from wm_drake.parameters.vary_file import load_vary
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.calibrate.computed import Evaluation
 from wm_drake.studies.calibrate.parameter_map import parameter_map_of
@@ -126,7 +126,7 @@ relations:
     to: {radial: 0.01 m^2/rad}
     prior: (4, 2)
     source: test
-quantities:
+vary:
   radial:
     bounds: (1, 6) N/mm
     prior: (3, 1) N/mm
@@ -149,7 +149,7 @@ def ratio_map(tmp_path, text=FREE):
         "gasket: {stiffness_x: 3 N/mm, rotational_stiffness_y: 150000 N*mm/rad}\n"
     )
     built = build_machine(load_machine(machine))
-    return built, parameter_map_of(built, load_free(path))
+    return built, parameter_map_of(built, load_vary(path))
 
 
 def test_relations_are_residuals_of_ratios(tmp_path):
@@ -169,14 +169,12 @@ def test_relations_are_residuals_of_ratios(tmp_path):
         ("{radial: 0.01 m^2/rad}", "{radial: 0.01 m/rad}", "has not the dimension of torsion"),
         ("prior: (4, 2)", "prior: (4, 0)", "standard deviation must be above 0"),
         ("    prior: (4, 2)\n", "", "needs either 'prior' or 'at_most'"),
-        ("prior: (4, 2)", "prior: (4, 2) N", "the numbers are in N; the ratio is a pure number"),
+        ("prior: (4, 2)", "prior: (4, 2) N", "'(4, 2) N' is not a pair of numbers"),
     ],
 )
 def test_a_wrong_relation_is_refused(tmp_path, old, new, message):
-    path = tmp_path / "free.yaml"
-    path.write_text(FREE.replace(old, new))
     with pytest.raises(InputError) as refused:
-        load_free(path)
+        ratio_map(tmp_path, FREE.replace(old, new))
     assert message in str(refused.value)
 
 
@@ -188,10 +186,10 @@ def test_an_evaluation_has_amplitudes_and_responses(short, tmp_path):
     )
     path = tmp_path / "friction.yaml"
     path.write_text(
-        "quantities: {friction: {bounds: '(10, 60) N', prior: '(30, 10) N', source: test,"
+        "vary: {friction: {bounds: '(10, 60) N', prior: '(30, 10) N', source: test,"
         " sets: damper_types.friction.friction_force}}\n"
     )
-    ratios = parameter_map_of(short, load_free(path))
+    ratios = parameter_map_of(short, load_vary(path))
     values = Evaluation(Experiment(short, ()), ratios, targets)(np.array([[30.0], [50.0]]))
     assert values.amplitude.shape == (2, 6, 6)
     assert values.responses.shape == (2, 4)

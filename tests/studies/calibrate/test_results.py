@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from linear_fits import fit_at
 
-from wm_drake.parameters.free import load_free
+from wm_drake.parameters.vary_file import load_vary
 from wm_drake.studies.calibrate.page import certainty
 from wm_drake.studies.calibrate.parameter_map import parameter_map_of
 from wm_drake.studies.calibrate.prediction import Prediction
@@ -22,7 +22,7 @@ from wm_drake.studies.calibrate.study import Calibration, SearchPlan
 from wm_drake.studies.calibrate.targets import Targets
 
 FREE = """
-quantities:
+vary:
   friction: {bounds: "(10, 60) N", prior: "(30, 10) N", sets: damper_types.friction.friction_force, source: test}
   motor: {bounds: "(4, 6) kg", prior: "(5, 0.5) kg", sets: bodies.motor.mass, source: test}
   radius: {bounds: "(230, 250) mm", prior: "(240, 5) mm", sets: loads.middle.unbalances.0.radius, source: test}
@@ -34,7 +34,7 @@ LOADS = (("middle", False), ("middle", True), ("back", True))
 def calibration(machine, tmp_path_factory):
     path = tmp_path_factory.mktemp("free") / "free.yaml"
     path.write_text(FREE)
-    parameter_map = parameter_map_of(machine, load_free(path))
+    parameter_map = parameter_map_of(machine, load_vary(path))
     sensors = tuple(machine.parameters.sensors)
     measured = np.full((3, 6), 0.01)
     targets = Targets(LOADS, sensors, measured, np.ones((3, 6)))

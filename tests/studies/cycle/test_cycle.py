@@ -15,7 +15,7 @@ from wm_drake.parameters import SpinProfile, load_load, load_profile
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.feet import foot_loads
 from wm_drake.simulation.measures.record import wrenches_on_cabinet
-from wm_drake.studies.cycle.study import course_of, parts_of, unbalance_of
+from wm_drake.studies.cycle.study import parts_of, run_cycle, unbalance_of
 from wm_drake.studies.cycle.task import WET_LAUNDRY
 
 PROFILE = SpinProfile.model_validate(
@@ -57,7 +57,7 @@ def test_pieces_are_the_whole_run(machine, case):
 
 @pytest.mark.slow
 def test_windows_have_the_extremes_of_the_record(machine, case):
-    course = course_of(machine, case)
+    course = run_cycle(machine, case).course
     record = wm.simulate(machine, case)
     rows = round(float(np.diff(course.time)[0]) / 5e-3)
     count = course.sizes["time"]
@@ -90,7 +90,7 @@ def test_unbalance_is_the_vector_sum(machine, case):
 
 @pytest.mark.slow
 def test_parts_are_those_of_the_profile(machine, case):
-    course = course_of(machine, case)
+    course = run_cycle(machine, case).course
     parts = parts_of(course, case)
     assert parts["part"].values.tolist() == ["up", "on"]
     inside = course.sel(time=slice(4.0, 9.0))

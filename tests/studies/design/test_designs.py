@@ -11,22 +11,23 @@ from made_up_runs import made_up
 from pages import data_of, drawings
 
 from wm_drake.errors import InputError
-from wm_drake.parameters import load_machine
-from wm_drake.parameters.designs import DESIGNS, DesignFile, load_design
-from wm_drake.parameters.tolerances import Tolerances
+from wm_drake.parameters import load_machine, varying
+from wm_drake.parameters.vary_file import VaryFile, load_vary
 from wm_drake.simulation.cases import Case, case_of
 from wm_drake.studies.design.page import design_answer
 from wm_drake.studies.design.problem import machine_designs
 from wm_drake.studies.design.search import SearchSettings
 from wm_drake.studies.design.study import (
     _is_kept,
+    chosen_designs,
     front_envelopes,
     promises,
     run_designs,
     summary_of,
 )
+from wm_drake.studies.design.task import check_goals
 from wm_drake.studies.experiment import Experiment
-from wm_drake.studies.study import Facts
+from wm_drake.studies.facts import Facts
 from wm_drake.studies.tolerance.distributions import base_samples
 from wm_drake.studies.tolerance.variables import uncertain_machine
 
@@ -42,15 +43,15 @@ def machine():
 def task_of(**changes):
     tree = {
         "loads": ("middle", "counter"),
-        "variables": {"k": {"keys": (SPRING,), "low": "50 %", "high": "150 %"}},
+        "vary": {"k": {"keys": (SPRING,), "low": "50 %", "high": "150 %"}},
         "objectives": ({"quantity": "Dx"}, {"quantity": "Fx"}),
     }
-    return DesignFile.model_validate(tree | changes)
+    return VaryFile.model_validate(tree | changes)
 
 
 def designs_of(machine, task):
     cases = [case_of(machine, load) for load in task.loads]
-    return machine_designs(machine, task, cases)
+    return machine_designs(varying(machine, task.entries()), task, cases)
 
 
 def run_of(machine):
@@ -93,7 +94,7 @@ def test_bounds_in_percent_value_and_distance_give_the_same_machine(machine):
         (f"nominal - {0.1 * k} N/m", f"nominal + {0.3 * k} N/m"),
     ):
         variable = {"keys": (SPRING,), "low": low, "high": high}
-        designs = designs_of(machine, task_of(variables={"k": variable}))
+        designs = designs_of(machine, task_of(vary={"k": variable}))
         assert designs.nominal() == pytest.approx([0.25])
         found = designs.machine_at(np.array([0.5])).spring_types["suspension"].stiffness
         assert found == pytest.approx(1.1 * k)
@@ -124,7 +125,7 @@ def test_front_under_a_constraint_is_found(machine, tmp_path):
         "design", "Dx_mm", "Fx_N", "constrained_Dx_mm", "k_percent",
     ]  # fmt: skip
     answer.write(tmp_path)
-    for name, number in front.attrs["chosen"].items():
+    for name, number in chosen_designs(designs, front).items():
         loaded = load_machine(tmp_path / f"machine_{name.replace(' ', '_')}.yaml")
         assert loaded.name == f"reference, {name}"
         part = front.k.sel(design=number).item()
@@ -177,10 +178,10 @@ def test_number_of_the_machine_is_an_objective(machine):
 
 @pytest.mark.slow
 def test_robust_front_keeps_its_promise_on_fresh_samples(machine):
-    tolerances = Tolerances.model_validate(
+    tolerances = VaryFile.model_validate(
         {
-            "load": "middle",
-            "quantities": {
+            "loads": "middle",
+            "vary": {
                 "k": {
                     "keys": (SPRING,),
                     "distribution": "normal",
@@ -199,10 +200,12 @@ def test_robust_front_keeps_its_promise_on_fresh_samples(machine):
 
     def designs(seed):
         return machine_designs(
-            machine,
+            varying(machine, task.entries()),
             task,
             [case],
-            lambda changed: uncertain_machine(changed, tolerances, case),
+            lambda changed: uncertain_machine(
+                varying(changed, tolerances.entries()), tolerances, case
+            ),
             base_samples(1, 256, seed)[0],
         )
 
@@ -217,7 +220,7 @@ def test_robust_front_keeps_its_promise_on_fresh_samples(machine):
     assert kept["chosen"].values.tolist() == ["best Fx", "best Dx"]  # no design gains in both
     assert set(np.concatenate([kept.Fx_kept, kept.Dx_kept])) == {"yes"}
     assert not (kept.Fx_is_broken | kept.Dx_is_broken).any()
-    number = front.attrs["chosen"]["best Fx"]
+    number = chosen_designs(robust, front)["best Fx"]
     best = kept.sel(chosen="best Fx")
     assert best.Fx.sel(samples="promised") == pytest.approx(front.Fx.sel(design=number).item())
     # the quantile of the normal distribution lies in both intervals
@@ -259,21 +262,20 @@ def test_failed_runs_are_not_on_the_front(machine):
 
 
 def test_shipped_files_fit_the_reference_machine(machine):
-    for name in DESIGNS.listed():
-        designs = designs_of(machine, load_design(name))
-        assert len(designs.dimensions) == 8
-        for corner in (0.0, 1.0):
-            designs.machine_at(np.full(8, corner))
+    designs = designs_of(machine, load_vary("gasket"))
+    assert len(designs.dimensions) == 8
+    for corner in (0.0, 1.0):
+        designs.machine_at(np.full(8, corner))
 
 
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"variables": {"k": {"keys": ("spring_types.x",), "low": "1 m", "high": "2 m"}}}, "x"),
-        ({"variables": {"k": {"keys": (SPRING,), "low": "90 %", "high": "80 %"}}}, "below"),
+        ({"vary": {"k": {"keys": ("spring_types.x",), "low": "1 m", "high": "2 m"}}}, "x"),
+        ({"vary": {"k": {"keys": (SPRING,), "low": "90 %", "high": "80 %"}}}, "below"),
         ({"objectives": ({"quantity": "D"},)}, "several responses"),
         ({"constraints": ({"quantity": "Dx", "at_most": "2 N"},)}, "N"),
-        ({"choices": {"c": {"options": {"a": {FRICTION: "1 m"}, "b": {}}}}}, "option a"),
+        ({"choices": {"c": {"options": {"a": {FRICTION: "1 m"}, "b": {}}}}}, "options.a"),
     ],
 )
 def test_wrong_files_are_refused(machine, changes, message):
@@ -284,7 +286,7 @@ def test_wrong_files_are_refused(machine, changes, message):
 @pytest.mark.parametrize(
     "changes",
     [
-        {"variables": {}},
+        {"vary": {}},
         {"loads": ()},
         {"objectives": ({"quantity": "Dx", "over": "often"},)},
         {"constraints": ({"quantity": "Dx"},)},
@@ -292,5 +294,7 @@ def test_wrong_files_are_refused(machine, changes, message):
     ],
 )
 def test_incomplete_files_are_refused(changes):
-    with pytest.raises(ValueError, match=r"design|loads|over|at_least|power of two"):
-        task_of(**changes)
+    with pytest.raises(
+        (ValueError, InputError), match=r"nothing varies|loads|over|at_least|power of two"
+    ):
+        check_goals(task_of(**changes))

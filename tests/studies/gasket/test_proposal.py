@@ -2,8 +2,9 @@
 
 import pytest
 
-from wm_drake.parameters import GASKET_FACTORS, levels_of, load_factors
+from wm_drake.parameters import varying
 from wm_drake.parameters.units import Unit
+from wm_drake.parameters.vary_file import gasket_entries
 from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.measures.responses import GAP
 from wm_drake.studies.doe.design import make_design
@@ -37,7 +38,8 @@ def best_places(gap, displacement):
 
 @pytest.fixture(scope="module")
 def factors(sponges):
-    return levels_of(sponges, {n: f for n, f in load_factors(GASKET_FACTORS).items() if n in NAMES})
+    entries = {name: entry for name, entry in gasket_entries().items() if name in NAMES}
+    return varying(sponges, entries).every
 
 
 def test_largest_gap_is_proposed_and_idle_factors_stay():

@@ -6,14 +6,12 @@ import xarray as xr
 from simple_machines import with_gasket_tables
 
 from wm_drake.parameters import (
-    GASKET_FACTORS,
-    TABLES,
     PublishedTerm,
-    at_levels,
-    levels_of,
-    load_factors,
+    varying,
 )
 from wm_drake.parameters.units import Unit
+from wm_drake.parameters.vary_file import gasket_entries
+from wm_drake.parameters.varying import TABLES
 from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.doe.design import make_design
@@ -127,9 +125,8 @@ def levels(screening):
     """Return factors with the names of a screening, for words."""
     from wm_drake.parameters import load_machine
 
-    known = load_factors(GASKET_FACTORS)
-    names = screening.design.factors
-    return levels_of(load_machine("reference"), {name: known[name] for name in names})
+    known, names = gasket_entries(), screening.design.factors
+    return varying(load_machine("reference"), {name: known[name] for name in names}).every
 
 
 def fake_simulate(machine, _measures, cases, _what):
@@ -149,14 +146,14 @@ def fake_simulate(machine, _measures, cases, _what):
 
 def test_level_zero_is_the_machine_if_tables_are_scaled(reference):
     machine = with_gasket_tables(reference)
-    known = {"K_Lx": load_factors(GASKET_FACTORS)["K_Lx"]}
-    every = {name: levels_of(machine, known, name) for name in TABLES}
+    known = {"K_Lx": gasket_entries()["K_Lx"]}
+    every = {name: varying(machine, known, tables=name) for name in TABLES}
     loads = [Case("middle", machine.loads["middle"], machine.profile)]
-    trials = GasketTrials(machine, every["scaled"], loads, ["D"])
+    trials = GasketTrials(every["scaled"], loads, ["D"])
     zero = at(run_level_zero(machine, every, trials, fake_simulate), ("middle", "Dx"))
     assert zero.machine.item() == pytest.approx(1e-3 * machine.gasket.stiffness_x.force[-1])
     assert zero.scaled_difference.item() == 0.0
-    slope = at_levels(machine, every["linear"], [0]).gasket.stiffness_x
+    slope = every["linear"].at_levels([0]).gasket.stiffness_x
     hardening = 0.03 * slope / machine.gasket.stiffness_x.force[-1] - 1.0
     assert zero.linear_difference.item() == pytest.approx(hardening)
     assert hardening < -0.1
@@ -164,6 +161,6 @@ def test_level_zero_is_the_machine_if_tables_are_scaled(reference):
 
 @pytest.mark.parametrize("factor", ["C_L", "K_Lx"])
 def test_level_zero_is_not_run_without_tables(sponges, factor):
-    known = {factor: load_factors(GASKET_FACTORS)[factor]}
-    every = {name: levels_of(sponges, known, name) for name in TABLES}
+    known = {factor: gasket_entries()[factor]}
+    every = {name: varying(sponges, known, tables=name) for name in TABLES}
     assert not run_level_zero(sponges, every, None, None)

@@ -12,15 +12,13 @@ from wm_drake.errors import InputError
 from wm_drake.model.build import build_machine
 from wm_drake.model.scene import Scene
 from wm_drake.parameters import (
-    GASKET_FACTORS,
     SpinProfile,
-    at_levels,
-    factor_of_text,
-    levels_of,
-    load_factors,
+    varying,
 )
 from wm_drake.parameters.spin import Region
 from wm_drake.parameters.units import Unit
+from wm_drake.parameters.vary import entries_of_texts
+from wm_drake.parameters.vary_file import gasket_entries
 from wm_drake.report.quantity import Quantity, shown
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import measure
@@ -73,6 +71,12 @@ def test_mean_at_levels_is_the_mean_over_the_others(screening):
         assert mean == pytest.approx(of.value.values[chosen].mean())
 
 
+def factors_of(machine, *texts):
+    """Return the factors of texts of `--factor`, with a number in place of a table."""
+    entries = entries_of_texts(texts, gasket_entries(), "--factor", "50 %..150 %")
+    return varying(machine, entries, tables="linear")
+
+
 def answer_of(screening, machine, factors=()):
     """Return the answer of a screening; without factors they have no physical values."""
     trials = SimpleNamespace(factors=factors, parameters=machine, loads=())
@@ -80,8 +84,7 @@ def answer_of(screening, machine, factors=()):
 
 
 def test_tables_are_the_same_bytes_each_time(reference, tmp_path):
-    known = load_factors(GASKET_FACTORS)
-    factors = levels_of(reference, {name: known[name] for name in ("C_L", "C_T", "K_Lx")})
+    factors = factors_of(reference, "C_L", "C_T", "K_Lx").every
     screening = run_screening(make_design("full", ("C_L", "C_T", "K_Lx")), additive)
     for name in ("first", "second"):
         (tmp_path / name).mkdir()
@@ -129,12 +132,10 @@ SHORT = SpinProfile(time=(0.0, 2.0), speed=(5.0, 12.0))
 
 def test_cases_of_trials_have_their_levels(reference):
     texts = ("K_Lx", "loads.middle.unbalances.0.mass=80 %..120 %")
-    known = load_factors(GASKET_FACTORS)
-    factors = levels_of(reference, dict(factor_of_text(text, known) for text in texts))
-    middle = at_levels(reference, factors, [0, 0])
-    machine = build_machine(middle)
+    factors = factors_of(reference, *texts)
+    machine = build_machine(factors.at_levels([0, 0]))
     loads = [Case(name, reference.loads[name], SHORT) for name in ("middle", "counter")]
-    trials = GasketTrials(middle, factors, loads)
+    trials = GasketTrials(factors, loads)
     assert trials.measures == ("extremes", "gap", "spring tensions")
     design = Design("own", texts, level_matrix(2), "main")
     experiment = Experiment(machine, trials.measures, loads=tuple(loads))
@@ -143,7 +144,7 @@ def test_cases_of_trials_have_their_levels(reference):
     names = [letter + axis for letter in "DFM" for axis in "xyz"]
     assert responses.response.values.tolist() == [*names, "gap"]
     # levels 0, 1: heavier, middle load
-    heavy, _ = experiment.cases_of(at_levels(middle, factors, design.levels[5]), "")
+    heavy, _ = experiment.cases_of(factors.at_levels(design.levels[5]), "")
     assert heavy.load.unbalances[0].mass == pytest.approx(1.2)
     measures = measure(simulate(machine, heavy), Scene(heavy.parameters))
     expected = [
@@ -224,16 +225,15 @@ def test_runs_that_touch_are_marked(reference):
 
 def test_physical_values_are_in_design_and_runs(reference, tmp_path):
     texts = ("C_L", "K_Lx=2 N/mm..4 N/mm")
-    known = load_factors(GASKET_FACTORS)
-    factors = levels_of(reference, dict(factor_of_text(text, known) for text in texts))
+    factors = factors_of(reference, *texts)
     design = Design("own", ("C_L", "K_Lx"), level_matrix(2), "main")
     y = {"y": np.arange(9.0)}
     screening = run_screening(design, lambda _: runs_of({"one": y}, {"y": QUANTITIES["y"]}))
-    answer_of(screening, reference, factors).write(tmp_path)
+    answer_of(screening, reference, factors.every).write(tmp_path)
     for name in ("design.csv", "runs.csv"):
         table = pd.read_csv(tmp_path / name)
         assert list(table["K_Lx_N_per_mm"]) == pytest.approx([2.0, 3.0, 4.0] * 3)
-        damping = 1e-3 * at_levels(reference, factors, [-1, 0]).gasket.damping_x
+        damping = 1e-3 * factors.at_levels([-1, 0]).gasket.damping_x
         assert table["C_L_Ns_per_mm"][0] == pytest.approx(damping)
     again = read_design(tmp_path / "design.csv", ("C_L", "K_Lx"), "main")
     np.testing.assert_array_equal(again.levels, design.levels)

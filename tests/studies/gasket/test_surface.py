@@ -8,16 +8,12 @@ from scipy import stats
 
 from wm_drake.errors import InputError
 from wm_drake.parameters import (
-    GASKET_FACTORS,
-    at_levels,
-    at_places,
-    levels_of,
-    load_factors,
     load_machine,
-    place_of,
-    quantities,
+    varying,
 )
 from wm_drake.parameters.units import Unit
+from wm_drake.parameters.variation import number_at
+from wm_drake.parameters.vary_file import gasket_entries
 from wm_drake.report.quantity import Quantity
 from wm_drake.studies.doe.design import make_design
 from wm_drake.studies.gasket.screening import run_screening, runs_of
@@ -99,32 +95,24 @@ def machine():
 
 
 @pytest.mark.parametrize("tables", ["scaled", "linear"])
-def test_places_on_levels_are_the_levels_and_between_them_lie_between(machine, tables):
-    factors = levels_of(machine, load_factors(GASKET_FACTORS), tables)
-    levels = [-1, 0, 1, 0, -1, 1, 0, 1]
-    ours = {k: v for k, v, _ in quantities(at_places(machine, factors, levels))}
-    theirs = {k: v for k, v, _ in quantities(at_levels(machine, factors, levels))}
-    assert ours.keys() == theirs.keys()
-    for key, value in theirs.items():
-        assert ours[key] == pytest.approx(value, rel=1e-12), key
-    half = at_places(machine, factors, [0.5] * 8)
-    for factor in factors:
-        for key, setting in factor.settings[1].items():
-            if isinstance(setting, float):
-                values = {k: v for k, v, _ in quantities(half)}
-                assert values[key] == pytest.approx(
-                    0.5 * (setting + factor.settings[2][key]), rel=1e-12
-                )
+def test_places_between_levels_lie_between_them(machine, tables):
+    factors = varying(machine, gasket_entries(), tables=tables)
+    half = factors.at_levels([0.5] * 8)
+    for factor in factors.every:
+        for number in factor.numbers:
+            low, middle, high = factor.levels_of(number)
+            assert (low, middle, high) == pytest.approx([s * middle for s in (0.5, 1.0, 1.5)])
+            value = number_at(half, number.key).nominal
+            assert value == pytest.approx(0.5 * (middle + high), rel=1e-12)
 
 
 def test_place_of_a_value_in_percent_and_with_unit(machine):
-    factor = next(f for f in levels_of(machine, load_factors(GASKET_FACTORS)) if f.name == "C_L")
-    assert place_of(machine, factor, "50 %") == pytest.approx(-1.0)
-    assert place_of(machine, factor, "125 %") == pytest.approx(0.5)
-    levels = factor.numbers["gasket.damping_x"]
-    assert place_of(machine, factor, f"{levels[2]} N*s/m") == pytest.approx(1.0)
+    (factor,) = varying(machine, {"C_L": gasket_entries()["C_L"]}).every
+    assert factor.level_of("50 %") == pytest.approx(-1.0)
+    assert factor.level_of("125 %") == pytest.approx(0.5)
+    assert factor.level_of(f"{factor.first_levels[2]} N*s/m") == pytest.approx(1.0)
     with pytest.raises(InputError, match="outside the range of factor C_L"):
-        place_of(machine, factor, "200 %")
+        factor.level_of("200 %")
 
 
 def test_check_says_which_runs_are_inside_the_interval():

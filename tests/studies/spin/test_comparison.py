@@ -12,6 +12,7 @@ from wm_drake.parameters import SpinProfile, load_machine, with_value
 from wm_drake.report.figure import Area, Rule
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import Measures
+from wm_drake.studies.facts import Facts
 from wm_drake.studies.spin.comparison import (
     COLOURS,
     STEADY,
@@ -27,7 +28,6 @@ from wm_drake.studies.spin.comparison import (
 from wm_drake.studies.spin.options import MOST_VARIANTS
 from wm_drake.studies.spin.page import Files
 from wm_drake.studies.spin.study import CaseResult, ComparedCases, SpinRuns
-from wm_drake.studies.study import Facts
 
 SENSORS = ["Xr", "Yr", "Zr", "Xf", "Yf", "Zf"]
 WITH, WITHOUT = "with gasket", "without gasket"

@@ -16,16 +16,16 @@ from pages import without_scripts
 from wm_drake.parameters import MachineParameters, load_machine
 from wm_drake.parameters.units import Unit
 from wm_drake.report.figure import Cells
-from wm_drake.report.formatting import number, percent
+from wm_drake.report.formatting import number, signed
 from wm_drake.report.scripts import packed_plotly
 from wm_drake.report.table import readable
 from wm_drake.simulation.spring_tension import slack_springs
+from wm_drake.studies.facts import Facts
 from wm_drake.studies.spin.data import amplitudes_of, differences_of, mounts_of, of_sensors
 from wm_drake.studies.spin.figures import orbits_figure, revolution_starts, simplified_indices
 from wm_drake.studies.spin.page import Files, spin_answer, warnings_of
 from wm_drake.studies.spin.study import CaseResult, SpinRuns
 from wm_drake.studies.spin.vibration import vibration_plots
-from wm_drake.studies.study import Facts
 
 DIVERGED = "the run diverged at 1.234 s: x = 0.6 m, bound 0.5 m"
 VOID = ("meta", "img", "br", "hr", "link", "input")
@@ -343,10 +343,10 @@ def test_revolutions_start_where_the_drum_has_turned_once() -> None:
 
 @pytest.mark.parametrize(
     ("value", "text"),
-    [(12.34, "+12 %"), (-3.6, "−4 %"), (-0.4, "0 %"), (0.4, "0 %"), (float("nan"), "–")],
+    [(12.34, "+12"), (-3.6, "−4"), (-0.4, "0"), (0.4, "0"), (float("nan"), "–")],
 )
-def test_percent_is_written_with_its_sign(value: float, text: str) -> None:
-    assert percent(value) == text
+def test_difference_is_written_with_its_sign(value: float, text: str) -> None:
+    assert signed(value) == text
 
 
 def test_long_lists_are_shown_by_their_ends() -> None:

@@ -13,7 +13,7 @@ from made_up_runs import made_up
 
 from wm_drake.errors import InputError
 from wm_drake.model.build import build_machine
-from wm_drake.parameters import SpinProfile, load_machine, load_profile, with_value
+from wm_drake.parameters import Entry, SpinProfile, load_machine, load_profile, with_value
 from wm_drake.parameters.recorded_sensors import recorded_test_of
 from wm_drake.parameters.spin import Region
 from wm_drake.parameters.unbalance_cases import load_unbalance_cases
@@ -47,6 +47,10 @@ LINEAR = (
 )
 
 
+def unknown(machine, keys):
+    return sought_of(machine, "+".join(keys), Entry(keys=keys))
+
+
 @pytest.fixture(scope="module")
 def reference(tmp_path_factory):
     """Return the reference machine with numbers in place of tables."""
@@ -57,7 +61,7 @@ def reference(tmp_path_factory):
 
 def model_of(reference, seen):
     """Return a model with a known answer: the last number changes the displacements only if `seen`."""
-    sought = tuple(sought_of(reference, keys) for keys in KEYS)
+    sought = tuple(unknown(reference, keys) for keys in KEYS)
     waves = np.sin(np.arange(3 * 2 * 5 * 9).reshape(3, 2, 5, 3, 3) ** 1.3)
 
     def regions(cases):
@@ -139,7 +143,7 @@ def test_noise_widens_intervals(reference):
 
 
 def test_numbers_that_are_one_unknown_change_together(reference):
-    sought = (sought_of(reference, ("gasket.stiffness_x", "gasket.stiffness_z")),)
+    sought = (unknown(reference, ("gasket.stiffness_x", "gasket.stiffness_z")),)
     changed = at_point(reference, sought, np.array([5e3]))
     assert (changed.gasket.stiffness_x, changed.gasket.stiffness_z) == (5e3, 5e3)
     assert changed == with_value(
@@ -157,7 +161,7 @@ def test_numbers_that_are_one_unknown_change_together(reference):
 )  # fmt: skip
 def test_bad_unknowns_are_refused(reference, keys, message):
     with pytest.raises(InputError, match=message):
-        sought_of(reference, keys)
+        unknown(reference, keys)
 
 
 @pytest.fixture

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from wm_drake import build_machine, load_machine, simulate_many
-from wm_drake.parameters import SpinProfile
-from wm_drake.parameters.tolerances import load_tolerances
+from wm_drake.parameters import SpinProfile, varying
+from wm_drake.parameters.vary_file import load_vary
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.tolerance.distributions import base_samples
 from wm_drake.studies.tolerance.rare import subset_simulation
@@ -22,7 +22,8 @@ RUN_UP = SpinProfile(time=(0.0, 12.0), speed=(6.0, 30.0))
 def test_subset_simulation_agrees_with_a_crude_count_on_the_reference_machine():
     parameters = load_machine("reference")
     case = Case("laundry", next(iter(parameters.loads.values())), RUN_UP)
-    uncertain = uncertain_machine(parameters, load_tolerances("heavy_laundry"), case)
+    file = load_vary("heavy_laundry")
+    uncertain = uncertain_machine(varying(parameters, file.entries(without=())), file, case)
     machine = build_machine(uncertain.parameters)
 
     def above(scores):

@@ -7,39 +7,32 @@ from made_up_runs import made_up
 from scipy import stats
 
 from wm_drake.errors import InputError
-from wm_drake.parameters import load_machine
-from wm_drake.parameters.tolerances import (
-    TOLERANCES,
-    Limit,
-    Tolerances,
-    load_limits,
-    load_tolerances,
-)
+from wm_drake.parameters.limits import Limit, load_limits
+from wm_drake.parameters.vary_file import VARY_FILES, VaryFile, load_vary
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.measures.responses import Response
 from wm_drake.studies.tolerance.page import leading
 from wm_drake.studies.tolerance.study import (
-    SHARE,
+    OF_RUNS,
     ToleranceSettings,
     ToleranceTrials,
     judged,
     limits_of,
 )
 from wm_drake.studies.tolerance.variables import uncertain_machine
+from wm_drake.studies.vary import varying_of
 
 SPRING = "spring_types.suspension.stiffness"
 GAP = Response("gap", MEASURES["gap"].variables[0])
 
 
-@pytest.fixture(scope="module")
-def machine():
-    return load_machine("reference")
-
-
-def uncertain(machine, tree, load="middle"):
-    case = Case(load, machine.loads["middle"], machine.profile)
-    return uncertain_machine(machine, Tolerances.model_validate(tree), case)
+def uncertain(machine, file):
+    """Return the uncertain machine of a file, or of entries in its form."""
+    if isinstance(file, dict):
+        file = VaryFile.model_validate({"loads": "middle"} | file)
+    case = Case("middle", machine.parameters.loads["middle"], machine.parameters.profile)
+    return uncertain_machine(varying_of(machine, file.entries(without=())), file, case)
 
 
 def normal(key, mean="100 %", deviation="5 %", **more):
@@ -47,30 +40,28 @@ def normal(key, mean="100 %", deviation="5 %", **more):
 
 
 def test_percent_value_and_distance_mean_the_same(machine):
-    k = machine.spring_types["suspension"].stiffness
+    k = machine.parameters.spring_types["suspension"].stiffness
     forms = [("100 %", "5 %"), (f"{k} N/m", f"{0.05 * k} N/m"), ("nominal", f"{0.05 * k} N/m")]
     for mean, deviation in forms:
-        found = uncertain(
-            machine, {"load": "middle", "quantities": {"k": normal(SPRING, mean, deviation)}}
-        )
+        found = uncertain(machine, {"vary": {"k": normal(SPRING, mean, deviation)}})
         (case,) = found.cases(np.array([[2.0]]))
         assert case.parameters.spring_types["suspension"].stiffness == pytest.approx(1.1 * k)
 
 
 def test_one_draw_or_one_each(machine):
-    one = uncertain(machine, {"load": "middle", "quantities": {"k": normal(SPRING)}})
-    each = uncertain(machine, {"load": "middle", "quantities": {"k": normal(SPRING, draws="each")}})
+    one = uncertain(machine, {"vary": {"k": normal(SPRING)}})
+    each = uncertain(machine, {"vary": {"k": normal(SPRING, draws="each")}})
     assert [v.name for v in one.variables] == ["k"]
     assert [v.name for v in each.variables] == ["k.left", "k.right", "k.rear"]
     (case,) = each.cases(np.array([[0.0, 1.0, 0.0]]))
-    k = machine.spring_types["suspension"].stiffness
+    k = machine.parameters.spring_types["suspension"].stiffness
     types = case.parameters.spring_types
     found = {name: types[s.type].stiffness for name, s in case.parameters.springs.items()}
     assert found == pytest.approx({"left": k, "right": 1.05 * k, "rear": k})
 
 
 def test_samples_with_the_same_parts_share_a_machine(machine):
-    tree = {"quantities": {"k": normal(SPRING)}, "laundry": load_tolerances("laundry").laundry}
+    tree = {"vary": {**load_vary("laundry").vary, "k": normal(SPRING)}}
     found = uncertain(machine, tree)
     scores = np.zeros((3, len(found.variables)))
     scores[1, 1:], scores[2, 0] = 0.5, 0.5  # another load; another spring
@@ -83,7 +74,7 @@ def test_samples_with_the_same_parts_share_a_machine(machine):
 
 
 def test_split_laundry_is_two_lumps(machine):
-    found = uncertain(machine, load_tolerances("laundry").model_dump())
+    found = uncertain(machine, load_vary("laundry"))
     cases = found.cases(np.random.default_rng(0).standard_normal((20, len(found.variables))))
     values = found.joint.values(np.random.default_rng(0).standard_normal((20, 7)))
     for case, (mass, angle, y, radius, share, lead, second_y) in zip(cases, values, strict=True):
@@ -97,59 +88,26 @@ def test_split_laundry_is_two_lumps(machine):
 
 
 def test_shipped_files_fit_the_reference_machine(machine):
-    for name in set(TOLERANCES.listed()) - {"unmeasured"}:
-        found = uncertain(machine, load_tolerances(name).model_dump())
-        assert all(variable.source for variable in found.variables)
+    for name in set(VARY_FILES.listed()) - {"gasket"}:
+        found = uncertain(machine, load_vary(name))
+        assert all(variable.entry.source for variable in found.variables)
         found.check(lambda case: None)
         assert name != "laundry_and_parts" or len(found.variables) == 12
 
 
-@pytest.mark.parametrize(
-    ("tree", "message"),
-    [
-        ({"quantities": {"k": normal(SPRING, "100 %", "1 N/mm")}}, "not in percent"),
-        ({"quantities": {"k": normal(SPRING, low="120 %", high="110 %")}}, "below"),
-        ({"quantities": {"k": normal(SPRING), "l": normal(SPRING)}}, "already"),
-        (
-            {
-                "quantities": {"k": normal(SPRING)},
-                "correlations": {"quantities": ("k", "q"), "matrix": ((1, 0.5), (0.5, 1))},
-            },
-            "no quantity 'q'",
-        ),
-    ],
-)
-def test_wrong_files_are_refused(machine, tree, message):
-    with pytest.raises(InputError, match=message):
-        uncertain(machine, {"load": "middle"} | tree)
+def test_correlation_of_an_unknown_quantity_is_refused(machine):
+    correlations = {"quantities": ("k", "q"), "matrix": ((1, 0.5), (0.5, 1))}
+    with pytest.raises(InputError, match="no quantity 'q'"):
+        uncertain(machine, {"vary": {"k": normal(SPRING)}, "correlations": correlations})
 
 
 def test_negative_mass_is_refused_before_the_study(machine):
     key = "loads.middle.unbalances.0.mass"
-    wide = {"load": "middle", "quantities": {"m": normal(key, "0.1 kg", "50 g")}}
+    wide = {"vary": {"m": normal(key, "0.1 kg", "50 g")}}
     with pytest.raises(InputError, match=r"lower end is not allowed.*truncate"):
         uncertain(machine, wide).check(lambda case: None)
-    wide["quantities"]["m"] |= {"low": "0 kg"}
+    wide["vary"]["m"] |= {"low": "0 kg"}
     uncertain(machine, wide).check(lambda case: None)
-
-
-def test_matrix_that_no_quantities_have_is_refused():
-    quantities = {name: normal(f"{name}.x") for name in "abc"}
-    matrix = ((1, 0.9, -0.9), (0.9, 1, 0.9), (-0.9, 0.9, 1))
-    correlations = {"quantities": tuple("abc"), "matrix": matrix}
-    with pytest.raises(ValueError, match="not positive definite"):
-        Tolerances.model_validate(
-            {"load": "middle", "quantities": quantities, "correlations": correlations}
-        )
-
-
-def test_file_with_an_error_names_line_and_key(tmp_path):
-    path = tmp_path / "t.yaml"
-    path.write_text(
-        "load: middle\nquantities:\n  k: {keys: [a.b], distribution: uniform, low: 1 m}\n"
-    )
-    with pytest.raises(InputError, match=r"t\.yaml:3: quantities\.k: .*'high' is missing"):
-        load_tolerances(path)
 
 
 def gap_of(case, k):
@@ -164,7 +122,7 @@ def study(machine):
     """Return a function that runs a study of two quantities with gaps of closed form."""
     key = "damper_types.friction.friction_force"
     quantities = {"k": normal(SPRING), "f": normal(key, "40 N", "4 N")}
-    k = machine.spring_types["suspension"].stiffness
+    k = machine.parameters.spring_types["suspension"].stiffness
 
     def run(cases, shift):
         gaps = np.array([gap_of(case, k) for case in cases]) + shift
@@ -178,7 +136,7 @@ def study(machine):
         return xr.Dataset(table, {"pair": ["tub_shell|wall_left", "motor|wall_bottom"]})
 
     def trials(settings, correlations=None, shift=0.0):
-        tree = {"load": "middle", "quantities": quantities, "correlations": correlations}
+        tree = {"vary": quantities, "correlations": correlations}
         experiment = made_up(lambda cases: run(cases, shift))
         return ToleranceTrials(uncertain(machine, tree), (GAP,), experiment, settings)
 
@@ -255,5 +213,5 @@ def test_limits_that_cannot_be_judged_are_refused(tmp_path):
 
 
 def test_shares_in_percent():
-    shown = [SHARE.text(x) for x in (0.0, 1.25e-6, 7.31e-4, 1.2345e-2, 0.5)]
+    shown = [OF_RUNS.text(x) for x in (0.0, 1.25e-6, 7.31e-4, 1.2345e-2, 0.5)]
     assert shown == ["0 %", "0.00013 %", "0.073 %", "1.2 %", "50 %"]

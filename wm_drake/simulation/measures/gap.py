@@ -40,6 +40,7 @@ GAP = Measure(
             "smallest distance between tub group and housing; the tub touches at 0 and below",
             better="larger",
             group="gap",
+            studio=1,
         ),
     ),
     each_run(_gap),

@@ -26,6 +26,7 @@ from wm_drake.simulation.records import (
     cabinet_in,
     load_of_record,
     profile_of,
+    rest_pose_of,
     sample_period,
 )
 from wm_drake.simulation.spring_tension import smallest_tensions
@@ -264,7 +265,7 @@ class RecordedRun(Run):
 
     @property
     def rest_pose(self) -> FloatArray:
-        return np.asarray(self.record.attrs["rest_pose"])
+        return rest_pose_of(self.record)
 
     @property
     def scene(self) -> Scene:

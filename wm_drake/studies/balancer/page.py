@@ -1,12 +1,12 @@
 """Show the study of balancers: the answer in words, curves and tables."""
 
-import itertools
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import xarray as xr
 
 from wm_drake.parameters import MachineParameters
+from wm_drake.report import chart
 from wm_drake.report import figure as fig
 from wm_drake.report.formatting import listed
 from wm_drake.report.labelled import LabelledTable
@@ -330,25 +330,18 @@ def _ring(ring: xr.Dataset) -> str:
 
 def curve_plot(base: xr.Dataset) -> Plot:
     """Return amplitude over speed of the load with which rings are varied."""
-    styles: dict[str, tuple[str, str, fig.Dash]] = {
-        "free": ("free balls", fig.OURS, ""),
-        "locked": ("locked balls", fig.MEASURED, ""),
-        "without_rings": ("without rings", fig.QUIET, "dashed"),
-        "liquid": ("liquid", fig.COLOURS[2], ""),
+    styles = {
+        "free": {"key": "free balls"},
+        "locked": {"key": "locked balls", "color": fig.MEASURED},
+        "without_rings": {"key": "without rings", "color": fig.QUIET, "dash": "dashed"},
+        "liquid": {"key": "liquid", "color": fig.COLOURS[2]},
     }
-    speeds = shown(base["from"])
-    marks: list[fig.Mark] = [
-        fig.Line(speeds, shown(base[name]), color=color, key=key, dash=dash)
-        for name, (key, color, dash) in styles.items()
-    ]
+    pays: list[fig.Mark] = []
     if base.pays_from.notnull():
         at, key = shown(base.pays_from).item(), "free balls pay from here"
-        marks.append(fig.Rule(at, "y", dash="dotted", color=fig.QUIET, key=key))
-    panel = fig.Panel(
-        marks=tuple(marks),
-        x=fig.Axis(label=SPEED.label),
-        y=fig.Axis(label=AMPLITUDE.label, is_log=True),
-    )
+        pays.append(fig.Rule(at, "y", dash="dotted", color=fig.QUIET, key=key))
+    x, y = {"label": SPEED.label}, {"label": AMPLITUDE.label, "is_log": True}
+    panel = chart.between((), chart.panel(base, "from", styles, x=x, y=y), *pays)
     peaks = [
         f"{_size(base[f'peak_{name}'])} at {SPEED.text(_speed_of_peak(base[name]))}"
         for name in ("free", "locked")
@@ -363,18 +356,20 @@ def curve_plot(base: xr.Dataset) -> Plot:
 
 def loads_plot(loads: xr.Dataset) -> Plot:
     """Return both amplitudes over the place of the unbalance, a line for each mass."""
-    styles: dict[str, fig.Dash] = {"free": "", "locked": "dashed"}
-    panels = []
-    for name, quantity in (("peak", PEAK), ("level", LEVEL)):
-        marks: list[fig.Mark] = []
-        for color, (_, of_mass) in zip(_colors(), loads.groupby("mass"), strict=False):
-            for balls, dash in styles.items():
-                key = f"{text_of(of_mass.mass[0])}, {balls}"
-                x, y = shown(of_mass.place), shown(of_mass[f"{name}_{balls}"])
-                marks.append(fig.Line(x, y, color=color, dash=dash, symbol="circle", key=key))
-        x_axis = fig.Axis(label=PLACE.named("place of the unbalance along the drum").label)
-        y_axis = fig.Axis(label=quantity.label, is_log=quantity is LEVEL)
-        panels.append(fig.Panel(marks=tuple(marks), x=x_axis, y=y_axis))
+    x = {"label": PLACE.named("place of the unbalance along the drum").label}
+    panels = [
+        chart.panel(
+            loads,
+            "place",
+            {f"{name}_free": {}, f"{name}_locked": {"dash": "dashed"}},
+            by="mass",
+            key=lambda of, line: f"{text_of(of.mass[0])}, {line.split('_')[1]}",
+            symbol="circle",
+            x=x,
+            y={"label": quantity.label, "is_log": quantity is LEVEL},
+        )
+        for name, quantity in (("peak", PEAK), ("level", LEVEL))
+    ]
     hurt = int((loads.peak_free > loads.peak_locked).sum())
     return Plot(
         fig.Figure(panels=fig.in_grid(panels, 2), height=320.0),
@@ -386,25 +381,23 @@ def loads_plot(loads: xr.Dataset) -> Plot:
 
 def rings_plot(loads: xr.Dataset, rings: xr.Dataset, numbers: xr.Dataset) -> Plot:
     """Return both amplitudes and the speed of release over damping, a line for each ball mass."""
-    panels = []
-    for name, quantity in (("peak_free", PEAK), ("level_free", LEVEL), ("pays_from", PAYS_FROM)):
-        marks: list[fig.Mark] = []
-        for color, (_, of_mass) in zip(_colors(), rings.groupby("ball_mass"), strict=False):
-            y = shown(of_mass[name].where(np.isfinite(of_mass[name])))
-            key = f"ball mass {text_of(of_mass.ball_mass[0])}"
-            x = shown(of_mass.damping)
-            marks.append(fig.Line(x, y, color=color, symbol="circle", key=key))
-        y_axis = fig.Axis(label=quantity.label, is_log=quantity is LEVEL)
-        x_axis = fig.Axis(label=DAMPING.label, is_log=True)
-        panels.append(fig.Panel(marks=tuple(marks), x=x_axis, y=y_axis))
+    shown_rings = rings.where(np.isfinite(rings[["peak_free", "level_free", "pays_from"]]))
+    panels = [
+        chart.panel(
+            shown_rings.assign({name: rings[name] for name in ("ball_mass", "damping")}),
+            "damping",
+            [name],
+            by="ball_mass",
+            key=lambda of, _: f"ball mass {text_of(of.ball_mass[0])}",
+            symbol="circle",
+            x={"label": DAMPING.label, "is_log": True},
+            y={"label": quantity.label, "is_log": quantity is LEVEL},
+        )
+        for name, quantity in (("peak_free", PEAK), ("level_free", LEVEL), ("pays_from", PAYS_FROM))
+    ]
     return Plot(
         fig.Figure(panels=fig.in_grid(panels, 3), height=300.0),
         _rings_text(rings, numbers),
         f"With {load_text(base_of(loads))}, over the damping of the races and the mass of the "
         "balls, in parts of the machine file. A point is missing where free balls do not pay.",
     )
-
-
-def _colors() -> Iterator[str]:
-    """Return colours of lines, again and again."""
-    return itertools.cycle(fig.COLOURS)

@@ -24,7 +24,7 @@ from wm_drake.parameters.spin import Region
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Share, Unit
 from wm_drake.report.formatting import number
-from wm_drake.report.quantity import HIDDEN, SPEED, Quantity
+from wm_drake.report.quantity import HIDDEN, MASS, SPEED, Quantity
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.balancer.rings import (
     balls_of,
@@ -53,7 +53,7 @@ speed of the release before the run-up goes on. [s]"""
 
 MM, MOMENT = Unit("m", "mm"), Unit("kg*m", "g*m")
 RATE = Quantity("rate of the run-up", Unit("rad/s^2", "rpm/s"), 0)
-MASS = Quantity("mass", Unit("kg", "kg"), form="{:g}".format)
+OF_LOAD = MASS.named("mass", form="{:g}".format)
 PLACE = Quantity("place", MM, 0)
 UNBALANCE = Quantity("unbalance", MOMENT, 0)
 CAPACITY = Quantity("first moment of all balls, side by side", MOMENT, 0)
@@ -196,7 +196,7 @@ class BalancerTrials:
         within = [is_within(capacities, m * self.radius, p) for m, p, *_ in points]
         names = xr.Dataset(
             {
-                "mass": MASS.variable("run", mass),
+                "mass": OF_LOAD.variable("run", mass),
                 "place": PLACE.variable("run", y),
                 "unbalance": UNBALANCE.variable("run", mass * self.radius),
                 "is_within_capacity": ("run", within, {HIDDEN: True}),
@@ -237,7 +237,7 @@ class BalancerTrials:
         names = []
         for mass, y, ball_mass, damping in points:
             changed = with_factors(parameters, ball_mass, damping)
-            load, name = self.load(mass, y), f"{MASS.text(mass)} at {PLACE.text(y)}"
+            load, name = self.load(mass, y), f"{OF_LOAD.text(mass)} at {PLACE.text(y)}"
             free.append(
                 Case(f"{name}, balls {ball_mass:g}, {damping:g}", load, profile, True, changed)
             )
@@ -266,7 +266,7 @@ class BalancerTrials:
         profile = run_up(self.high, self.rate)
         pairs = zip(loads.mass.values.tolist(), loads.place.values.tolist(), strict=True)
         cases = [
-            Case(f"{MASS.text(mass)} at {PLACE.text(y)}, {what}", self.load(mass, y), profile)
+            Case(f"{OF_LOAD.text(mass)} at {PLACE.text(y)}, {what}", self.load(mass, y), profile)
             for mass, y in pairs
         ]
         return self.curves(machine, cases, what)
@@ -366,7 +366,7 @@ def numbers_of(trials: BalancerTrials, loads: xr.Dataset, plain: xr.Dataset) -> 
         "rate": (RATE, trials.rate),
         "highest_speed": (SPEED.named("highest speed"), trials.high),
         "capacity": (CAPACITY, capacity),
-        "heaviest": (Quantity("mass of it at the wall", MASS.unit, 2), capacity / trials.radius),
+        "heaviest": (MASS.named("mass of it at the wall", decimals=2), capacity / trials.radius),
         "picked_up_from": (PICKED_UP, picked_up_from(parameters)),
         "lock_below": (SPEED.named("lock the balls below"), lock_below(loads)),
         "peak_without_rings": (AMPLITUDE, plain.amplitude.max()),

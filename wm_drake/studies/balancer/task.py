@@ -10,7 +10,7 @@ from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import load_machine
 from wm_drake.parameters.units import Unit
-from wm_drake.report.quantity import SPEED
+from wm_drake.report.quantity import MASS, SPEED
 from wm_drake.simulation.steps import checked_step
 from wm_drake.studies.answer import Answer
 from wm_drake.studies.balancer.candidates import (
@@ -31,7 +31,6 @@ from wm_drake.studies.balancer.options import BalancerOptions
 from wm_drake.studies.balancer.page import balancer_answer, load_text
 from wm_drake.studies.balancer.rings import with_factors, without_rings
 from wm_drake.studies.balancer.study import (
-    MASS,
     PLACE,
     RATE,
     WINDOW,

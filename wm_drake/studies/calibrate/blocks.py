@@ -35,7 +35,7 @@ from wm_drake.studies.fitting.search import silent
 
 
 class FreeNumbers(Protocol):
-    """Unknown numbers of a machine: keys with ranges, or the quantities of a free file."""
+    """Unknown numbers of a machine: keys with ranges, or the numbers of a vary file."""
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:

@@ -17,10 +17,12 @@ class CalibrateOptions(CompareOptions):
         "RECORD...",
         "argument",
     )
-    free: Path | None = option(None, "YAML file of the free quantities, bounds and priors.", "FILE")
+    vary: str | None = option(
+        None, "Vary file: the numbers to find, with bounds and priors.", "FILE"
+    )
     unknown: tuple[str, ...] = option(
         (),
-        "For records, in place of --free: number to find, with or without a range: "
+        "For records, in place of --vary: number to find, with or without a range: "
         "gasket.stiffness_y='(1, 4) N/mm'. KEY1+KEY2 are two keys with the same value. Repeatable.",
         "KEYS[=RANGE]",
     )

@@ -127,7 +127,7 @@ def _method(calibration: Calibration) -> str:
         f"deviation {number(calibration.plan.deviation, 3)} and the rounding of the measured "
         "value; other responses enter in the same way, each with its own deviation."
         f"{beyond} The second sum is over the free quantities: (quantity − expected) / deviation. "
-        "It includes the preloads of the springs and the relations if the free file gives them. "
+        "It includes the preloads of the springs and the relations if the vary file gives them. "
         "The standard deviations after the fit are those of a normal distribution about the "
         "solution, for which the logarithms of the amplitudes are linear in the quantities. They "
         "do not describe other minima of the cost; the distinct solutions show those."
@@ -331,7 +331,7 @@ def _quantity_tables(calibration: Calibration) -> list[LabelledTable]:
         "relations",
         relations_of(calibration),
         "Relations",
-        "Ratios of free quantities to what physics gives for them (free file), and those of the "
+        "Ratios of free quantities to what physics gives for them (vary file), and those of the "
         "calibrated machine.",
     )
     return [quantities, solutions, relations]

@@ -1,53 +1,21 @@
-"""The linear map from free quantities to the values of a machine."""
+"""The numbers of a machine that vary, as unknowns of a fit, and what else is known of them."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
 
 import numpy as np
 
-from wm_drake.errors import InputError, Problem, nearest_names
-from wm_drake.model.bodies import with_sdf_values
+from wm_drake.errors import InputError, Problem, input_error, nearest_names
 from wm_drake.model.machine import Machine
-from wm_drake.parameters import MachineParameters, with_values
-from wm_drake.parameters.free import FreeFile, FreeQuantity, KnownQuantity, Measured
-from wm_drake.parameters.keys import quantities
+from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Unit, dimension, from_base, with_base
+from wm_drake.parameters.units import dimension, split, to_base
+from wm_drake.parameters.variation import range_of
+from wm_drake.parameters.vary_file import Relation, VaryFile
+from wm_drake.parameters.varying import Varied, Varying, measured
 from wm_drake.studies.fitting.problem import Unknown
-
-COMPONENTS = {"x": 0, "y": 1, "z": 2}
-
-
-@dataclass(frozen=True)
-class FreeValue:
-    """A value of the machine that depends on free quantities.
-
-    Attributes:
-        key: Key path of the value; of the whole vector if it is one component of it.
-        component: Index of the component of a vector; None for the whole value.
-        factors: (quantities, 1 or points) factors of each free quantity: one for a number, several
-            for the column of a table.
-        constant: (1 or points) what the known quantities add.
-        reasons: Texts of the known quantities that enter.
-        is_list: Whether the value is the column of a table.
-    """
-
-    key: str
-    component: int | None
-    factors: FloatArray
-    constant: FloatArray
-    reasons: tuple[str, ...]
-    is_list: bool
-
-    def changes(self, point: FloatArray) -> dict[str, Any]:
-        """Return the value at a point (quantities), by key path. [SI]"""
-        sums = self.constant + np.asarray(point) @ self.factors
-        if np.count_nonzero(self.factors) > sums.size:
-            # 15 digits, so that the sum is short in a file
-            sums = np.array([float(f"{number:.15g}") for number in sums])
-        key = self.key if self.component is None else f"{self.key}.{self.component}"
-        return {key: tuple(map(float, sums)) if self.is_list else float(sums[0])}
+from wm_drake.studies.vary import in_vary_file, varying_of
 
 
 @dataclass(frozen=True)
@@ -80,15 +48,14 @@ class KnownRatio:
 
 @dataclass(frozen=True)
 class ParameterMap:
-    """The free quantities of a machine and the values that depend on them.
+    """The numbers of a machine that vary, and what is known of them.
 
-    Arrays have one entry for each quantity, in SI units.
+    Arrays have one entry for each number, in SI units.
 
     Attributes:
-        base: The machine, with explicit values for all that may change.
-        unknowns: The quantities, each with the unit in which it is written, bounds, prior and the
+        varying: The machine, with explicit values for all that may change, and the numbers.
+        unknowns: The numbers, each with the unit in which it is written, bounds, prior and the
             point where searches start.
-        values: Values of the machine that depend on the quantities.
         preload: Expected preload of each spring and its standard deviation; None without a prior.
             [N]
         elongation: Smallest elongation of the springs and its standard deviation; None if any is
@@ -96,17 +63,21 @@ class ParameterMap:
         relations: What is known of ratios of quantities.
     """
 
-    base: MachineParameters
+    varying: Varying
     unknowns: tuple[Unknown, ...]
-    values: tuple[FreeValue, ...]
     preload: tuple[float, float] | None
     elongation: tuple[float, float] | None
     relations: tuple[KnownRatio, ...]
 
     @property
+    def base(self) -> MachineParameters:
+        """The machine."""
+        return self.varying.machine
+
+    @property
     def names(self) -> list[str]:
-        """Names of the quantities."""
-        return [unknown.name for unknown in self.unknowns]
+        """Names of the numbers."""
+        return list(self.varying.names)
 
     @property
     def lower(self) -> FloatArray:
@@ -172,122 +143,98 @@ class ParameterMap:
         return np.hstack([np.empty((len(points), 0)), *parts])
 
     def parameters_at(self, point: FloatArray) -> MachineParameters:
-        """Return the machine at a point.
-
-        Args:
-            point: Values of the free quantities, in SI units.
+        """Return the machine at a point. [SI]
 
         Raises:
             InputError: a value of the machine is not allowed.
         """
-        changes: dict[str, Any] = {}
-        for value in self.values:
-            changes |= value.changes(point)
-        return with_values(self.base, changes)
+        return self.varying.machine_at(point)
 
 
-def parameter_map_of(machine: Machine, free: FreeFile) -> ParameterMap:
-    """Return the parameter map of a free file for a machine.
+def parameter_map_of(machine: Machine, file: VaryFile) -> ParameterMap:
+    """Return the parameter map of a machine.
 
     Raises:
-        InputError: the machine does not have a key, or a factor has the wrong dimension or the
-            wrong number of values.
+        InputError: the machine does not have a key, a factor has the wrong dimension or the wrong
+            number of values, or a number has no bounds or no prior.
     """
-    listed: dict[str, FreeQuantity | KnownQuantity] = {**free.quantities, **free.known}
-    keys = list(dict.fromkeys(key for quantity in listed.values() for key in quantity.sets))
-    base = with_sdf_values(machine.drawn.plant, machine.parameters, keys)
-    known = {key: (value, unit) for key, value, unit in quantities(base)}
-    problems: list[Problem] = []
-    values = []
-    for key in keys:
+    varying = varying_of(machine, file.entries(), file.known)
+    unknowns, problems = list[Unknown](), list[Problem]()
+    for varied in varying.every:
         try:
-            values.append(_value(key, known, free))
-        except ValueError as error:
-            first = next(name for name, quantity in listed.items() if key in quantity.sets)
-            section = "quantities" if first in free.quantities else "known"
-            problems.append(Problem("", f"{section}.{first}.sets", f"'{key}' {error}"))
+            unknowns.append(_unknown(varied))
+        except InputError as error:
+            problems += error.problems
     if problems:
         raise InputError(problems)
+    preload, elongation = file.spring_preload, file.spring_elongation
     return ParameterMap(
-        base,
-        tuple(_unknown(name, quantity) for name, quantity in free.quantities.items()),
-        tuple(values),
-        None if free.spring_preload is None else free.spring_preload.prior.pair,
-        None if free.spring_elongation is None else free.spring_elongation.at_least.pair,
-        tuple(_known_ratios(free)),
+        varying,
+        tuple(unknowns),
+        _pair(preload.prior, "N", "spring_preload") if preload else None,
+        _pair(elongation.at_least, "mm", "spring_elongation") if elongation else None,
+        tuple(_known_ratios(varying, file.relations)),
     )
 
 
-def _unknown(name: str, quantity: FreeQuantity) -> Unknown:
-    lower, upper = quantity.bounds.pair
-    start = (quantity.start or quantity.prior).values[0]
-    return Unknown(
-        name,
-        lower,
-        upper,
-        with_base(quantity.unit),
-        float(np.clip(start, lower, upper)),
-        prior=quantity.prior.pair,
-    )
+def read_parameter_map(machine: Machine, path: Path, file: VaryFile) -> ParameterMap:
+    """Return the parameter map of a machine; problems have the line of the file."""
+    with in_vary_file(path, file):
+        return parameter_map_of(machine, file)
 
 
-def _known_ratios(free: FreeFile) -> Iterator[KnownRatio]:
-    names = list(free.quantities)
-    for name, relation in free.relations.items():
-        pair = relation.at_most or relation.prior
-        assert pair is not None  # the file was checked
-        factors = np.array([relation.to[n].values[0] if n in relation.to else 0.0 for n in names])
-        yield KnownRatio(
-            name, names.index(relation.quantity), factors, *pair.pair, relation.at_most is not None
-        )
+def _unknown(varied: Varied) -> Unknown:
+    kind = varied.entry.kind
+    if kind not in ("", "normal"):
+        message = f"has a {kind} distribution; a fit needs normal ones, a mean and a deviation"
+        raise input_error(message, key=varied.name)
+    lower, upper, mean, deviation = varied.needed("low", "high", "mean", "deviation", study="a fit")
+    if not lower <= mean <= upper:
+        raise input_error("the expected value is outside the bounds", key=varied.name)
+    start = float(np.clip(varied.at.get("start", mean), lower, upper))
+    return Unknown(varied.name, lower, upper, varied.unit, start, prior=(mean, deviation))
 
 
-def _value(key: str, known: Mapping[str, tuple[Any, Unit]], free: FreeFile) -> FreeValue:
-    name, _, last = key.rpartition(".")
-    component = None
-    if key not in known and last in COMPONENTS and name in known:
-        component, shape_key = COMPONENTS[last], name
-    elif key in known:
-        shape_key = key
-    else:
-        raise ValueError(f"is not a number of the machine{nearest_names(key, known)}")
-    value, unit = known[shape_key]
-    is_list = isinstance(value, tuple) and component is None
-    size = len(value) if is_list else 1
+def _pair(text: str, unit: str, key: str) -> tuple[float, float]:
+    """Return a value and its standard deviation. [SI]
 
-    def factors(quantity: FreeQuantity | KnownQuantity) -> FloatArray:
-        factor = quantity.sets.get(key)
-        if factor is None:
-            return np.zeros(size)
-        return _factor(factor, quantity.unit, unit, size, is_list)
-
-    entering = {name: entry for name, entry in free.known.items() if key in entry.sets}
-    constant = sum(
-        (entry.value.values[0] * factors(entry) for entry in entering.values()), np.zeros(size)
-    )
-    return FreeValue(
-        shape_key,
-        component,
-        np.array([factors(quantity) for quantity in free.quantities.values()]),
-        constant,
-        tuple(_known_text(name, entry) for name, entry in entering.items()),
-        is_list,
-    )
+    Raises:
+        InputError: they have another dimension, or the deviation is not above 0.
+    """
+    ends = range_of(text)
+    try:
+        pairs = [measured(end) for end in ends or ()]
+    except ValueError as error:
+        raise input_error(str(error), key=key) from None
+    if len(pairs) != 2 or any(dimension(written) != dimension(unit) for _, written in pairs):
+        example = f"(2, 1) {unit}".rstrip()
+        raise input_error(f"'{text}' is not a pair of numbers such as '{example}'", key=key)
+    if not pairs[1][0] > 0.0:
+        raise input_error("the standard deviation must be above 0", key=key)
+    return pairs[0][0], pairs[1][0]
 
 
-def _known_text(name: str, entry: KnownQuantity) -> str:
-    """Return a text such as ``drum_mass 9 kg (parts list)``."""
-    value = f"{from_base(entry.value.values[0], entry.unit):.10g} {entry.unit}".rstrip()
-    return f"{name} {value} ({entry.source})"
+def _known_ratios(varying: Varying, relations: dict[str, Relation]) -> Iterator[KnownRatio]:
+    """Yield what is known of ratios.
 
-
-def _factor(
-    factor: Measured, quantity_unit: str, unit: Unit, size: int, is_list: bool
-) -> FloatArray:
-    if factor.is_list != is_list or len(factor.values) != size:
-        needed = f"a list of {size} factors" if is_list else "one factor"
-        raise ValueError(f"needs {needed}, not {len(factor.values)}")
-    if dimension(quantity_unit) * dimension(factor.unit) != dimension(unit.si):
-        written = " times ".join(filter(None, [quantity_unit, factor.unit])) or "a pure number"
-        raise ValueError(f"needs a unit such as {unit.shown}, but {written} is not of this kind")
-    return np.array(factor.values)
+    Raises:
+        InputError: a relation names no number that varies, or has another dimension.
+    """
+    names = varying.names
+    for label, relation in relations.items():
+        key = f"relations.{label}"
+        for name in (relation.quantity, *relation.to):
+            if name not in names:
+                raise input_error(f"no quantity '{name}'{nearest_names(name, names)}", key=key)
+        index = names.index(relation.quantity)
+        factors = np.zeros(len(names))
+        for name, text in relation.to.items():
+            (factor, *others), written, _ = split(text)
+            unit = varying.every[names.index(name)].unit
+            product = dimension(unit.shown) * dimension(written)
+            if others or product != dimension(varying.every[index].unit.shown):
+                message = f"{name} times its factor has not the dimension of {relation.quantity}"
+                raise input_error(message, key=key)
+            factors[names.index(name)] = to_base(factor, written)
+        pair = _pair(relation.at_most or relation.prior or "", "", key)
+        yield KnownRatio(label, index, factors, *pair, relation.at_most is not None)

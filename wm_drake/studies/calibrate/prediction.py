@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from wm_drake.errors import check_known, input_error
-from wm_drake.parameters.free import FreeFile
 from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.vary_file import VaryFile
 from wm_drake.studies.calibrate.computed import Evaluation
 from wm_drake.studies.calibrate.response_targets import ResponseTarget
 from wm_drake.studies.calibrate.solutions import Solution
@@ -120,14 +120,14 @@ LEVEL = 0.95
 
 def predict(
     experiment: Experiment,
-    free: FreeFile,
+    free: VaryFile,
     calibration: Calibration,
     held_out: Sequence[Sequence[str]],
     plan: SearchPlan | None = None,
 ) -> list[Prediction]:
     """Repeat a calibration once for each group of held-out loads.
 
-    These searches start at or around the expected values. The start values of the free file are not
+    These searches start at or around the expected values. The start values of the vary file are not
     used, because they may come from a calibration with all loads.
 
     Args:

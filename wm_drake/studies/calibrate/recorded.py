@@ -10,7 +10,7 @@ import numpy as np
 from wm_drake.parameters import Load, MachineParameters
 from wm_drake.parameters.recorded_sensors import RecordedSensor
 from wm_drake.parameters.types import FloatArray
-from wm_drake.report.quantity import TIME
+from wm_drake.report.quantity import TIME, quantity_of
 from wm_drake.simulation.mount_forces import speed_ranges
 from wm_drake.simulation.records import profile_of
 from wm_drake.studies.calibrate.blocks import Block
@@ -51,7 +51,7 @@ class RecordedLoad:
     def places(self) -> list[str]:
         """Names of the drum speeds or times at which amplitudes are compared."""
         places = places_of([pair.run for pair in self.pairs])
-        return [places.attrs["quantity"].text(value) for value in places.values]
+        return [quantity_of(places).text(value) for value in places.values]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

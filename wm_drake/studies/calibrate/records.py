@@ -22,7 +22,7 @@ from wm_drake.parameters.units import Unit
 from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.recorded_signal import turned_signals
-from wm_drake.simulation.records import Record, profile_of
+from wm_drake.simulation.records import Record, profile_of, why_diverged
 from wm_drake.studies.calibrate.blocks import BlockModel
 from wm_drake.studies.calibrate.recorded import (
     By,
@@ -230,7 +230,7 @@ class RecordModel(BlockModel):
         keys = list(cases)
 
         def keep(number: int, record: Record) -> None:
-            if not record.attrs["diverged"]:
+            if not why_diverged(record):
                 self._runs[keys[number]] = turned_signals(record, self.sensors, self.points)
 
         if cases:

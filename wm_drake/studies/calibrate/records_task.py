@@ -5,16 +5,15 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from wm_drake.errors import InputError, input_error
+from wm_drake.errors import input_error
 from wm_drake.model.machine import Machine
-from wm_drake.parameters import located
-from wm_drake.parameters.free import load_free
+from wm_drake.parameters.vary_file import VARY_FILES, load_vary
 from wm_drake.simulation.cases import load_of
 from wm_drake.studies.answer import Answer
 from wm_drake.studies.calibrate.blocks import FreeNumbers, calibrated
 from wm_drake.studies.calibrate.fit_page import FitWords, compared, fit_answer
 from wm_drake.studies.calibrate.options import CalibrateOptions
-from wm_drake.studies.calibrate.parameter_map import parameter_map_of
+from wm_drake.studies.calibrate.parameter_map import read_parameter_map
 from wm_drake.studies.calibrate.recorded import RecordedLoad, without_edges
 from wm_drake.studies.calibrate.records import RecordModel
 from wm_drake.studies.calibrate.solutions import FreeQuantities
@@ -23,7 +22,6 @@ from wm_drake.studies.compare.task import CompareTask
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.experiment import Experiment, record_here
 from wm_drake.studies.fitting.sought import SoughtNumbers, sought_in
-from wm_drake.studies.inputs import existing_file
 from wm_drake.studies.study import Task
 
 OF_TARGETS = ("targets", "deviation", "weight", "limit", "leave_out")
@@ -167,21 +165,18 @@ def _by_load(options: CalibrateOptions) -> dict[str | None, tuple[Path, ...]]:
 
 
 def _free_numbers(options: CalibrateOptions, machine: Machine) -> FreeNumbers:
-    """Return the unknowns of `--unknown`, or those of a free file."""
-    if bool(options.unknown) == (options.free is not None):
+    """Return the unknowns of `--unknown`, or those of a vary file."""
+    if bool(options.unknown) == (options.vary is not None):
         raise input_error(
-            "records need either --unknown KEYS[=RANGE] or --free FILE", where="--unknown"
+            "records need either --unknown NAME[=VALUES] or --vary FILE", where="--unknown"
         )
-    if options.free is None:
+    if options.vary is None:
         sought = sought_in(machine.parameters, options.unknown)
         return SoughtNumbers(machine.parameters, sought, "calibrated")
-    free = load_free(existing_file(options.free, "--free"))
-    if free.spring_preload is not None or free.spring_elongation is not None:
+    path, file = VARY_FILES.path(options.vary), load_vary(options.vary)
+    if file.spring_preload is not None or file.spring_elongation is not None:
         raise input_error(
             "spring_preload and spring_elongation are about targets; leave them out for records",
-            where=str(options.free),
+            where=str(path),
         )
-    try:
-        return FreeQuantities(parameter_map_of(machine, free))
-    except InputError as error:
-        raise located(error, options.free) from None
+    return FreeQuantities(read_parameter_map(machine, path, file))

@@ -9,7 +9,7 @@ from wm_drake.model.scene import Scene
 from wm_drake.parameters import MachineParameters, measured_amplitudes
 from wm_drake.parameters.measured import EXPERIMENT
 from wm_drake.parameters.units import Share
-from wm_drake.report.quantity import SPEED, TIME, Quantity
+from wm_drake.report.quantity import CHANGE, SPEED, TIME, Quantity
 from wm_drake.simulation.measures import measure
 from wm_drake.simulation.records import Record
 from wm_drake.studies.calibrate.prediction import FITS, Prediction
@@ -18,7 +18,6 @@ from wm_drake.studies.calibrate.study import Calibration
 from wm_drake.studies.calibrate.targets import GASKET, MEASURED
 from wm_drake.studies.fitting.page import estimates_of, of_unknowns
 
-CHANGE = Quantity("change by the gasket", Share(), form="{:+.0f}".format)
 COVERED = Quantity("in the 95 % intervals", Share(), 0)
 GAP = Quantity("gap", MEASURED.unit, 1)
 PLACE = Quantity("place", MEASURED.unit, 0)
@@ -148,11 +147,11 @@ def effects_of(calibration: Calibration) -> xr.DataArray:
     shape = len(loads), len(by_source), len(targets.sensors)
     values = np.reshape([[of[load] for of in by_source.values()] for load in loads], shape)
     labels = {"load": loads, "source": list(by_source), "sensor": list(targets.sensors)}
-    return xr.DataArray(CHANGE.variable(list(labels), values), labels)
+    return xr.DataArray(CHANGE.named("change by the gasket").variable(list(labels), values), labels)
 
 
 def relations_of(calibration: Calibration) -> xr.Dataset:
-    """Return the relations of the free file: `known` ratio, `deviation`, and the ratio `found`."""
+    """Return the relations of the vary file: `known` ratio, `deviation`, and the ratio `found`."""
     point, relations = calibration.solutions[0].point, calibration.parameter_map.relations
     ratio = Quantity("ratio", form="{:.3g}".format)
     numbers = {

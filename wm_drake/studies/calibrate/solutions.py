@@ -23,7 +23,7 @@ DISTINCT = 0.5
 
 @dataclass(frozen=True)
 class FreeQuantities:
-    """Quantities of a free file as the unknowns of a fit to recordings."""
+    """Quantities of a vary file as the unknowns of a fit to recordings."""
 
     parameter_map: ParameterMap
 
@@ -179,11 +179,10 @@ def machine_of(parameter_map: ParameterMap, fit: Fit, ending: str = "") -> Machi
     all_texts = fit_texts(parameter_map, fit)
     fits: dict[str, list[str]] = {}
     reasons: dict[str, list[str]] = {}
-    for value in parameter_map.values:
-        entering = np.flatnonzero(np.any(value.factors != 0.0, axis=1))
+    for key, entering, known in parameter_map.varying.origins():
         texts = [all_texts[index] for index in entering]
-        for listed, new in ((fits, texts), (reasons, value.reasons)):
-            kept = listed.setdefault(value.key, [])
+        for listed, new in ((fits, texts), (reasons, known)):
+            kept = listed.setdefault(key, [])
             kept.extend(text for text in new if text not in kept)
     parameters = parameter_map.parameters_at(_rounded(parameter_map, fit))
     fitted = {

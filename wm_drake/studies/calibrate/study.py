@@ -7,8 +7,8 @@ import numpy as np
 from wm_drake.batch.ledger import key_of
 from wm_drake.batch.remembered import model_version, sources_version
 from wm_drake.model.machine import Machine
-from wm_drake.parameters.free import FreeFile
 from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.vary_file import VaryFile
 from wm_drake.studies.calibrate.computed import Evaluation
 from wm_drake.studies.calibrate.parameter_map import ParameterMap, parameter_map_of
 from wm_drake.studies.calibrate.solutions import Solution, distinct
@@ -50,7 +50,7 @@ class SearchPlan:
     """Settings of the search.
 
     Attributes:
-        starts: Number of starts. The first is the one in the free file; the others are drawn at
+        starts: Number of starts. The first is the one in the vary file; the others are drawn at
             random around it.
         iterations: Limit of iterations from each start; 0 for that of `KINKED`.
         deviation: Relative standard deviation of an amplitude.
@@ -95,7 +95,7 @@ class Calibration:
 
 
 def identity_of(
-    machine: Machine, free: FreeFile, targets: Targets, plan: SearchPlan
+    machine: Machine, free: VaryFile, targets: Targets, plan: SearchPlan
 ) -> dict[str, str]:
     """Return the texts that identify a calibration in its ledger."""
     return {
@@ -113,7 +113,7 @@ def identity_of(
 
 def calibrate(
     experiment: Experiment,
-    free: FreeFile,
+    free: VaryFile,
     targets: Targets,
     plan: SearchPlan,
     progress: Progress = silent,
@@ -125,14 +125,14 @@ def calibrate(
     number of workers.
 
     Args:
-        experiment: Runs of the machine. Numbers that the free file does not name keep their values.
+        experiment: Runs of the machine. Numbers that the vary file does not name keep their values.
         free: Quantities that may change, with bounds and priors.
         targets: Measured amplitudes.
         plan: Settings of the search.
         progress: Called with the fraction done and the least misfit so far.
 
     Raises:
-        InputError: the free file does not fit the machine, the machine of the first start cannot be
+        InputError: the vary file does not fit the machine, the machine of the first start cannot be
             run, or a setting of the plan is not allowed.
     """
     parameter_map = parameter_map_of(experiment.machine, free)

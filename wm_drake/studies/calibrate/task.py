@@ -6,19 +6,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from wm_drake.errors import InputError, input_error, problems_at
+from wm_drake.errors import input_error, problems_at
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
-from wm_drake.parameters import MachineParameters, located
-from wm_drake.parameters.free import load_free
+from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.measured import measured_amplitudes, measured_responses
 from wm_drake.parameters.units import plain_number
+from wm_drake.parameters.vary_file import VARY_FILES, load_vary
 from wm_drake.simulation.cases import case_of
 from wm_drake.simulation.records import Record
 from wm_drake.studies.answer import Answer, Part
 from wm_drake.studies.calibrate.options import CalibrateOptions
 from wm_drake.studies.calibrate.page import calibrate_answer
-from wm_drake.studies.calibrate.parameter_map import parameter_map_of
+from wm_drake.studies.calibrate.parameter_map import read_parameter_map
 from wm_drake.studies.calibrate.prediction import check_held_out, predict
 from wm_drake.studies.calibrate.records_task import CalibrateRecordsTask
 from wm_drake.studies.calibrate.response_targets import with_deviations
@@ -32,7 +32,7 @@ from wm_drake.studies.calibrate.study import (
 from wm_drake.studies.calibrate.targets import AMPLITUDE, MEASURED, Targets, targets_of
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.experiment import Experiment
-from wm_drake.studies.inputs import existing_file, pairs_of, with_measured
+from wm_drake.studies.inputs import pairs_of, with_measured
 from wm_drake.studies.modes.natural import natural_modes
 from wm_drake.studies.next.knowledge import Knowledge, of_calibration
 from wm_drake.studies.next.task import next_block
@@ -53,7 +53,7 @@ class CalibrateTask(Task):
     """A calibration to targets with checked options."""
 
     def __init__(self, options: CalibrateOptions, machine: Machine) -> None:
-        """Read targets and free file, and check the settings of the searches.
+        """Read targets and vary file, and check the settings of the searches.
 
         Raises:
             InputError: an option or a file is wrong.
@@ -61,8 +61,8 @@ class CalibrateTask(Task):
         for name in OF_RECORDS:
             if name in options.model_fields_set:
                 raise input_error("is about records, and none is given", where=f"--{name}")
-        if options.free is None:
-            raise input_error("is missing; name a file of free quantities", where="--free")
+        if options.vary is None:
+            raise input_error("is missing; name a vary file", where="--vary")
         self.options, self.held_out = options, _groups(options.leave_out)
         measured = with_measured(machine.parameters, options.targets, "--targets")
         deviations = _fractions(options.deviation, "--deviation")
@@ -76,12 +76,9 @@ class CalibrateTask(Task):
         self.plan = SearchPlan(
             options.starts, options.seed, options.iterations, amplitude, resolution
         )
-        self.free = load_free(existing_file(options.free, "--free"))
+        self.free = load_vary(options.vary)
         check_held_out(self.targets, self.held_out)
-        try:
-            parameter_map_of(self.machine, self.free)
-        except InputError as error:
-            raise located(error, options.free) from None
+        read_parameter_map(self.machine, VARY_FILES.path(options.vary), self.free)
 
     @property
     def identity(self) -> dict[str, Any]:
@@ -119,7 +116,7 @@ class CalibrateTask(Task):
     def _next(self, executor: Executor, calibration: Calibration) -> Part:
         """Return what to measure next, given the best solution of a calibration."""
         best, options = calibration.solutions[0], self.options
-        words = ["wm-drake study next", options.machine, f"--free {options.free}"]
+        words = ["wm-drake study next", options.machine, f"--vary {options.vary}"]
         words += [f"--calibrated {executor.out or 'FOLDER'}"]
 
         def known() -> Knowledge:

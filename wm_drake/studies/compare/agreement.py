@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from wm_drake.report.quantity import Quantity
+from wm_drake.report.quantity import quantity_of
 from wm_drake.studies.compare.study import DIFFERENCE
 
 LEAST_SHOWN = 0.1
@@ -51,7 +51,7 @@ def agreement_of(amplitudes: Sequence[xr.Dataset], place: xr.DataArray) -> xr.Da
     at, k = np.unravel_index(np.argmax(outside), outside.shape)
     differs = bool(outside[at, k] > 0.0)
     near = measured[max(0, at - 2) : at + 3, k]
-    quantity: Quantity = place.attrs["quantity"]
+    quantity = quantity_of(place)
     values = place.values
     places = {
         "from_place": values[inside[0]] if has_range else np.nan,

@@ -8,8 +8,7 @@ from scipy.stats import beta
 from wm_drake.errors import input_error
 from wm_drake.parameters.recorded_sensors import RecordedSensor
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Share
-from wm_drake.report.quantity import Quantity
+from wm_drake.report.quantity import SHARE
 from wm_drake.simulation.band import HIGHEST_PART
 from wm_drake.simulation.orders import REVOLUTIONS, order_vectors
 from wm_drake.studies.compare.pairs import QUANTITIES, Pair, order_one
@@ -21,7 +20,6 @@ which finds the place where noise is most like the prediction (120 drawn records
 NEIGHBOURS = (1.0 - 3.0 / REVOLUTIONS, 1.0 + 3.0 / REVOLUTIONS)
 """Orders on both sides of 1 that a Blackman window of `REVOLUTIONS` just separates from it."""
 
-SHARE = Quantity("", Share(), 0)
 
 REVERSED = -0.5
 """Correlation of order 1 below which a sensor is taken to have the other sign."""

@@ -8,9 +8,9 @@ import xarray as xr
 from wm_drake.model.scene import Scene
 from wm_drake.parameters.recorded_sensors import RecordedSensor
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Unit
-from wm_drake.report.quantity import SPEED, TIME, Quantity
+from wm_drake.report.quantity import SPEED, TIME, of_measure
 from wm_drake.simulation.recorded_signal import sensor_axis
+from wm_drake.simulation.records import rest_pose_of
 from wm_drake.simulation.vibration import tub_motion_of
 from wm_drake.studies.compare.pairs import Pair
 
@@ -20,7 +20,7 @@ LEAST_RANK = 5
 SMALLEST_PART = 1e-2
 """Singular value of a motion, by the largest one, below which the sensors do not tell it."""
 
-GAP = Quantity("smallest gap", Unit("m", "mm"), 1)
+GAP = of_measure("smallest_gap")
 
 
 def gaps_of(
@@ -55,7 +55,7 @@ def gaps_of(
     inverse = np.linalg.pinv(moving, rcond=SMALLEST_PART)
     gaps = []
     for pair in pairs:
-        poses, rest = tub_motion_of(pair.run)[0][:, :6], np.asarray(pair.run.attrs["rest_pose"])
+        poses, rest = tub_motion_of(pair.run)[0][:, :6], rest_pose_of(pair.run)
         missing = pair.measured[:, numbers] - pair.predicted[:, numbers]
         valid = np.isfinite(missing).all(axis=1)
         time = pair.run.time.values
@@ -86,7 +86,7 @@ def _tells_displacement(sensor: RecordedSensor) -> bool:
 
 def _motion_row(sensor: RecordedSensor, point: FloatArray, pair: Pair) -> FloatArray:
     """Return the displacement of a sensor for each small motion of the tub: angles, position."""
-    angles = np.asarray(pair.run.attrs["rest_pose"][:3])
+    angles = rest_pose_of(pair.run)[:3]
     axis = sensor_axis(sensor, angles[None], angles)[0]
     sign = -1.0 if sensor.polarity == "negative" else 1.0
     return sign * sensor.gain * np.concatenate([np.cross(point, axis), axis])

@@ -8,10 +8,10 @@ import xarray as xr
 
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.recorded_sensors import RecordedSensor
-from wm_drake.parameters.units import Share, Unit
+from wm_drake.parameters.units import Unit
 from wm_drake.report import figure as fig
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import SPEED, TIME, Quantity, quantity_of, shown, text_of
+from wm_drake.report.quantity import SHARE, SPEED, TIME, Quantity, quantity_of, shown, text_of
 from wm_drake.simulation.displacements import band_of
 from wm_drake.simulation.netcdf import netcdf_bytes
 from wm_drake.studies.answer import Answer, Part, Plot, pictures_first
@@ -84,9 +84,6 @@ METHOD = (
     "with the same gaps. An amplitude is the smooth envelope of the filtered signal, the magnitude "
     "of its analytic signal, as in fits to records; noise hardly changes it."
 )
-
-
-SHARE = Quantity("", Share(), 0)
 
 
 def within_text(count: int) -> str:
@@ -249,7 +246,7 @@ def _amplitudes(amplitudes: xr.Dataset, count: int) -> Plot:
 
 def _residuals(amplitudes: xr.Dataset, tolerance: str) -> Plot:
     shares = amplitudes.assign(allowed=amplitudes.tolerance / amplitudes.measured.max("place"))
-    shares.allowed.attrs.update(amplitudes.difference.attrs)
+    shares["allowed"] = quantity_of(amplitudes.difference).on(shares.allowed)
 
     def marks(of: xr.Dataset) -> list[fig.Mark]:
         x, allowed = shown(of.place), shown(of.allowed)

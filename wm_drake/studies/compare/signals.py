@@ -17,7 +17,7 @@ from scipy.sparse import csr_array
 
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
-from wm_drake.report.quantity import SPEED, TIME
+from wm_drake.report.quantity import SPEED, TIME, quantity_of
 from wm_drake.simulation.band import pass_band
 from wm_drake.simulation.displacements import analytic_sizes, filtered
 from wm_drake.simulation.mount_forces import speed_ranges
@@ -97,7 +97,7 @@ def _rises(profile: SpinProfile) -> bool:
 
 def _place_numbers(run: Record, places: xr.DataArray) -> np.ndarray:
     """Return the number of the place of each sample of a run. (n,)"""
-    is_speed = places.attrs["quantity"] is SPEED
+    is_speed = quantity_of(places) is SPEED
     values = np.abs(run.drum_speed.values) if is_speed else run.time.values
     middles = places.values
     width = middles[1] - middles[0]

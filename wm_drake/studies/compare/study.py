@@ -8,7 +8,7 @@ from scipy.stats import t as student
 
 from wm_drake.parameters.recorded_sensors import RecordedSensor
 from wm_drake.parameters.units import Share, Unit
-from wm_drake.report.quantity import Quantity
+from wm_drake.report.quantity import Quantity, quantity_of
 from wm_drake.simulation.band import pass_band
 from wm_drake.simulation.records import profile_of, sample_period
 from wm_drake.simulation.vibration import relative_error
@@ -96,7 +96,7 @@ def sensors_of(repeats: xr.Dataset, amplitudes: xr.Dataset, quantity: str) -> xr
     at = amplitudes.measured.fillna(-1.0).argmax("place")
     known = amplitudes.measured.notnull()
     within = (amplitudes.agrees & known).sum("place") / known.sum("place")
-    place: Quantity = repeats.place.attrs["quantity"]
+    place = quantity_of(repeats.place)
     means = repeats[["distance", "correlation"]].sel(sensor=names).mean("repeat")
     numbers = {
         "measured": (unit.named("largest, measured"), measured),

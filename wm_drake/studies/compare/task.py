@@ -20,7 +20,7 @@ from wm_drake.parameters.recorded_sensors import (
 )
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
-from wm_drake.simulation.records import Record
+from wm_drake.simulation.records import Record, why_diverged
 from wm_drake.studies.answer import Answer
 from wm_drake.studies.compare.checks import check_pair
 from wm_drake.studies.compare.gaps import gaps_of
@@ -131,8 +131,8 @@ class CompareTask(Task):
         records: dict[int, Record] = {}
         executor.records(self.machine, cases, records.__setitem__, "runs")
         for record in records.values():
-            if record.attrs["diverged"]:
-                raise input_error(f"the run diverged: {record.attrs['diverged']}", key="machine")
+            if reason := why_diverged(record):
+                raise input_error(f"the run diverged: {reason}", key="machine")
         return [records[number] for number in range(len(cases))]
 
 

@@ -1,14 +1,19 @@
 """Show a cycle: its course in panels one below the other, and a table of its parts."""
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import xarray as xr
 
 from wm_drake.parameters import MachineParameters
 from wm_drake.report import figure as fig
+from wm_drake.report.chart import panel
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import STEP, TIME, Quantity, quantity_of, shown, text_of
+from wm_drake.report.quantity import TIME, quantity_of, shown, text_of
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.answer import Answer, Part, Plot
+from wm_drake.studies.cycle.study import Cycle
 
 HOW = (
     "Each point stands for {window}: mean speed, extremes of the rest. Amplitude: half of the "
@@ -19,14 +24,18 @@ HOW = (
 )
 
 
+FROM_ZERO = {"range": (0.0, None)}
+
+
 def cycle_answer(
-    parameters: MachineParameters, case: Case, course: xr.Dataset, parts: xr.Dataset
+    parameters: MachineParameters, case: Case, cycle: Cycle, parts: xr.Dataset
 ) -> Answer:
     """Return the answer of the study.
 
     Args:
-        course, parts: As of `course_of` and `parts_of` in `wm_drake.studies.cycle.study`.
+        parts: As of `parts_of` in `wm_drake.studies.cycle.study`.
     """
+    course = cycle.course
     table = LabelledTable(
         "parts",
         parts.assign(touches=parts.gap.drop_attrs() <= 0.0),
@@ -35,7 +44,6 @@ def cycle_answer(
         marked=("touches", "alarm"),
         is_in_terminal=True,
     )
-    diverged = (f"{case.name}: {course.attrs['diverged']}",) if course.attrs["diverged"] else ()
     return Answer(
         f"Cycle of machine {parameters.name}",
         summary(case, course),
@@ -47,17 +55,10 @@ def cycle_answer(
         (
             ("Load", case.name),
             ("Duration of the cycle", TIME.text(case.profile.duration)),
-            ("Integration", _integration(course)),
+            ("Integration", cycle.integration),
         ),
-        diverged=diverged,
+        diverged=(f"{case.name}: {cycle.diverged}",) if cycle.diverged else (),
     )
-
-
-def _integration(course: xr.Dataset) -> str:
-    """Return how the cycle was integrated."""
-    how = course.attrs
-    step, period = STEP.text(how["step"]), STEP.text(how["period"])
-    return f"{how['integrator']}, steps of {step}, samples every {period}"
 
 
 def _course_table(course: xr.Dataset) -> LabelledTable:
@@ -98,65 +99,34 @@ def summary(case: Case, course: xr.Dataset) -> str:
     return " ".join(sentences)
 
 
+SHOWN: dict[str, dict[str, Any]] = {
+    "drum_speed": {},
+    "mass": {"y": FROM_ZERO},
+    "unbalance": {"y": FROM_ZERO},
+    "half_swing": {"y": FROM_ZERO, "by": "sensor"},
+    "gap": {"y": FROM_ZERO},
+    "foot_smallest": {"drawn": ["foot_smallest", "foot_largest"]},
+    "sideways": {"y": FROM_ZERO},
+}
+"""How variables of a cycle are drawn over time, as far as the machine has them."""
+
+WORDS = {"foot_smallest": "load of a foot", "sideways": "force along the floor"}
+"""Words of panels, where those of their first variable do not do."""
+
+
 def course_plot(course: xr.Dataset) -> Plot:
     """Return speed, unbalance, half swings, gap and loads of the feet over the cycle."""
-    time = shown(course.time)
-    panels = [
-        _panel(course, time, ("drum_speed",)),
-        _panel(course, time, ("mass",), from_zero=True),
-        _panel(course, time, ("unbalance",), from_zero=True),
-        _swings(course, time),
-    ]
-    if course.gap.notnull().any():
-        panels.append(_panel(course, time, ("gap",), from_zero=True))
-    if "foot_smallest" in course:
-        panels.append(_panel(course, time, ("foot_smallest", "foot_largest"), "load of a foot"))
-        panels.append(_panel(course, time, ("sideways",), "force along the floor", from_zero=True))
-    figure = fig.Figure(panels=fig.in_grid(panels, 1, share="x"), height=150.0)
+    ends, panels = {"range": (0.0, shown(course.time)[-1].item())}, []
+    for name, how in SHOWN.items():
+        if name in course and course[name].notnull().any():
+            quantity = quantity_of(course[name])
+            quantity = quantity.named(WORDS.get(name, quantity.words))
+            how = {"drawn": [name], "x": ends, **how}
+            how["y"] = {"label": quantity.label, **how.get("y", {})}
+            panels.append(replace(panel(course, "time", **how), name=quantity.words))
     window = TIME.text(float(np.diff(course.time.values[:2]).sum()))
     return Plot(
-        figure,
-        f"Course of the cycle: {', '.join(panel.name for panel in panels)} over time.",
+        fig.Figure(panels=fig.in_grid(panels, 1, share="x"), height=150.0),
+        f"Course of the cycle: {', '.join(one.name for one in panels)} over time.",
         HOW.format(window=window),
     )
-
-
-def _panel(
-    course: xr.Dataset,
-    time: np.ndarray,
-    names: tuple[str, ...],
-    words: str = "",
-    *,
-    from_zero: bool = False,
-) -> fig.Panel:
-    """Return a panel of variables of one unit over time."""
-    quantity: Quantity = quantity_of(course[names[0]])
-    quantity = quantity.named(words) if words else quantity
-    marks = tuple(
-        fig.Line(time, shown(course[name]), color=color, key=_key(course[name], names))
-        for name, color in zip(names, fig.COLOURS, strict=False)
-    )
-    y = fig.Axis(label=quantity.label, range=(0.0 if from_zero else None, None))
-    x = fig.Axis(label=TIME.label, range=(0.0, float(time[-1])))
-    return fig.Panel(name=quantity.words, marks=marks, x=x, y=y)
-
-
-def _key(array: xr.DataArray, names: tuple[str, ...]) -> str:
-    return quantity_of(array).words if len(names) > 1 else ""
-
-
-def _swings(course: xr.Dataset, time: np.ndarray) -> fig.Panel:
-    """Return the half swings of all sensors over time."""
-    quantity = quantity_of(course.half_swing)
-    marks = tuple(
-        fig.Line(time, shown(course.half_swing.sel(sensor=name)), color=color, key=f"sensor {name}")
-        for name, color in zip(course.sensor.values.tolist(), _colours(course), strict=True)
-    )
-    x = fig.Axis(label=TIME.label, range=(0.0, float(time[-1])))
-    y = fig.Axis(label=quantity.label, range=(0.0, None))
-    return fig.Panel(name=quantity.words, marks=marks, x=x, y=y)
-
-
-def _colours(course: xr.Dataset) -> list[str]:
-    count = course.sizes["sensor"]
-    return [fig.COLOURS[k % len(fig.COLOURS)] for k in range(count)]

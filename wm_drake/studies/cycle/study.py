@@ -7,6 +7,7 @@ piece, and each piece is measured while the next one is integrated.
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -20,7 +21,7 @@ from wm_drake.model.machine import Machine, Setup
 from wm_drake.model.scene import Scene
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
-from wm_drake.report.quantity import SPEED, TIME, Quantity
+from wm_drake.report.quantity import MASS, SPEED, STEP, TIME, Quantity, of_measure
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.feet import foot_loads
 from wm_drake.simulation.mounts import mount_wrenches
@@ -35,12 +36,12 @@ SHORTEST = 0.75
 WINDOWS_OF_PIECE = 20
 """Windows that are computed at a time: some MB of samples."""
 
-MASS = Quantity("mass of the load", Unit("kg", "kg"), 2)
+OF_LOAD = MASS.named("mass of the load", decimals=2)
 UNBALANCE = Quantity("unbalance", Unit("kg*m", "g*m"), 0)
 SWING = Quantity("half swing", Unit("m", "mm"), 1)
 """Half of the distance from the smallest to the largest displacement of a window; an amplitude is
 that of the filtered displacement of a whole run (docs/theory/measures.md)."""
-GAP = Quantity("smallest gap", Unit("m", "mm"), 1)
+GAP = of_measure("smallest_gap")
 FOOT = Quantity("load of a foot", Unit("N", "N"), 0)
 SLIDING = Quantity("horizontal force on the floor", Unit("N", "N"), 0)
 
@@ -68,7 +69,7 @@ class WindowExtremes:
         masses = self._masses(whole)[self.rows - 1 :: self.rows]
         values = {
             "drum_speed": SPEED.variable("time", self._windows(whole.state[:, 13]).mean(axis=1)),
-            "mass": MASS.variable("time", masses.sum(axis=1)),
+            "mass": OF_LOAD.variable("time", masses.sum(axis=1)),
             "unbalance": UNBALANCE.variable("time", unbalance_of(setup, masses)),
             "half_swing": SWING.variable(
                 ("time", "sensor"), 0.5 * np.ptp(self._windows(displacement), axis=1)
@@ -135,21 +136,31 @@ def unbalance_of(setup: Setup, masses: FloatArray) -> FloatArray:
     return np.asarray(np.hypot(moment[:, 0], moment[:, 2]))
 
 
-def course_of(machine: Machine, case: Case, scene: Scene | None = None) -> xr.Dataset:
-    """Run a cycle and return its course.
+class Cycle(NamedTuple):
+    """A cycle that was run.
+
+    Attributes:
+        course: Over `time`, the middles of windows [s]: mean `drum_speed`, `mass` of the load and
+            its static `unbalance` at the end of the window, `half_swing` of each sensor, half of
+            the distance from the smallest to the largest displacement, smallest `gap`; with a
+            fixed cabinet smallest and largest load of a foot, `foot_smallest` and `foot_largest`,
+            and largest force along the floor, `sideways`.
+        diverged: Why it stopped early; "" if it did not.
+        integration: How it was integrated, in words.
+    """
+
+    course: xr.Dataset
+    diverged: str
+    integration: str
+
+
+def run_cycle(machine: Machine, case: Case, scene: Scene | None = None) -> Cycle:
+    """Run a cycle.
 
     Args:
         machine: Built machine.
         case: Load and profile.
         scene: Shapes of the machine; made here if None.
-
-    Returns:
-        Over `time`, the middles of windows [s]: mean `drum_speed`, `mass` of the load and its
-        static `unbalance` at the end of the window, `half_swing` of each sensor, half of the
-        distance from the smallest to the largest displacement, smallest `gap`; with a fixed
-        cabinet smallest and largest load of a foot, `foot_smallest` and `foot_largest`, and largest
-        force along the floor, `sideways`. Attributes `diverged`: why it stopped early, "" if it did
-        not; `integrator`; `step` and `period`, time between samples [s].
     """
     profile, parameters = case.profile, machine.parameters
     empty = machine.set_up(gasket=case.gasket)
@@ -165,8 +176,9 @@ def course_of(machine: Machine, case: Case, scene: Scene | None = None) -> xr.Da
             courses.append(extremes(piece))
         diverged = piece.divergence.reason if piece.divergence else ""
     course = xr.concat(courses, "time", combine_attrs="override")
-    how = {"integrator": stepping.integrator, "step": stepping.step, "period": period}
-    return course.assign_attrs(diverged=diverged, **how)
+    step, every = STEP.text(stepping.step), STEP.text(period)
+    how = f"{stepping.integrator}, steps of {step}, samples every {every}"
+    return Cycle(course, diverged, how)
 
 
 def _ahead(pieces: Iterator[Trajectory]) -> Iterator[Trajectory]:
@@ -180,7 +192,7 @@ def _ahead(pieces: Iterator[Trajectory]) -> Iterator[Trajectory]:
 
 OF_PART: dict[str, tuple[Quantity, Callable[[FloatArray], float]]] = {
     "drum_speed": (SPEED.named("highest speed"), lambda values: np.abs(values).max()),
-    "mass": (MASS.named("mass at the end"), lambda values: values[-1]),
+    "mass": (OF_LOAD.named("mass at the end"), lambda values: values[-1]),
     "unbalance": (UNBALANCE.named("unbalance at the end"), lambda values: values[-1]),
     "half_swing": (SWING.named("largest half swing"), np.max),
     "gap": (GAP, np.min),
@@ -195,7 +207,7 @@ def parts_of(course: xr.Dataset, case: Case) -> xr.Dataset:
     """Return the extremes in each region of the profile, over `part`; the whole cycle without any.
 
     Args:
-        course: As of `course_of`.
+        course: `course` of a `Cycle`.
     """
     regions = [(r.name, r.begin, r.end) for r in case.profile.regions]
     regions = regions or [("whole cycle", 0.0, case.profile.duration)]

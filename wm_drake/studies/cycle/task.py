@@ -11,7 +11,7 @@ from wm_drake.simulation.cases import Case
 from wm_drake.studies.answer import Answer
 from wm_drake.studies.cycle.options import CycleOptions
 from wm_drake.studies.cycle.page import cycle_answer
-from wm_drake.studies.cycle.study import course_of, parts_of
+from wm_drake.studies.cycle.study import parts_of, run_cycle
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.study import Task
 
@@ -30,8 +30,9 @@ class CycleTask(Task):
 
     def run(self, executor: Executor) -> Answer:  # noqa: ARG002
         """Run the cycle."""
-        course = course_of(self.machine, self.case)
-        return cycle_answer(self.machine.parameters, self.case, course, parts_of(course, self.case))
+        cycle = run_cycle(self.machine, self.case)
+        parts = parts_of(cycle.course, self.case)
+        return cycle_answer(self.machine.parameters, self.case, cycle, parts)
 
 
 def _load(name: str, machine: Machine) -> tuple[str, Load]:

@@ -3,13 +3,16 @@
 `pick.js` moves what has the label `PICKED` when a reader picks another design.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import xarray as xr
 
+from wm_drake.report import chart
 from wm_drake.report import figure as fig
 from wm_drake.report.quantity import TIME, quantity_of, shown
 from wm_drake.studies.design.problem import MachineDesigns
-from wm_drake.studies.design.study import EVALUATIONS, HYPERVOLUME, PROPOSED
+from wm_drake.studies.design.study import PROPOSED, chosen_designs
 
 PICKED = "picked design"
 """Label of what belongs to the picked design."""
@@ -24,9 +27,9 @@ COLUMNS = 3
 """Number of panels of envelopes in a row."""
 
 
-def first_picked(front: xr.Dataset) -> int:
+def first_picked(designs: MachineDesigns, front: xr.Dataset) -> int:
     """Return the number of the design that is picked first: the proposed one, if there is one."""
-    chosen: dict[str, int] = front.attrs["chosen"]
+    chosen = chosen_designs(designs, front)
     return chosen.get(PROPOSED, next(iter(chosen.values())))
 
 
@@ -42,7 +45,8 @@ def front_figure(designs: MachineDesigns, front: xr.Dataset) -> fig.Figure:
     Args:
         front: Front with at least one design and two objectives.
     """
-    numbers, picked = sorted(set(front.attrs["chosen"].values())), first_picked(front)
+    numbers = sorted(set(chosen_designs(designs, front).values()))
+    picked = first_picked(designs, front)
     of_chosen, of_picked = front.sel(design=numbers), front.sel(design=[picked])
     panels = []
     for pair in pairs_of(designs):
@@ -85,32 +89,32 @@ def envelopes_figure(envelopes: xr.Dataset, picked: int) -> fig.Figure:
     Args:
         picked: Number of the design.
     """
-    columns = min(COLUMNS, envelopes.sizes["sensor"])
     largest = max(float(np.nanmax(shown(one), initial=0.0)) for one in envelopes.values())
     time = shown(envelopes["time"])
-    x = fig.Axis(label=TIME.label, range=(0.0, float(time[0] + time[-1])))
-    y = fig.Axis(range=(0.0, 1.05 * largest or 1.0))
-    panels = []
-    for sensor in envelopes["sensor"].values.tolist():
-        of_sensor = envelopes.sel(sensor=sensor)
-        nominal, one = shown(of_sensor.nominal), shown(of_sensor.envelope.sel(design=picked))
-        marks = (
-            fig.Line(time, nominal, color=fig.QUIET, key="the machine itself"),
-            fig.Line(time, one, color=fig.MEASURED, width=2.2, key=PICKED),
+    of_picked = envelopes.sel(design=picked)
+    panels = [
+        replace(
+            chart.panel(
+                of_picked.sel(sensor=sensor),
+                "time",
+                {
+                    "nominal": {"color": fig.QUIET, "key": "the machine itself"},
+                    "envelope": {"color": fig.MEASURED, "width": 2.2, "key": PICKED},
+                },
+                x={"label": TIME.label, "range": (0.0, float(time[0] + time[-1]))},
+                y={"label": "", "range": (0.0, 1.05 * largest or 1.0)},
+            ),
+            title=quantity_of(envelopes.envelope).named(sensor).label,
         )
-        title = quantity_of(envelopes.envelope).named(sensor).label
-        panels.append(fig.Panel(title=title, marks=marks, x=x, y=y))
-    return fig.Figure(panels=fig.in_grid(panels, columns, share="both"), height=160.0)
+        for sensor in envelopes["sensor"].values.tolist()
+    ]
+    placed = fig.in_grid(panels, min(COLUMNS, len(panels)), share="both")
+    return fig.Figure(panels=placed, height=160.0)
 
 
 def history_figure(front: xr.Dataset) -> fig.Figure:
     """Return the hypervolume over the number of evaluated designs."""
-    evaluations, volume = shown(front.evaluations), shown(front.hypervolume)
-    marks = (
-        fig.Line(evaluations, volume, width=2.2),
-        fig.Points(evaluations[-1:], volume[-1:], color=fig.MEASURED, size=8.0),
-    )
-    panel = fig.Panel(
-        marks=marks, x=fig.Axis(label=EVALUATIONS.label), y=fig.Axis(label=HYPERVOLUME.label)
-    )
-    return fig.Figure(panels=(panel,), height=240.0)
+    last = {"color": fig.MEASURED, "size": 8.0, "kind": fig.Points}
+    end = chart.marks_of(front.isel(generation=[-1]), "evaluations", {"hypervolume": last})
+    panel = chart.panel(front, "evaluations", ["hypervolume"], width=2.2)
+    return fig.Figure(panels=(chart.between((), panel, *end),), height=240.0)

@@ -9,7 +9,7 @@ class DesignOptions(Options):
     """Options of the design study."""
 
     file: str = option(
-        "gasket", "Shipped design file (gasket), or a YAML file.", "NAME|FILE", "argument"
+        "gasket", "Shipped vary file (gasket), or a YAML file.", "NAME|FILE", "argument"
     )
     evaluations: int = option(2000, "Number of designs to evaluate.", "N", ge=4)
     population: int = option(64, "Designs of a generation.", "N", ge=4)

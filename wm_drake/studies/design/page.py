@@ -11,7 +11,7 @@ from wm_drake.parameters import machine_yaml
 from wm_drake.report.formatting import listed
 from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.page import as_json, fragment, picture
-from wm_drake.report.quantity import quantity_of, shown, text_of
+from wm_drake.report.quantity import SHARE, quantity_of, shown, text_of
 from wm_drake.simulation.measures.responses import GAP
 from wm_drake.studies.answer import Answer, Part, Plot
 from wm_drake.studies.design.figures import (
@@ -24,8 +24,8 @@ from wm_drake.studies.design.figures import (
     pairs_of,
 )
 from wm_drake.studies.design.problem import MachineDesigns
-from wm_drake.studies.design.study import FRESH, PROPOSED, design_proposal
-from wm_drake.studies.proposal import MOST_LOSS, SHARE
+from wm_drake.studies.design.study import FRESH, PROPOSED, chosen_designs, design_proposal
+from wm_drake.studies.proposal import MOST_LOSS
 from wm_drake.studies.proposal_page import proposal_part
 
 
@@ -41,7 +41,7 @@ def design_answer(
     Args:
         front, robust, envelopes: As of `run_designs`, `promises` and `front_envelopes` in
             `wm_drake.studies.design.study`; no envelopes without a front.
-        about: Description in the design file.
+        about: Description in the vary file.
     """
     names = [*(goal.name for goal in designs.goals), *(d.name for d in designs.dimensions)]
     nominal = front[[f"nominal_{goal.name}" for goal in designs.objectives]]
@@ -82,7 +82,7 @@ def design_answer(
 def _machine_files(designs: MachineDesigns, front: xr.Dataset) -> dict[str, str]:
     """Return the machine files of chosen designs."""
     files = {}
-    for name, number in front.attrs["chosen"].items():
+    for name, number in chosen_designs(designs, front).items():
         machine = designs.machine_at(front.place.sel(design=number).values)
         about = f"Design '{name}' of a design study of machine {machine.name}"
         changes = {"name": f"{machine.name}, {name}", "about": about, "measured": ()}
@@ -109,7 +109,7 @@ def summary(designs: MachineDesigns, front: xr.Dataset, robust: xr.Dataset) -> s
 
 def _short(designs: MachineDesigns, front: xr.Dataset, envelopes: xr.Dataset) -> Part:
     """Return the part in short: the proposed design, why, and its costs."""
-    is_made = PROPOSED in front.attrs["chosen"]
+    is_made = PROPOSED in chosen_designs(designs, front)
     command = f"wm-drake spin --machine {machine_file_name(PROPOSED)}" if is_made else ""
     aim = "gap" if GAP in [goal.name for goal in designs.objectives] else "desirability"
     limit = f"no objective worse by more than {SHARE.text(MOST_LOSS)}"
@@ -118,7 +118,7 @@ def _short(designs: MachineDesigns, front: xr.Dataset, envelopes: xr.Dataset) ->
         if is_made
         else f"No design of the front is clearly better and makes {limit}."
     )
-    growth = _growth(envelopes, front.attrs["chosen"][PROPOSED]) if is_made else ""
+    growth = _growth(envelopes, chosen_designs(designs, front)[PROPOSED]) if is_made else ""
     proposal = design_proposal(designs, front, command)
     return proposal_part(proposal, why, {}, [("Larger amplitudes", growth)])
 
@@ -158,7 +158,7 @@ def _picker(designs: MachineDesigns, front: xr.Dataset, envelopes: xr.Dataset) -
         "picked design; the cross is the machine itself.",
     )
     of_envelopes = picture(
-        envelopes_figure(envelopes, first_picked(front)),
+        envelopes_figure(envelopes, first_picked(designs, front)),
         "Envelopes of the picked design at each sensor.",
         f"Largest envelope of the filtered displacements over time: {designs.shown}. Coloured: the "
         "picked design; grey: the machine itself.",
@@ -176,7 +176,7 @@ def _picked(designs: MachineDesigns, front: xr.Dataset, envelopes: xr.Dataset) -
     objectives = np.column_stack([shown(front[goal.name]) for goal in designs.objectives])
     return {
         "rows": [_rows(designs, front.sel(design=number)) for number in front["design"].values],
-        "picked": first_picked(front) - 1,
+        "picked": first_picked(designs, front) - 1,
         "pairs": pairs_of(designs),
         "objectives": objectives,
         "envelopes": np.round(shown(envelopes.envelope), 4),
@@ -201,7 +201,7 @@ def _rows(designs: MachineDesigns, one: xr.Dataset) -> list[tuple[str, str, str]
 
 def _chosen(designs: MachineDesigns, front: xr.Dataset) -> LabelledTable:
     """Return the numbers of the chosen designs, a column for each."""
-    chosen = front.attrs["chosen"]
+    chosen = chosen_designs(designs, front)
     rows = {name: _rows(designs, front.sel(design=number)) for name, number in chosen.items()}
     kinds, names, _ = zip(*next(iter(rows.values())), strict=True)
     columns = {

@@ -1,19 +1,21 @@
 """Designs of a machine as points of the unit cube, and their objectives and constraints."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from wm_drake.errors import InputError, Problem, input_error
-from wm_drake.parameters import MachineParameters, Variation, quantities, variation_of, with_values
-from wm_drake.parameters.designs import Constraint, DesignFile, Objective
-from wm_drake.parameters.tolerances import fraction
+from wm_drake.parameters import MachineParameters, quantities, with_values
+from wm_drake.parameters.limits import Constraint, Objective, fraction
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.parameters.variation import value_at
+from wm_drake.parameters.vary_file import Choice, VaryFile
+from wm_drake.parameters.varying import Varied, Varying
 from wm_drake.report.quantity import Quantity, text_of
 from wm_drake.simulation.cases import Case, load_of
 from wm_drake.simulation.measures.responses import Response, chosen_responses
@@ -23,49 +25,38 @@ from wm_drake.studies.tolerance.variables import UncertainMachine
 
 @dataclass(frozen=True)
 class Range:
-    """A design variable: a variation with a range.
+    """A number that the search may choose between its ends.
 
     Attributes:
-        variation: What it changes.
-        low, high: Bounds. [1 for percent, else SI]
+        varied: What it changes.
     """
 
-    variation: Variation
-    low: float
-    high: float
+    varied: Varied
 
     @property
     def name(self) -> str:
-        """Name in the design file."""
-        return self.variation.name
+        """Name of the entry."""
+        return self.varied.name
 
     @property
     def nominal(self) -> float:
         """Place from 0 to 1 nearest to the machine itself."""
-        place = (self.variation.nominal - self.low) / (self.high - self.low)
-        return float(np.clip(place, 0.0, 1.0))
+        low, high = self.varied.at["low"], self.varied.at["high"]
+        return float(np.clip((self.varied.nominal - low) / (high - low), 0.0, 1.0))
 
     @property
     def keys(self) -> tuple[str, ...]:
         """Key paths of what it changes."""
-        return self.variation.keys
+        return self.varied.keys
 
     def text(self, value: xr.DataArray) -> str:
         """Return the value of a design as text."""
         return text_of(value)
 
-    def changes(self, place: float) -> dict[str, Any]:
-        """Return new values of the machine by key path, at a place from 0 to 1."""
-        return self.variation.changes(self.number(place))
-
     def variable(self, places: FloatArray) -> xr.Variable:
         """Return the values of designs at places from 0 to 1."""
-        quantity = Quantity(self.name, self.variation.unit)
-        return quantity.variable("design", self.number(places))
-
-    def number(self, place: Any) -> Any:
-        """Return the value of the variation at a place from 0 to 1. [1 for percent, else SI]"""
-        return self.low + place * (self.high - self.low)
+        quantity = Quantity(self.name, self.varied.unit)
+        return quantity.variable("design", self.varied.at_place(places))
 
 
 @dataclass(frozen=True)
@@ -111,7 +102,7 @@ class DesignGoal:
     """An objective or a constraint with what it is computed from.
 
     Attributes:
-        given: As in the design file.
+        given: As in the vary file.
         response: Response of the runs; None if it is a number of the machine.
         unit: Unit.
         limit: Limit of a constraint. [SI] NaN for an objective.
@@ -160,19 +151,30 @@ class MachineDesigns:
     """The designs of a machine.
 
     Attributes:
-        dimensions: What the search may change.
+        varying: The machine, and the numbers that the search may choose.
+        choices: What else the search may choose.
         cases: One case for each load, without parameters; empty for a robust design.
         scattered: Returns the uncertain machine of some parameters; None for a nominal design.
         scores: Samples of a robust design, the same for every design.
     """
 
-    parameters: MachineParameters
-    dimensions: tuple[Range | OptionVariable, ...]
+    varying: Varying
+    choices: tuple[OptionVariable, ...]
     objectives: tuple[DesignGoal, ...]
     constraints: tuple[DesignGoal, ...]
     cases: tuple[Case, ...]
     scattered: Callable[[MachineParameters], UncertainMachine] | None = None
     scores: FloatArray | None = None
+
+    @property
+    def parameters(self) -> MachineParameters:
+        """The machine."""
+        return self.varying.machine
+
+    @cached_property
+    def dimensions(self) -> tuple[Range | OptionVariable, ...]:
+        """What the search may change: numbers, then choices."""
+        return (*map(Range, self.varying.every), *self.choices)
 
     @property
     def goals(self) -> tuple[DesignGoal, ...]:
@@ -192,9 +194,11 @@ class MachineDesigns:
 
     def machine_at(self, design: FloatArray) -> MachineParameters:
         """Return the machine of a design."""
-        changes: dict[str, Any] = {}
-        for dimension, place in zip(self.dimensions, map(float, design), strict=True):
-            changes |= dimension.changes(place)
+        places, every = list(map(float, design)), self.varying.every
+        numbers = zip(every, places, strict=False)
+        changes = self.varying.changes(varied.at_place(place) for varied, place in numbers)
+        for choice, place in zip(self.choices, places[len(every) :], strict=True):
+            changes |= choice.changes(place)
         return with_values(self.parameters, changes)
 
     def nominal(self) -> FloatArray:
@@ -280,8 +284,8 @@ class MachineDesigns:
 
 
 def machine_designs(
-    parameters: MachineParameters,
-    task: DesignFile,
+    varying: Varying,
+    file: VaryFile,
     cases: Sequence[Case],
     scattered: Callable[[MachineParameters], UncertainMachine] | None = None,
     scores: FloatArray | None = None,
@@ -289,20 +293,26 @@ def machine_designs(
     """Return the designs of a machine that a file describes.
 
     Args:
-        parameters: The machine, with the numbers of the SDF that the file names
-            (`wm_drake.model.bodies.with_sdf_values`).
+        varying: The machine, with the numbers of the SDF that the file names
+            (`wm_drake.model.bodies.with_sdf_values`), and its numbers that vary.
+        file: Choices, objectives and constraints.
         cases: One case for each load; one for the profile of a robust design.
         scattered: As in `MachineDesigns`.
         scores: As in `MachineDesigns`.
 
     Raises:
-        InputError: the machine does not have a key or a response, or a bound is wrong.
+        InputError: the machine does not have a key or a response, or a number has no ends.
     """
-    dimensions, problems = _dimensions(parameters, task)
+    problems, parameters = _problems_of_choices(varying.machine, file.choices), varying.machine
+    for varied in varying.every:
+        try:
+            varied.needed("low", "high", study="a design search")
+        except InputError as error:
+            problems += error.problems
     goals: dict[str, list[DesignGoal]] = {"objectives": [], "constraints": []}
     known = {key: (value, unit) for key, value, unit in quantities(parameters)}
     for kind, listed in goals.items():
-        for place, given in enumerate(getattr(task, kind)):
+        for place, given in enumerate(getattr(file, kind)):
             try:
                 listed.append(_goal(parameters, cases[0], given, known))
             except InputError as error:
@@ -310,8 +320,8 @@ def machine_designs(
     if problems:
         raise InputError(problems)
     return MachineDesigns(
-        parameters,
-        tuple(dimensions),
+        varying,
+        tuple(OptionVariable(name, choice.options) for name, choice in file.choices.items()),
         tuple(goals["objectives"]),
         tuple(goals["constraints"]),
         () if scattered else tuple(cases),
@@ -320,29 +330,19 @@ def machine_designs(
     )
 
 
-def _dimensions(
-    parameters: MachineParameters, task: DesignFile
-) -> tuple[list[Range | OptionVariable], list[Problem]]:
-    """Return the variables and choices of a file, and what is wrong with them."""
-    dimensions, problems = list[Range | OptionVariable](), list[Problem]()
-    for name, given in task.variables.items():
-        texts = {"low": given.low, "high": given.high}
-        try:
-            variation, ends = variation_of(parameters, name, given.keys, texts, given.about)
-            if not ends["low"] < ends["high"]:
-                raise input_error("low must be below high", key=given.keys[-1])
-            dimensions.append(Range(variation, **ends))
-        except InputError as error:
-            problems += [Problem(f"variable {name}", p.key, p.message) for p in error.problems]
-    for name, choice in task.choices.items():
-        dimensions.append(OptionVariable(name, choice.options))
+def _problems_of_choices(
+    parameters: MachineParameters, choices: Mapping[str, Choice]
+) -> list[Problem]:
+    """Return what is wrong with the options of choices."""
+    problems = []
+    for name, choice in choices.items():
         for option, values in choice.options.items():
             try:
                 with_values(parameters, values)
             except InputError as error:
-                where = f"choice {name}, option {option}"
-                problems += [Problem(where, p.key, p.message) for p in error.problems]
-    return dimensions, problems
+                key = f"choices.{name}.options.{option}"
+                problems += [Problem("", key, f"{p.key}: {p.message}") for p in error.problems]
+    return problems
 
 
 def _goal(

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from scipy import stats
 
-from wm_drake.parameters.tolerances import fraction
+from wm_drake.parameters.limits import fraction
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.report.quantity import TIME, Quantity
@@ -51,8 +51,7 @@ def run_designs(
         Over `design`, numbers from 1: objectives and constraints by the names of the goals, the
         variables, and the `place` of the design in the unit cube, over `dimension` too. Over
         `generation`: `evaluations` and `hypervolume`. Over no dimension: the objectives of the
-        machine itself, moved into the bounds, as `nominal_Dx`. Attribute `chosen`: numbers of
-        chosen designs by name: best Dx, ..., and the proposed one, if there is any.
+        machine itself, moved into the bounds, as `nominal_Dx`.
     """
     problem = DesignProblem(
         lambda x: designs.costs(x, experiment),
@@ -81,27 +80,20 @@ def run_designs(
             },
         },
         {"design": np.arange(len(result.designs)) + 1},
-        {"chosen": chosen_designs(designs.objectives, result.objectives, nominal[0])},
     )
 
 
-def chosen_designs(
-    goals: tuple[DesignGoal, ...], costs: FloatArray, machine: FloatArray
-) -> dict[str, int]:
-    """Return the number of the best design of each objective, and of the proposed one, by name.
-
-    Args:
-        goals: Objectives.
-        costs: What the search made small. (n, objectives)
-        machine: Objectives of the machine itself. [SI] (objectives,)
-    """
-    if not len(costs):
+def chosen_designs(designs: MachineDesigns, front: xr.Dataset) -> dict[str, int]:
+    """Return the number of the best design of each objective, and of the proposed one, by name."""
+    goals = designs.objectives
+    if not front.sizes["design"]:
         return {}
+    values = np.column_stack([front[goal.name].values for goal in goals])
     chosen = {
-        f"best {g.given.quantity}": 1 + int(np.argmin(c))
-        for g, c in zip(goals, costs.T, strict=True)
+        f"best {g.given.quantity}": 1 + int(np.argmin(v if g.is_small_better else -v))
+        for g, v in zip(goals, values.T, strict=True)
     }
-    values = costs * [1.0 if goal.is_small_better else -1.0 for goal in goals]
+    machine = np.array([front[f"nominal_{goal.name}"].item() for goal in goals])
     aim = Aim(objectives_of(goals), np.vstack([machine, values]), machine)
     number = aim.proposed(values, [1] * len(values))
     return chosen if number is None else {**chosen, PROPOSED: 1 + number}
@@ -118,7 +110,7 @@ def design_proposal(designs: MachineDesigns, front: xr.Dataset, command: str) ->
     Args:
         command: Command that runs it.
     """
-    number, changes = front.attrs["chosen"].get(PROPOSED), []
+    number, changes = chosen_designs(designs, front).get(PROPOSED), []
     names = [goal.name for goal in designs.objectives]
     rows = {BEFORE: [front[f"nominal_{name}"].item() for name in names]}
     if number is not None:
@@ -158,7 +150,7 @@ def promises(
         which grows with their number and has no interval; and whether it `Dx_is_broken`. Empty for
         a nominal front.
     """
-    scores, chosen = designs.scores, front.attrs["chosen"]
+    scores, chosen = designs.scores, chosen_designs(designs, front)
     if scores is None or not chosen:
         return xr.Dataset()
     numbers = sorted(set(chosen.values()))

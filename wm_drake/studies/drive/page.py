@@ -1,41 +1,40 @@
 """Show the drive study: smallest torque limits, map, estimated unbalance."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 import xarray as xr
 
 from wm_drake.parameters import MachineParameters, SpinProfile
-from wm_drake.parameters.units import Unit
+from wm_drake.report import chart
 from wm_drake.report import figure as fig
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import SPEED, Quantity, quantity_of, shown, text_of
+from wm_drake.report.quantity import SHARE, SPEED, quantity_of, shown, text_of
 from wm_drake.studies.answer import Answer, Part, Plot
 from wm_drake.studies.drive.study import (
     PASSES,
-    PLANTED,
     TORQUE_LIMIT,
     UNBALANCE,
     estimation_errors,
     motor_with_limit,
 )
 
-SHARE = Quantity("share", Unit("", "%"), 0)
-
 
 def drive_answer(
     parameters: MachineParameters,
     profile: SpinProfile,
-    thresholds: xr.Dataset,
-    grid: xr.Dataset,
-    estimation: xr.Dataset | None,
+    data: Mapping[str, xr.Dataset],
+    speed: float,
 ) -> Answer:
     """Return the answer of the study.
 
     Args:
-        thresholds, grid, estimation: As of `find_thresholds`, `torque_map` and
-            `estimate_unbalance` in `wm_drake.studies.drive.study`.
+        data: `thresholds`, `map` and, if there is one, `estimation`, as of `find_thresholds`,
+            `torque_map` and `estimate_unbalance` in `wm_drake.studies.drive.study`.
+        speed: Speed of the estimation. [rad/s]
     """
+    thresholds, grid, estimation = data["thresholds"], data["map"], data.get("estimation")
     ratio = motor_with_limit(parameters)[0].belt_ratio
     passed = grid.end.values >= PASSES * profile.speed[-1]
     torque_map = Part(
@@ -58,7 +57,7 @@ def drive_answer(
     errors = None if estimation is None else estimation_errors(estimation)
     parts = [torque_map, Part("Smallest torque limit", (limits,))]
     if estimation is not None and errors is not None:
-        table = LabelledTable("errors", errors, "Errors of the estimation", _about(estimation))
+        table = LabelledTable("errors", errors, "Errors of the estimation", _about(speed))
         parts[1:1] = [
             Part(
                 "Unbalance seen by the drive",
@@ -97,9 +96,9 @@ def summary(thresholds: xr.Dataset, errors: xr.Dataset | None) -> str:
     return " ".join(sentences)
 
 
-def _about(estimation: xr.Dataset) -> str:
+def _about(speed: float) -> str:
     return (
-        f"Error of the unbalance estimated at a constant {SPEED.text(estimation.attrs['speed'])}, "
+        f"Error of the unbalance estimated at a constant {SPEED.text(speed)}, "
         "over loads of two masses at random places. Estimate: parts of motor torque and speed "
         "that go round with the drum, m r = |T - J dw/dt| / g, with the inertia of the empty drum. "
         "What remains: inertia of the load, and a tub that moves."
@@ -146,25 +145,20 @@ def map_plot(grid: xr.Dataset, passed: np.ndarray, ratio: float) -> Plot:
 
 def estimation_plot(estimation: xr.Dataset) -> Plot:
     """Return estimated over planted unbalance."""
-    planted = shown(estimation.planted)
-    series = {
-        "from_speed_alone": ("speed ripple alone, J dw/dt", "triangle-up", fig.QUIET),
-        "from_torque_alone": ("torque alone", "triangle-down", fig.MEASURED),
-        "estimated": ("both", "circle", fig.OURS),
+    drawn = {
+        "from_speed_alone": {"key": "speed ripple alone, J dw/dt", "symbol": "triangle-up"},
+        "from_torque_alone": {"key": "torque alone", "symbol": "triangle-down"},
+        "estimated": {"key": "both", "color": fig.OURS},
     }
-    points = [
-        fig.Points(planted, shown(estimation[name]), symbol=symbol, color=color, key=key)
-        for name, (key, symbol, color) in series.items()
-    ]
-    ends = [0.0, 1.02 * planted.max()]
-    panel = fig.Panel(
-        marks=(*points, fig.Line(ends, ends, color=fig.MARK, key="planted")),
-        x=fig.Axis(label=PLANTED.label),
-        y=fig.Axis(label=quantity_of(estimation.estimated).label),
-    )
+    drawn["from_speed_alone"]["color"] = fig.QUIET
+    drawn["from_torque_alone"]["color"] = fig.MEASURED
+    ends = [0.0, 1.02 * shown(estimation.planted).max()]
+    line = fig.Line(ends, ends, color=fig.MARK, key="planted")
+    y = {"label": quantity_of(estimation.estimated).label}
+    panel = chart.panel(estimation, "planted", drawn, kind=fig.Points, y=y)
     return Plot(
-        fig.Figure(panels=(panel,), height=340.0),
-        f"{len(planted)} random loads.",
+        fig.Figure(panels=(chart.between((), panel, line),), height=340.0),
+        f"{estimation.sizes['random_load']} random loads.",
         "Estimated over planted unbalance. Torque or speed alone see only their share of it, which "
         "depends on the controller.",
     )

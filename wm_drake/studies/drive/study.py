@@ -205,7 +205,7 @@ def estimate_unbalance(
     Returns:
         Over the random loads: `planted`, size of the vector sum of mass times radius, `estimated`
         from torque and speed, their difference `error`, and the parts T_1 / g and J w'_1 / g
-        alone, in size [kg m]. Attribute `speed` [rad/s].
+        alone, in size [kg m].
     """
     profile = SpinProfile(time=(0.0, RAMP, RAMP + HOLD), speed=(0.0, speed, speed))
     parameters = experiment.machine.parameters
@@ -231,10 +231,7 @@ def estimate_unbalance(
         "from_torque_alone": (FROM_TORQUE, np.abs(torque) / g),
         "from_speed_alone": (FROM_SPEED, inertia * np.abs(acceleration) / g),
     }
-    return xr.Dataset(
-        {name: q.variable("random_load", v) for name, (q, v) in numbers.items()},
-        attrs={"speed": speed},
-    )
+    return xr.Dataset({name: q.variable("random_load", v) for name, (q, v) in numbers.items()})
 
 
 def estimation_errors(estimation: xr.Dataset) -> xr.Dataset:

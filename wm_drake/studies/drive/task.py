@@ -50,17 +50,16 @@ class DriveTask(Task):
         options, parameters = self.options, self.machine.parameters
         loads = tuple(self.cases)
         experiment = Experiment(self.machine, MEASURES, executor.simulate, loads)
-        thresholds = find_thresholds(experiment)
+        thresholds, speed = find_thresholds(experiment), SPEED.to_si(options.speed).item()
         needs = thresholds.passes_from.fillna(motor_with_limit(parameters)[1].torque).values
         worst = int(np.argmax(np.where(thresholds.passes_from.isnull(), np.inf, needs)))
         top = needs[worst]
         torques = (top * np.linspace(0.25, 2.0, options.torques)).tolist()
         factors = np.linspace(0.25, 1.5, options.unbalances).tolist()
         grid = torque_map(experiment, self.cases[worst], torques, factors)
-        estimation = None
+        data = {"thresholds": thresholds, "map": grid}
         if options.loads:
             inertia = drum_inertia(self.machine.set_up())
             drawn = random_loads(options.loads, options.seed, self.cases[0].load)
-            speed = SPEED.to_si(options.speed).item()
-            estimation = estimate_unbalance(experiment, speed, drawn, inertia)
-        return drive_answer(parameters, self.cases[0].profile, thresholds, grid, estimation)
+            data["estimation"] = estimate_unbalance(experiment, speed, drawn, inertia)
+        return drive_answer(parameters, self.cases[0].profile, data, speed)

@@ -6,35 +6,35 @@ from dataclasses import dataclass
 import numpy as np
 
 from wm_drake.errors import input_error, problems_at
-from wm_drake.parameters import Change, MachineParameters, Variation, apply, with_values
+from wm_drake.parameters import MachineParameters, with_values
 from wm_drake.parameters.keys import allowed_range
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.variation import number_at, range_of
+from wm_drake.parameters.variation import Change, number_at
+from wm_drake.parameters.vary import Entry, entries_of_texts
+from wm_drake.parameters.vary_file import gasket_entries
+from wm_drake.parameters.varying import Varied, Varying
 from wm_drake.studies.fitting.fit import Fit
 from wm_drake.studies.fitting.problem import Unknown
 
 SPAN = 1.5
 """Default bounds of an unknown: the number of the machine divided and multiplied by this."""
 
-JOIN = "+"
-"""Separator between keys whose numbers are equal and form one unknown."""
-
 
 @dataclass(frozen=True)
 class Sought:
-    """An unknown: a variation with bounds.
+    """An unknown: a number that varies, with bounds.
 
     Attributes:
-        variation: Numbers of the machine that are equal to the unknown.
+        varied: Numbers of the machine that are equal to the unknown.
     """
 
-    variation: Variation
+    varied: Varied
     unknown: Unknown
 
     @property
     def keys(self) -> tuple[str, ...]:
         """Key paths of the numbers."""
-        return self.variation.keys
+        return self.varied.keys
 
     @property
     def guess(self) -> float:
@@ -42,60 +42,62 @@ class Sought:
         return float(self.unknown.start or np.sqrt(self.unknown.lower * self.unknown.upper))
 
 
-def sought_of(parameters: MachineParameters, keys: Sequence[str], bounds: str = "") -> Sought:
+def sought_of(parameters: MachineParameters, name: str, entry: Entry) -> Sought:
     """Return an unknown of a machine; the search uses its logarithm if the bounds are positive.
 
     Args:
         parameters: The machine; its number is the start value.
-        keys: Key paths of numbers that are equal.
-        bounds: Bounds of the search, ``LOW..HIGH`` or ``(LOW, HIGH) UNIT``. If empty, they are the
-            machine's number divided and multiplied by `SPAN`.
+        name: Name of the unknown.
+        entry: Keys of numbers that are equal, and their bounds. Without bounds, they are the
+            machine's number divided and multiplied by `SPAN`. With a mean and a deviation, the
+            unknown has a prior, and is not searched by its logarithm.
 
     Raises:
         InputError: a key is unknown or not a number, the numbers have different units, or bounds
             are wrong, or are needed because the number is not positive.
     """
-    numbers = tuple(number_at(parameters, key) for key in keys)
+    numbers = tuple(number_at(parameters, key) for key in entry.keys)
+    if not numbers:
+        raise input_error("sets sums; allowed in a file of --vary", key=name)
     for number in numbers:
         if number.is_table:
             raise input_error("is a table; an unknown is a number", key=number.key)
     first = numbers[0]
     if any(number.unit != first.unit for number in numbers):
         raise input_error(
-            f"{', '.join(keys)} have different units; equal numbers need the same unit",
+            f"{', '.join(entry.keys)} have different units; equal numbers need the same unit",
             key=first.key,
         )
-    value = first.nominal
-    if bounds:
-        ends = range_of(bounds)
-        if ends is None:
-            example = f"(1, 2) {first.unit.shown}"
-            message = f"'{bounds}' is not a range; write for example '{example}'"
+    at = {place: first.resolved(text) for place, text in entry.texts.items()}
+    value = at.get("mean", first.nominal)
+    if "low" not in at or "high" not in at:
+        if value is None or value <= 0.0:
+            message = "is not positive, so its range must be given; write KEY=LOW..HIGH"
             raise input_error(message, key=first.key)
-        lower, upper = map(first.resolved, ends)
-    elif value is None or value <= 0.0:
-        message = "is not positive, so its range must be given; write KEY=LOW..HIGH"
-        raise input_error(message, key=first.key)
-    else:
-        lower, upper = value / SPAN, value * SPAN
+        at = {"low": value / SPAN, "high": value * SPAN} | at
     for number in numbers:  # the search may go to either end
         allowed = allowed_range(parameters, number.key)
-        if not (allowed.holds(lower) and allowed.holds(upper)):
+        if not (allowed.holds(at["low"]) and allowed.holds(at["high"])):
             limits = " and ".join(f"{sign} {end:g}" for sign, end in allowed.limits())
-            raise input_error(f"'{bounds}' is out of range; allowed is {limits}", key=number.key)
-    start = value if value is not None and lower <= value <= upper else None
-    name = JOIN.join(keys)
-    return Sought(
-        Variation(name, numbers, Change.VALUE, first.unit),
-        Unknown(name, lower, upper, first.unit, start, logarithmic=lower > 0.0),
-    )
+            ends = f"{first.unit.reading(at['low'])} to {first.unit.reading(at['high'])}"
+            raise input_error(f"{ends} is out of range; allowed is {limits}", key=number.key)
+    varied = Varied(name, entry, numbers, Change.VALUE, first.unit, at)
+    start = at.get("start", value)
+    start = start if start is not None and at["low"] <= start <= at["high"] else None
+    prior = None
+    if entry.deviation is not None:
+        size = first.resolved(entry.deviation)  # percents are those of the machine's number
+        prior = (at["mean"], size)
+    is_log = prior is None and at["low"] > 0.0
+    unknown = Unknown(name, at["low"], at["high"], first.unit, start, is_log, prior)
+    return Sought(varied, unknown)
 
 
 def at_point(
     parameters: MachineParameters, sought: Sequence[Sought], values: FloatArray
 ) -> MachineParameters:
     """Return the machine with values of the unknowns, in SI units."""
-    return apply(parameters, [s.variation for s in sought], map(float, values))
+    return Varying(parameters, tuple(one.varied for one in sought)).machine_at(values)
 
 
 @dataclass(frozen=True)
@@ -153,15 +155,11 @@ class SoughtNumbers:
 
 
 def sought_in(parameters: MachineParameters, texts: Sequence[str]) -> tuple[Sought, ...]:
-    """Return the unknowns of KEYS[=RANGE] texts of `--unknown`.
+    """Return the unknowns of NAME[=VALUES] texts of `--unknown`.
 
     Raises:
         InputError: a key or a range is wrong.
     """
-    unknowns = []
-    for text in texts:
-        names, _, bounds = (part.strip() for part in text.partition("="))
-        keys = [key.strip() for key in names.split(JOIN)]
-        with problems_at("--unknown"):
-            unknowns.append(sought_of(parameters, keys, bounds))
-    return tuple(unknowns)
+    entries = entries_of_texts(texts, gasket_entries(), "--unknown")
+    with problems_at("--unknown"):
+        return tuple(sought_of(parameters, name, entry) for name, entry in entries.items())

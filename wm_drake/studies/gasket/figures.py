@@ -13,9 +13,9 @@ from wm_drake.report.formatting import number
 from wm_drake.report.quantity import quantity_of, shown, text_of
 from wm_drake.studies.doe.coding import LEVELS
 from wm_drake.studies.gasket.screening import (
+    CONTRIBUTION,
     LEADING_INTERACTION,
     LEADING_MAIN,
-    SHARE,
     at,
     is_main,
     mains,
@@ -150,17 +150,17 @@ def pareto_figure(screening: xr.Dataset, load: str, words: Words) -> fig.Figure:
             bars = fig.Bars(at_y, percents[at_y], is_across=True, color=color, key=keys[kind])
             marks.append(bars)
         for least in (LEADING_MAIN, LEADING_INTERACTION):
-            value = float(SHARE.values(least))
+            value = float(CONTRIBUTION.values(least))
             rule = fig.Rule(value, "y", color=fig.MEASURED, dash="dashed", key="thresholds of [B]")
             marks.append(rule)
         significant = significant_share(of_label)
         if significant is not None:
             key = "significant from here (main effects)"
-            value = float(SHARE.values(significant))
+            value = float(CONTRIBUTION.values(significant))
             marks.append(fig.Rule(value, "y", color=fig.MARK, dash="dotted", key=key))
         ticks = fig.named(term.replace(":", " × ") for term in top.term.values.tolist())
         y = fig.Axis(ticks=ticks, range=(len(ticks) - 0.5, -0.5), has_grid=False)
-        x = fig.Axis(label=f"{words.response(name)}, {SHARE.unit_text}", range=(0.0, None))
+        x = fig.Axis(label=f"{words.response(name)}, {CONTRIBUTION.unit_text}", range=(0.0, None))
         return fig.Panel(marks=tuple(marks), x=x, y=y)
 
     return _panels(screening, load, panel_of, 180.0)

@@ -1,22 +1,23 @@
 """Findings of a screening study as sentences, made from its numbers."""
 
 from collections import Counter
+from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
 
 from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import CONSEQUENCE, listed
-from wm_drake.report.quantity import Quantity, quantity_of, text_of
+from wm_drake.report.quantity import CHANGE, SHARE, Quantity, quantity_of, text_of
 from wm_drake.simulation.measures.responses import GAP
 from wm_drake.studies.doe.design import Design
 from wm_drake.studies.gasket.screening import (
+    CONTRIBUTION,
     FAR,
     LEADING_INTERACTION,
     LEADING_MAIN,
     LEAST_PREDICTED_R2,
     PREDICTED_R2,
-    SHARE,
     Label,
     at,
     compared_terms,
@@ -32,8 +33,6 @@ from wm_drake.studies.gasket.screening import (
 )
 from wm_drake.studies.gasket.study import DIFFERENCE
 from wm_drake.studies.gasket.words import Words
-from wm_drake.studies.proposal import CHANGE
-from wm_drake.studies.proposal import SHARE as WHOLE
 
 MOST_NAMED = 6
 """Largest number of results that a sentence names."""
@@ -89,7 +88,9 @@ def contact_text(screening: xr.Dataset) -> str:
     )
 
 
-def why_text(screening: xr.Dataset, proposal: xr.Dataset, words: Words) -> str:
+def why_text(
+    screening: xr.Dataset, proposal: xr.Dataset, factors: Sequence[str], words: Words
+) -> str:
     """Return why factors are changed, in a sentence: their shares, where it matters most.
 
     This is the gap with the load with which it is smallest as it is, or without a gap the response
@@ -98,9 +99,10 @@ def why_text(screening: xr.Dataset, proposal: xr.Dataset, words: Words) -> str:
     Args:
         screening: As of `screening.run_screening`.
         proposal: As of `page.Comparisons`.
+        factors: Names of those that it changes.
         words: Words of the study.
     """
-    factors, label = proposal.factors, nearest(screening)
+    label = nearest(screening)
     if not factors:
         return ""
     of_factors = screening.share.sel(term=factors)
@@ -115,7 +117,7 @@ def why_text(screening: xr.Dataset, proposal: xr.Dataset, words: Words) -> str:
     texts = []
     if large:
         texts.append(
-            f"{listed([f'{one.term.item()} has {WHOLE.text(one)}' for one in large])} {of_what}"
+            f"{listed([f'{one.term.item()} has {SHARE.text(one)}' for one in large])} {of_what}"
         )
     if small:
         verb = "helps" if len(small) == 1 else "help"
@@ -132,13 +134,12 @@ def summary(
     screening: xr.Dataset,
     words: Words,
     published: xr.Dataset,
-    level_zero: xr.Dataset,
     check: xr.Dataset,
 ) -> list[str]:
     """Return sentences on the study and its results.
 
     They are about the design, contact, the most influential factors, the quality of the model,
-    published results, level 0 and runs beside the model.
+    published results and runs beside the model.
     """
     design, loads = screening.design, [f"load {load}" for load in screening["load"].values]
     sentences = [
@@ -151,8 +152,6 @@ def summary(
     sentences.append(_quality(screening, words))
     if published:
         sentences += _against_published(screening, words, published)
-    if level_zero:
-        sentences.append(level_zero_text(level_zero, words))
     if check:
         sentences.append(about_check(check))
     return sentences
@@ -169,7 +168,7 @@ def _against_published(screening: xr.Dataset, words: Words, published: xr.Datase
         named = [f"{_of(label, words)} ({CHANGE.text(at(means, label))})" for label in ranked]
         texts.append(
             f"Means beside the published ones: {len(far)} of {len(known)} differ by more than "
-            f"{WHOLE.text(FAR)}{_listed(named)}."
+            f"{SHARE.text(FAR)}{_listed(named)}."
         )
     compared = compared_terms(published)
     return [*texts, *_against_terms(screening, words, published)] if compared.any() else texts
@@ -185,8 +184,8 @@ def _against_terms(screening: xr.Dataset, words: Words, published: xr.Dataset) -
     if of_mains.notnull().any():
         texts.append(
             "Contributions of main effects differ from the published ones by "
-            f"{SHARE.text(of_mains.mean())} of the variance in the mean and by "
-            f"{WHOLE.text(of_mains.max())} at most."
+            f"{CONTRIBUTION.text(of_mains.mean())} of the variance in the mean and by "
+            f"{SHARE.text(of_mains.max())} at most."
         )
     signs = sign_differs(screening, published)
     other = [
@@ -212,7 +211,7 @@ def _against_terms(screening: xr.Dataset, words: Words, published: xr.Dataset) -
     return [
         *texts,
         f"Contributions beside the published ones: {len(far)} differ by more than "
-        f"{WHOLE.text(FAR)} of the variance{_listed(named)}.",
+        f"{SHARE.text(FAR)} of the variance{_listed(named)}.",
     ]
 
 
@@ -228,16 +227,17 @@ def _listed(named: list[str]) -> str:
     return f": {listed(shown)}" if shown else ""
 
 
-def level_zero_text(zero: xr.Dataset, words: Words) -> str:
+def level_zero_text(zero: xr.Dataset, words: Words, tables: str) -> str:
     """Return a sentence on level 0 and the machine.
 
     Args:
-        zero: As of `study.run_level_zero`, with the attribute `tables`, their treatment.
+        zero: As of `study.run_level_zero`.
         words: Words of the study.
+        tables: Treatment of stiffness tables.
     """
     linear, label = _largest(zero.linear_difference)
     size = f"up to {DIFFERENCE.text(linear)} ({_of(label, words)})"
-    if zero.tables == "linear":
+    if tables == "linear":
         return (
             "Level 0 of this study is not the machine: its stiffness tables are replaced by the "
             f"slopes of their first 20 %, as in [B], so responses at level 0 differ by {size}. "
@@ -286,7 +286,7 @@ def _quality(screening: xr.Dataset, words: Words) -> str:
     if design.is_complete and design.residual_df < 1:
         return f"{model} has a coefficient for each of the trials, so it meets them exactly."
     if design.is_complete:
-        left = SHARE.text(screening.unexplained.max().fillna(0.0))
+        left = CONTRIBUTION.text(screening.unexplained.max().fillna(0.0))
         return f"{model} leaves at most {left} of the variance of a response over all combinations."
     known = [label for label in labels_of(screening) if at(r2, label).notnull()]
     if not known:
@@ -386,12 +386,12 @@ def _driver_sentence(of_label: xr.Dataset, words: Words) -> str:
     terms = leading(of_label)
     if not terms:
         return (
-            f"{opening} has no leading term: no main effect exceeds {WHOLE.text(LEADING_MAIN)} and "
-            f"no interaction exceeds {WHOLE.text(LEADING_INTERACTION)}."
+            f"{opening} has no leading term: no main effect exceeds {SHARE.text(LEADING_MAIN)} and "
+            f"no interaction exceeds {SHARE.text(LEADING_INTERACTION)}."
         )
     of_factors = [_effect_text(of_label, term, words) for term in terms if ":" not in term]
     joint = [
-        f"{words.term(term)} ({WHOLE.text(of_label.share.sel(term=term))})"
+        f"{words.term(term)} ({SHARE.text(of_label.share.sel(term=term))})"
         for term in terms
         if ":" in term
     ]
@@ -401,7 +401,7 @@ def _driver_sentence(of_label: xr.Dataset, words: Words) -> str:
 
 
 def _effect_text(of_label: xr.Dataset, factor: str, words: Words) -> str:
-    share = WHOLE.text(of_label.share.sel(term=factor))
+    share = SHARE.text(of_label.share.sel(term=factor))
     effect = of_label.effect.sel(term=factor, other_level="")
     (low, middle, high), text = effect.values, quantity_of(effect).text
     name = words.factor(factor)

@@ -32,12 +32,16 @@ class GasketOptions(Options):
     seed: int = option(0, "Seed of the D-optimal design.", ge=0, le=2**32 - 1)
     factor: tuple[str, ...] = option(
         (),
-        "Factor to study instead of the eight factors of the gasket: one of C_L, K_Lx, ..., or any "
-        "key of the machine file. Bounds are in percent of its value, or numbers with a unit. "
-        "Default: 50 %..150 %. Repeatable.",
+        "Factor to study instead of all entries of --vary: one of C_L, K_Lx, ..., or any key of "
+        "the machine file. Bounds are in percent of its value, or numbers with a unit. Default: "
+        "50 %..150 %. Repeatable.",
         "NAME|KEY[=LOW..HIGH]",
     )
-    factors: Path | None = option(None, "YAML file of factors.", "FILE")
+    vary: str | None = option(
+        None,
+        "Shipped vary file, or a YAML file: its entries are the factors. Default: gasket.",
+        "NAME|FILE",
+    )
     response: tuple[str, ...] = option(
         (),
         "What is measured of each run: D, F, M, gap, amplitude, critical_speed, power_mean, "

@@ -1,7 +1,7 @@
 """Show the gasket study: the proposed setting, why, effects, the fitted model, tables."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from wm_drake.report.formatting import listed
 from wm_drake.report.interactive import packed
 from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.page import as_json, fragment
-from wm_drake.report.quantity import shown
+from wm_drake.report.quantity import SHARE, each_of, shown
 from wm_drake.simulation.measures.responses import GAP
 from wm_drake.studies.answer import Answer, Part, Plot
 from wm_drake.studies.gasket import figures, tables
@@ -23,6 +23,7 @@ from wm_drake.studies.gasket.findings import (
     about_check,
     about_residual,
     answer_text,
+    level_zero_text,
     load_findings,
     summary,
     warnings,
@@ -31,7 +32,6 @@ from wm_drake.studies.gasket.findings import (
 from wm_drake.studies.gasket.screening import is_main
 from wm_drake.studies.gasket.study import GasketTrials
 from wm_drake.studies.gasket.words import Words
-from wm_drake.studies.proposal import SHARE as WHOLE
 from wm_drake.studies.proposal_page import gaps_text, proposal_part
 
 LEAST_EFFICIENCY = 80.0
@@ -50,18 +50,23 @@ class Comparisons:
         level_zero: As of `study.run_level_zero`.
         check: Chosen settings, as of `surface.run_settings`.
         proposed: Level 0 and the proposed setting with all loads of the machine, likewise.
-        proposal: As of `wm_drake.studies.proposal.proposal_of`, with the attributes `factors`,
-            names of those that it changes, and `is_machine`, whether level 0 is the machine.
+        proposal: As of `wm_drake.studies.proposal.proposal_of`.
+        tables: Treatment of stiffness tables in the study.
+        changed: Places of the factors that the proposal changes, by name. [levels]
+        is_machine: Whether level 0 is the machine.
     """
 
-    published: xr.Dataset
-    level_zero: xr.Dataset
-    check: xr.Dataset
-    proposed: xr.Dataset
-    proposal: xr.Dataset
+    published: xr.Dataset = field(default_factory=xr.Dataset)
+    level_zero: xr.Dataset = field(default_factory=xr.Dataset)
+    check: xr.Dataset = field(default_factory=xr.Dataset)
+    proposed: xr.Dataset = field(default_factory=xr.Dataset)
+    proposal: xr.Dataset = field(default_factory=xr.Dataset)
+    tables: str = ""
+    changed: Mapping[str, float] = field(default_factory=dict)
+    is_machine: bool = True
 
 
-NO_COMPARISONS = Comparisons(*(xr.Dataset() for _ in range(5)))
+NO_COMPARISONS = Comparisons()
 """A screening with nothing beside it."""
 
 
@@ -80,8 +85,10 @@ def gasket_answer(
         compared: What is shown next to it.
     """
     words, parameters = Words(trials.factors, screening), trials.parameters
-    findings = summary(screening, words, compared.published, compared.level_zero, compared.check)
-    explorer = partial(_explorer, screening, models, trials, compared.proposed)
+    findings = summary(screening, words, compared.published, compared.check)
+    if compared.level_zero:
+        findings.append(level_zero_text(compared.level_zero, words, compared.tables))
+    explorer = partial(_explorer, screening, models, trials, compared.changed)
     loads = screening["load"].values.tolist()
     return Answer(
         f"Gasket study of machine {parameters.name}",
@@ -132,33 +139,27 @@ def _short(screening: xr.Dataset, compared: Comparisons, words: Words) -> Part:
         text = f"{listed(studied)}; in the runs of the proposal also {listed(left_out)}"
     return proposal_part(
         proposal,
-        why_text(screening, proposal, words),
+        why_text(screening, proposal, list(compared.changed), words),
         words.labels(),
         [*facts, ("Loads", text)],
-        machine="the machine" if proposal.is_machine else "level 0",
+        machine="the machine" if compared.is_machine else "level 0",
     )
 
 
 def _explorer(
-    screening: xr.Dataset, models: xr.Dataset, trials: GasketTrials, proposed: xr.Dataset
+    screening: xr.Dataset, models: xr.Dataset, trials: GasketTrials, changed: Mapping[str, float]
 ) -> str:
     """Return the part of the page that computes predictions of the fitted models."""
     return fragment(
         Path(__file__).with_name("explore.html"),
-        models=explorer_data(screening, models, trials, proposed),
+        models=explorer_data(screening, models, trials, changed),
         has_interactions=models.interactions,
-        has_proposed=_places(proposed) is not None,
+        has_proposed=bool(changed),
     )
 
 
-def _places(proposed: xr.Dataset) -> tuple[float, ...] | None:
-    """Return the places of the proposed setting; None if nothing is proposed."""
-    places: tuple[float, ...] = proposed.attrs.get("places", ())
-    return places if any(places) else None
-
-
 def explorer_data(
-    screening: xr.Dataset, models: xr.Dataset, trials: GasketTrials, proposed: xr.Dataset
+    screening: xr.Dataset, models: xr.Dataset, trials: GasketTrials, changed: Mapping[str, float]
 ) -> Markup:
     """Return the fitted models with the words for factors and responses, as JSON.
 
@@ -166,11 +167,11 @@ def explorer_data(
         screening: As of `screening.run_screening`.
         models: As of `surface.models_of`.
         trials: What was run.
-        proposed: The proposed setting, as of `Comparisons`, whose places are shown first.
+        changed: Places of the proposal, as of `Comparisons`, which are shown first.
     """
     words = Words(trials.factors, screening)
     loads, names = models["load"].values.tolist(), models.response.values.tolist()
-    each = screening.value.attrs["each"]
+    each = each_of(screening.value)
     pairs = screening.term.values[~is_main(screening.term)].tolist()
     return as_json(
         {
@@ -189,7 +190,7 @@ def explorer_data(
                 {"name": name, "title": words.response(name), "unit": each[name].unit_text}
                 for name in names
             ],
-            "proposed": _places(proposed),
+            "proposed": [changed.get(f.name, 0.0) for f in trials.factors] if changed else None,
             "interactions": models.interactions,
             "models": {
                 load: {
@@ -320,7 +321,7 @@ def _heat_maps(screening: xr.Dataset, words: Words) -> list[Plot]:
     caption = (
         "Contribution of each term to the variance of each response, in percent: main effects "
         "above, interactions below. The symbols of the responses are explained under Run details. "
-        f"Terms that contribute less than {WHOLE.text(figures.SMALLEST_SHARE)} to every response "
+        f"Terms that contribute less than {SHARE.text(figures.SMALLEST_SHARE)} to every response "
         "are not shown. The colour scale follows the square root of the percentage."
     )
     loads = screening["load"].values.tolist()

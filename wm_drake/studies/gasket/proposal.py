@@ -10,13 +10,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import xarray as xr
 
-from wm_drake.parameters import GASKET_FACTORS, FactorLevels, MachineParameters, load_factors
-from wm_drake.parameters.elements import CurveTable
+from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Share
 from wm_drake.parameters.variation import number_at
+from wm_drake.parameters.vary_file import gasket_entries
+from wm_drake.parameters.varying import Varied
 from wm_drake.report.formatting import significant
-from wm_drake.report.quantity import Quantity
+from wm_drake.report.quantity import SHARE
 from wm_drake.simulation.measures.kind import Better
 from wm_drake.studies.gasket.surface import Setting, model_rows
 from wm_drake.studies.proposal import AFTER, BEFORE, Aim, worst_of
@@ -26,8 +26,6 @@ MOST_GRID = 20_000
 
 CLIMBERS = 4
 """Number of the best level combinations from which single factors are moved."""
-
-PERCENT = Quantity("", Share(), 0)
 
 
 def goals_of(screening: xr.Dataset) -> dict[str, Better]:
@@ -111,7 +109,7 @@ def _grid(count: int) -> FloatArray:
     return np.vstack([np.zeros(count), levels])
 
 
-def text_at(machine: MachineParameters, factor: FactorLevels, place: float) -> tuple[str, float]:
+def text_at(machine: MachineParameters, factor: Varied, place: float) -> tuple[str, float]:
     """Return the value of a factor at a place, rounded to what a person would write, and its place.
 
     The text is what `--set` and `--check` take.
@@ -119,29 +117,30 @@ def text_at(machine: MachineParameters, factor: FactorLevels, place: float) -> t
     Args:
         place: Place from -1 to 1.
     """
-    key, numbers = next(iter(factor.numbers.items()))
-    number, value = number_at(machine, key), float(np.interp(place, (-1.0, 0.0, 1.0), numbers))
-    if isinstance(number.original, CurveTable):
+    value = factor.at_level(place)
+    if factor.numbers:
+        value = factor.numbers[0].si(factor.change, value)
+        number = number_at(machine, factor.numbers[0].key)
+    if factor.numbers and number.is_table:
         assert number.nominal
-        text = PERCENT.text(value / number.nominal)
+        text = SHARE.text(value / number.nominal)
     else:
-        unit = number.unit.for_reader
+        unit = factor.first_unit.for_reader
         text = f"{significant(unit.from_si(value), 3)} {unit.shown}".replace("−", "-")
-    value = number.resolved(text)
-    return text, float(np.interp(value, numbers, (-1.0, 0.0, 1.0)))
+    return text, factor.level_of(text)
 
 
-def sets_of(factor: FactorLevels, text: str) -> dict[str, str]:
+def sets_of(factor: Varied, text: str) -> dict[str, str]:
     """Return the values for `--set`, by symbol or key; empty if only a machine file can say it."""
-    known, keys = load_factors(GASKET_FACTORS).get(factor.name), factor.settings[1]
+    known, keys = gasket_entries().get(factor.name), factor.keys
     if known and set(known.keys) == set(keys):
         return {factor.name: text}
-    if any(isinstance(value, CurveTable) for value in keys.values()) or len(keys) > 1:
+    if any(number.is_table for number in factor.numbers) or len(keys) > 1 or factor.entry.sets:
         return {}
     return dict.fromkeys(keys, text)
 
 
-def settings_of(changes: Mapping[str, float], factors: Sequence[FactorLevels]) -> list[Setting]:
+def settings_of(changes: Mapping[str, float], factors: Sequence[Varied]) -> list[Setting]:
     """Return level 0, and the setting of the changes if there are any.
 
     Args:
@@ -155,14 +154,14 @@ def settings_of(changes: Mapping[str, float], factors: Sequence[FactorLevels]) -
     return [zero, Setting(AFTER, tuple(places))]
 
 
-def is_level_zero(machine: MachineParameters, factors: tuple[FactorLevels, ...]) -> bool:
+def is_level_zero(machine: MachineParameters, factors: Sequence[Varied]) -> bool:
     """Return whether a machine is level 0 of its factors, but for rounding."""
     for factor in factors:
-        for key, value in factor.settings[1].items():
-            original = number_at(machine, key).original
-            if isinstance(original, CurveTable) != isinstance(value, CurveTable):
+        for number in factor.numbers:
+            original = number_at(machine, number.key)
+            middle = factor.levels_of(number)[1]
+            if original.is_table != number.is_table:
                 return False
-            middle = value.nominal_stiffness if isinstance(value, CurveTable) else value
-            if not np.isclose(middle, number_at(machine, key).nominal or 0.0, rtol=1e-6):
+            if not np.isclose(middle, original.nominal or 0.0, rtol=1e-6):
                 return False
     return True

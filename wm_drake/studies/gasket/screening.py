@@ -28,9 +28,9 @@ from wm_drake.errors import input_error
 from wm_drake.parameters import PublishedResults, PublishedTerm
 from wm_drake.parameters.published import CONSTANT, INTERACTIONS, MAIN, RANGE
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Share, Unit
+from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import number, three_digits
-from wm_drake.report.quantity import Quantity
+from wm_drake.report.quantity import SHARE, Quantity, each_of
 from wm_drake.simulation.measures.kind import Better
 from wm_drake.studies.doe.anova import AnovaTable, Term, anova
 from wm_drake.studies.doe.coding import LEVELS, efficiency
@@ -67,7 +67,7 @@ def r2_text(r2: float) -> str:
 
 VALUE = Quantity("run", form=three_digits)
 MEAN = Quantity("mean", form=three_digits)
-SHARE = Quantity("contribution", Share(), 1)
+CONTRIBUTION = SHARE.named("contribution", decimals=1)
 PREDICTED_R2 = Quantity("predicted R²", form=r2_text)
 ADJUSTED_R2 = Quantity("adjusted R²", form=r2_text)
 OVERLAP = Quantity("gap", Unit("m", "mm"), form=three_digits)
@@ -167,7 +167,7 @@ def analyse(design: Design, runs: xr.Dataset) -> xr.Dataset:
         by_response = anova(levels[good], frame, interactions=design.model != "main")
         tables.append([by_response[name] for name in names])
         trials.append(good)
-    screening = runs.assign(_of_runs(runs.value) | _of_tables(tables, runs.value.attrs["each"]))
+    screening = runs.assign(_of_runs(runs.value) | _of_tables(tables, each_of(runs.value)))
     for name in ("fitted", "residual"):
         array = np.full(runs.value.shape, np.nan)
         for of_load, good, rows in zip(tables, trials, array, strict=True):
@@ -194,10 +194,8 @@ def _of_runs(values: xr.DataArray) -> dict[str, xr.DataArray]:
         "largest": values.max("trial", keep_attrs=True),
         "deviation": values.std("trial", ddof=1, keep_attrs=True),
     }
-    for name, array in numbers.items():
-        words = "standard deviation" if name == "deviation" else name
-        array.attrs |= VALUE.named(words).attributes()
-    return numbers
+    words = {"deviation": "standard deviation"}
+    return {name: VALUE.named(words.get(name, name)).on(array) for name, array in numbers.items()}
 
 
 def _of_tables(
@@ -224,18 +222,19 @@ def _of_tables(
 
     return {
         "mean": of(MEAN, lambda t: t.constant, is_response=True),
-        "main": of(SHARE.named("main effects"), lambda t: t.main),
-        "interaction": of(SHARE.named("interactions"), lambda t: t.interaction),
-        "unexplained": of(SHARE.named("residual"), lambda t: t.unexplained),
+        "main": of(CONTRIBUTION.named("main effects"), lambda t: t.main),
+        "interaction": of(CONTRIBUTION.named("interactions"), lambda t: t.interaction),
+        "unexplained": of(CONTRIBUTION.named("residual"), lambda t: t.unexplained),
         "residual_deviation": of(
             MEAN.named("residual standard deviation"), _residual_deviation, is_response=True
         ),
         "residual_df": of(COUNT, lambda t: t.residual_df),
         "adjusted_r2": of(ADJUSTED_R2, lambda t: t.adjusted_r2),
         "predicted_r2": of(PREDICTED_R2, lambda t: t.predicted_r2),
-        "share": of_terms(SHARE, lambda _, term: term.share),
+        "share": of_terms(CONTRIBUTION, lambda _, term: term.share),
         "sum_sq_share": of_terms(
-            SHARE.named("sum of squares"), lambda t, term: term.sum_sq / (t.total_sum_sq or np.nan)
+            CONTRIBUTION.named("sum of squares"),
+            lambda t, term: term.sum_sq / (t.total_sum_sq or np.nan),
         ),
         "df": of_terms(COUNT, lambda _, term: term.df),
         "f": of_terms(Quantity("F"), lambda _, term: term.f),
@@ -347,7 +346,7 @@ def published_for(results: PublishedResults, screening: xr.Dataset, source: str 
 def _fill(published: xr.Dataset, label: Label, terms: Mapping[str, PublishedTerm]) -> None:
     """Write the published numbers of a response into arrays of NaN."""
     load, name = label
-    quantity = published["mean"].attrs["each"][name]
+    quantity = each_of(published["mean"])[name]
     place = {"load": load, "response": name}
 
     def write(variable: str, value: Any, **where: Any) -> None:
@@ -362,14 +361,14 @@ def _fill(published: xr.Dataset, label: Label, terms: Mapping[str, PublishedTerm
             write(variable, quantity.to_si(terms[term].effects[place_of_effect]))
     for variable, term in (("main", MAIN), ("interaction", INTERACTIONS)):
         if term in terms:
-            write(variable, SHARE.to_si(terms[term].percent))
+            write(variable, CONTRIBUTION.to_si(terms[term].percent))
     for term in published.term.values.tolist():
         straight, turned = terms.get(term), terms.get(":".join(reversed(term.split(":"))))
         known = straight or turned
         if known is None:
             continue
         if known.percent is not None:
-            write("share", SHARE.to_si(known.percent), term=term)
+            write("share", CONTRIBUTION.to_si(known.percent), term=term)
         if known.effects:
             shape = (len(LEVELS),) * (term.count(":") + 1)
             effects = quantity.to_si(known.effects).reshape(shape)

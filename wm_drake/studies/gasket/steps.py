@@ -19,16 +19,9 @@ import pandas as pd
 import xarray as xr
 
 from wm_drake.engines import DEFAULT_ENGINE
-from wm_drake.parameters import (
-    GASKET_FACTORS,
-    FactorLevels,
-    MachineParameters,
-    at_levels,
-    factor_of_text,
-    levels_of,
-    load_factors,
-    published_results,
-)
+from wm_drake.parameters import MachineParameters, Varying, published_results, varying
+from wm_drake.parameters.vary import entries_of_texts
+from wm_drake.parameters.vary_file import gasket_entries
 from wm_drake.report.labelled import LabelledTable
 from wm_drake.simulation.cases import Case, case_of, is_as_measured
 from wm_drake.studies.answer import Answer
@@ -36,26 +29,8 @@ from wm_drake.studies.doe.design import Design
 from wm_drake.studies.experiment import run_here
 from wm_drake.studies.gasket.page import NO_COMPARISONS, gasket_answer
 from wm_drake.studies.gasket.screening import analyse, check_degrees_of_freedom, published_for
-from wm_drake.studies.gasket.study import GasketTrials
+from wm_drake.studies.gasket.study import DEFAULT_LEVELS, GasketTrials
 from wm_drake.studies.gasket.surface import models_of
-
-
-@dataclass(frozen=True)
-class Factors:
-    """Numbers of a machine that vary at three levels.
-
-    Attributes:
-        machine: The machine.
-        every: Levels of each factor.
-    """
-
-    machine: MachineParameters
-    every: tuple[FactorLevels, ...]
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the factors."""
-        return tuple(factor.name for factor in self.every)
 
 
 @dataclass(frozen=True)
@@ -95,7 +70,7 @@ class Analysis:
 
 def factors(
     machine: MachineParameters, names: Sequence[str] = (), *, tables: str = "scaled"
-) -> Factors:
+) -> Varying:
     """Return the factors of a design with their levels.
 
     Args:
@@ -114,13 +89,13 @@ def factors(
         >>> wm.factors(wm.load_machine("reference"), ["C_L", "K_Lx=80 %..120 %"]).names
         ('C_L', 'K_Lx')
     """
-    known = load_factors(GASKET_FACTORS)
-    chosen = dict(factor_of_text(text, known) for text in names) if names else known
-    return Factors(machine, levels_of(machine, chosen, tables))
+    known = gasket_entries()
+    chosen = entries_of_texts(names, known, "", DEFAULT_LEVELS) if names else known
+    return varying(machine, chosen, tables=tables).with_levels("a factor")
 
 
 def run_trials(
-    factors: Factors,
+    factors: Varying,
     design: Design,
     loads: Sequence[str | Case] = ("middle", "counter"),
     responses: Sequence[str] = (),
@@ -149,9 +124,9 @@ def run_trials(
         (9, 3)
     """
     check_degrees_of_freedom(design)
-    middle = at_levels(factors.machine, factors.every, [0] * len(factors.every))
+    middle = factors.at_levels([0] * len(factors.every))
     cases = [load if isinstance(load, Case) else case_of(middle, load) for load in loads]
-    plan = GasketTrials(middle, factors.every, cases, responses)
+    plan = GasketTrials(factors, cases, responses)
     runs = plan.responses(design, plan.experiment(partial(run_here, **running)))
     return Trials(plan, design, runs, running.get("engine", DEFAULT_ENGINE))
 

@@ -12,8 +12,9 @@ import numpy as np
 import xarray as xr
 
 from wm_drake.model.build import build_machine
-from wm_drake.parameters import TABLES, FactorLevels, MachineParameters, at_levels
+from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.units import Share
+from wm_drake.parameters.varying import TABLES, Varied, Varying
 from wm_drake.report.formatting import three_digits
 from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.cases import Case, load_of
@@ -21,6 +22,9 @@ from wm_drake.simulation.measures.responses import Response, chosen_responses, m
 from wm_drake.studies.doe.design import Design
 from wm_drake.studies.experiment import Experiment, Simulate, responses
 from wm_drake.studies.gasket.screening import VALUE, runs_of
+
+DEFAULT_LEVELS = "50 %..150 %"
+"""Levels of a factor that is named without any: those of [B]."""
 
 LOADS = ("middle", "counter")
 """Loads of [B] section 4."""
@@ -31,15 +35,13 @@ class GasketTrials:
     """The trials of a design, as runs of a machine.
 
     Attributes:
-        parameters: The machine; only the factors change.
-        factors: Levels of the factors for this machine.
+        varying: The machine, and its factors with three levels.
         loads: One case for each load to run, without parameters.
         response_names: Names of the responses, as for `chosen_responses`; empty for the default.
         chosen: Responses.
     """
 
-    parameters: MachineParameters
-    factors: tuple[FactorLevels, ...]
+    varying: Varying
     loads: Sequence[Case]
     response_names: Sequence[str] = ()
     chosen: tuple[Response, ...] = field(init=False)
@@ -52,6 +54,16 @@ class GasketTrials:
         """
         responses = chosen_responses(self.parameters, self.loads[0].profile, self.response_names)
         object.__setattr__(self, "chosen", responses)
+
+    @cached_property
+    def parameters(self) -> MachineParameters:
+        """The machine at level 0 of all factors; only the factors change."""
+        return self.varying.at_levels([0] * len(self.factors))
+
+    @property
+    def factors(self) -> tuple[Varied, ...]:
+        """The factors."""
+        return self.varying.every
 
     @cached_property
     def measures(self) -> tuple[str, ...]:
@@ -75,9 +87,7 @@ class GasketTrials:
             experiment: Runs of the machine with the loads of the study.
         """
         names = [f"trial {number}" for number in range(1, design.trials + 1)]
-        machines = (
-            at_levels(self.parameters, self.factors, levels) for levels in design.levels.tolist()
-        )
+        machines = (self.varying.at_levels(levels) for levels in design.levels.tolist())
         return responses_of(experiment.at(names, machines), self.chosen)
 
 
@@ -118,7 +128,7 @@ DIFFERENCE = Quantity("difference", Share(), 1)
 
 def run_level_zero(
     machine: MachineParameters,
-    levels: Mapping[str, tuple[FactorLevels, ...]],
+    every: Mapping[str, Varying],
     trials: GasketTrials,
     simulate: Simulate,
 ) -> xr.Dataset:
@@ -130,7 +140,7 @@ def run_level_zero(
 
     Args:
         machine: The machine.
-        levels: Levels of the factors by treatment of tables, all of `TABLES`.
+        every: The factors by treatment of tables, all of `TABLES`.
         trials: Loads and responses.
         simulate: Function that runs cases.
 
@@ -139,12 +149,12 @@ def run_level_zero(
         `linear_difference` and `scaled_difference` from the machine, as shares of it; NaN where
         that is zero. No variables if no factor has a table, so that both treatments are the same.
     """
-    linear, scaled = ([factor.settings for factor in levels[name]] for name in TABLES)
+    linear, scaled = (every[name].every for name in TABLES)
     if linear == scaled:
         return xr.Dataset()
     variants = {MACHINE: machine}
     for name in TABLES:
-        variants[name] = at_levels(machine, levels[name], [0] * len(levels[name]))
+        variants[name] = every[name].at_levels([0] * len(every[name].every))
     runs = []
     for name, parameters in variants.items():
         # a table and a number are different structures, so each variant is built
@@ -157,7 +167,7 @@ def run_level_zero(
     for number, name in enumerate(variants):
         zero[name] = values.isel(trial=number)
         words = name if name == MACHINE else f"level 0, tables {name}"
-        zero[name].attrs |= VALUE.named(words).attributes()
+        zero[name] = VALUE.named(words).on(zero[name])
     for name in TABLES:
         difference = (zero[name] - zero[MACHINE]) / zero[MACHINE].where(zero[MACHINE] != 0.0)
         words = f"difference, tables {name}"

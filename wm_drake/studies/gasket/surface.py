@@ -26,10 +26,9 @@ import pandas as pd
 import xarray as xr
 from scipy.special import stdtrit
 
-from wm_drake.parameters import at_places
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report.formatting import three_digits
-from wm_drake.report.quantity import Quantity
+from wm_drake.report.quantity import Quantity, each_of
 from wm_drake.studies.doe.anova import SumCoding
 from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.gasket.screening import MEAN, good_trials
@@ -78,7 +77,7 @@ def models_of(screening: xr.Dataset) -> xr.Dataset:
         degrees of freedom. Over `load`, `column` and `other`: `inverse`, (X' X)^-1 of its trials.
         Attributes: `factors`, their names, and `interactions`, whether the model has them.
     """
-    design, each = screening.design, screening.value.attrs["each"]
+    design, each = screening.design, each_of(screening.value)
     interactions = design.model != "main"
     # of sum-coded columns, the coefficients are the effects at -1 and 0
     effects = screening.effect.sel(level=[-1, 0])
@@ -132,7 +131,7 @@ def predicted(models: xr.Dataset, places: FloatArray) -> xr.Dataset:
         a new run.
     """
     rows = model_rows(np.asarray(places, dtype=float), interactions=models.interactions)
-    each, dims = models.coefficient.attrs["each"], ("setting", "load", "response")
+    each, dims = each_of(models.coefficient), ("setting", "load", "response")
     values = np.einsum("np,lrp->nlr", rows, models.coefficient.values)
     widths = half_widths(models, rows, of_run=True)
     return xr.Dataset(
@@ -203,9 +202,7 @@ def run_settings(
         with a load that the models do not have; `run`, `difference` of both, and `is_inside`,
         whether the run lies in the interval.
     """
-    machines = (
-        at_places(trials.parameters, trials.factors, setting.places) for setting in settings
-    )
+    machines = (trials.varying.at_levels(setting.places) for setting in settings)
     names = [f"check {number}" for number in range(1, len(settings) + 1)]
     data = experiment.at(names, machines, "settings")
     runs = responses_of(data, trials.chosen).value.rename(trial="setting")
@@ -227,9 +224,9 @@ def compared_with_models(
     check = predicted(models, np.array([setting.places for setting in settings]))
     check = check.assign_coords(setting=texts).reindex(load=runs["load"])
     check["run"] = runs.assign_coords(setting=texts)
-    check["run"].attrs |= MEAN.named("run").attributes()
+    check["run"] = MEAN.named("run").on(check["run"])
     difference = check.run - check.predicted
-    each = runs.attrs["each"]
+    each = each_of(runs)
     check["difference"] = MEAN.named("difference").of_each(
         "response", each, difference.dims, difference
     )

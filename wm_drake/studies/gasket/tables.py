@@ -3,19 +3,20 @@
 import numpy as np
 import xarray as xr
 
+from wm_drake.parameters.variation import Number
 from wm_drake.report.formatting import MISSING
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import HIDDEN, Quantity, named, quantity_of
+from wm_drake.report.quantity import CHANGE, SHARE, Quantity, hidden, named, quantity_of
 from wm_drake.report.terminal import Console
 from wm_drake.studies.doe.coding import LEVELS, MODELS
 from wm_drake.studies.doe.design import Design
 from wm_drake.studies.gasket.findings import EFFICIENCY
 from wm_drake.studies.gasket.screening import (
+    CONTRIBUTION,
     FAR,
     LEADING_INTERACTION,
     LEADING_MAIN,
     OTHER_LEVELS,
-    SHARE,
     VALUE,
     at,
     compared_terms,
@@ -26,8 +27,6 @@ from wm_drake.studies.gasket.screening import (
 )
 from wm_drake.studies.gasket.study import GasketTrials
 from wm_drake.studies.gasket.words import Words
-from wm_drake.studies.proposal import CHANGE
-from wm_drake.studies.proposal import SHARE as WHOLE
 
 WIDE = 100
 """Width of a terminal from which on its table has the leading terms. [characters]"""
@@ -49,7 +48,7 @@ def variance_table(screening: xr.Dataset, published: xr.Dataset, words: Words) -
     if published:
         caption += (
             f" Published: from {published.source}. Difference: of the mean from the published one, "
-            f"as a share of that; rows in which it is above {WHOLE.text(FAR)} are marked."
+            f"as a share of that; rows in which it is above {SHARE.text(FAR)} are marked."
         )
     data, design = _variance(screening, published), screening.design
     terms = _terms_of(screening, published)
@@ -94,9 +93,8 @@ def _variance(screening: xr.Dataset, published: xr.Dataset) -> xr.Dataset:
                 ("load", "response"), difference
             )
             data["is_far"] = np.abs(difference) > FAR
-    for name in ("deviation", "residual_deviation", "residual_df"):
-        data[name] = screening[name].assign_attrs({HIDDEN: True})
-    return data
+    more = screening[["deviation", "residual_deviation", "residual_df"]]
+    return data.assign(hidden(more, *more).data_vars)
 
 
 def _terms_of(screening: xr.Dataset, published: xr.Dataset) -> xr.Dataset:
@@ -118,10 +116,10 @@ def _leading_text(of_label: xr.Dataset) -> str:
     texts = []
     for term in leading(of_label):
         one = of_label.sel(term=term)
-        text = f"{term.replace(':', ' × ')} {WHOLE.number(one.share)}"
+        text = f"{term.replace(':', ' × ')} {SHARE.number(one.share)}"
         if "published_share" in one and one.published_share.notnull():
             mark = SIGN_MARK if one.sign_differs else ""
-            text += f" ({WHOLE.number(one.published_share)}{mark})"
+            text += f" ({SHARE.number(one.published_share)}{mark})"
         texts.append(text)
     return ", ".join(texts)
 
@@ -149,8 +147,8 @@ def leading_table(screening: xr.Dataset, published: xr.Dataset, words: Words) ->
     dims = ("load", "response", "term", "other_level")
     rows = {dim: xr.DataArray(list(c), dims="row") for dim, c in zip(dims, columns, strict=True)}
     caption = (
-        f"Main effects above {WHOLE.text(LEADING_MAIN)} and interactions above "
-        f"{WHOLE.text(LEADING_INTERACTION)}, largest first. An effect is the deviation from the "
+        f"Main effects above {SHARE.text(LEADING_MAIN)} and interactions above "
+        f"{SHARE.text(LEADING_INTERACTION)}, largest first. An effect is the deviation from the "
         "mean at a level of the factor; those of a factor sum to zero. For an interaction, each "
         "line is a level of its second factor, and each column a level of its first factor, whose "
         "values are in the line."
@@ -205,7 +203,7 @@ def contribution_tables(screening: xr.Dataset, words: Words) -> tuple[LabelledTa
     return (
         LabelledTable(
             "contributions",
-            xr.Dataset({"contribution": shares.assign_attrs(SHARE.attributes())}),
+            xr.Dataset({"contribution": CONTRIBUTION.on(shares)}),
             "All terms",
             "Contribution of every term to each response, in percent of the variance.",
             across="response",
@@ -246,10 +244,12 @@ def physical_values(design: Design, trials: GasketTrials) -> dict[str, xr.Variab
     values = {}
     for factor in trials.factors:
         places = design.levels[:, design.factors.index(factor.name)] + 1
-        is_same = len(set(factor.numbers.values())) == 1
-        for key in list(factor.numbers)[: 1 if is_same else None]:
-            quantity = Quantity(factor.name, factor.units[key])
-            numbers = np.asarray(factor.numbers[key])[places]
+        each = {n.key: (n.unit, factor.levels_of(n)) for n in factor.numbers}
+        each = each or {"": (factor.unit, factor.first_levels)}
+        is_same = len({levels for _, levels in each.values()}) == 1
+        for key, (unit, levels) in list(each.items())[: 1 if is_same else None]:
+            quantity = Quantity(factor.name, unit)
+            numbers = np.asarray(levels)[places]
             name = factor.name if is_same else f"{factor.name}_{key}"
             values[f"{name}{quantity.suffix or '_value'}"] = quantity.variable("trial", numbers)
     return values
@@ -322,16 +322,16 @@ def design_table(design: Design) -> LabelledTable:
 
 def factors_table(trials: GasketTrials, words: Words) -> LabelledTable:
     """Return the values of the machine file that belong to the levels of each factor."""
-    keys = [(factor, key) for factor in trials.factors for key in factor.numbers]
-    each = {key: Quantity(key, factor.units[key]) for factor, key in keys}
-    values = [factor.numbers[key] for factor, key in keys]
+    keys = [(factor, number) for factor in trials.factors for number in factor.numbers]
+    each = {number.key: Quantity(number.key, number.unit) for _, number in keys}
+    values = [factor.levels_of(number) for factor, number in keys]
     data = xr.Dataset(
         {
             "factor": ("key", [words.factor(factor.name) for factor, _ in keys]),
-            "in_machine": ("key", [factor.nominal[key] or MISSING for factor, key in keys]),
+            "in_machine": ("key", [_nominal_text(number) for _, number in keys]),
             "level_value": VALUE.named("value").of_each("key", each, ("key", "level"), values),
         },
-        {"key": [key for _, key in keys], "level": list(LEVELS)},
+        {"key": [number.key for _, number in keys], "level": list(LEVELS)},
     )
     return LabelledTable(
         "factors",
@@ -342,3 +342,7 @@ def factors_table(trials: GasketTrials, words: Words) -> LabelledTable:
         across="level",
         words=LEVEL_WORDS,
     )
+
+
+def _nominal_text(number: Number) -> str:
+    return MISSING if number.nominal is None else number.unit.reading(number.nominal)

@@ -7,21 +7,12 @@ from typing import Any
 
 import xarray as xr
 
-from wm_drake.errors import InputError, check_known, input_error, nearest_names, problems_at
+from wm_drake.errors import check_known, input_error, nearest_names, problems_at
 from wm_drake.model.machine import Machine
-from wm_drake.parameters import (
-    GASKET_FACTORS,
-    TABLES,
-    FactorLevels,
-    MachineParameters,
-    PublishedResults,
-    at_levels,
-    factor_of_text,
-    levels_of,
-    load_factors,
-    place_of,
-    published_results,
-)
+from wm_drake.parameters import PublishedResults, published_results
+from wm_drake.parameters.vary import entries_of_texts
+from wm_drake.parameters.vary_file import GASKET, VARY_FILES, load_vary
+from wm_drake.parameters.varying import TABLES, Varied, Varying
 from wm_drake.simulation.cases import Case, is_as_measured
 from wm_drake.studies.answer import Answer
 from wm_drake.studies.doe.coding import MODELS
@@ -42,13 +33,14 @@ from wm_drake.studies.gasket.screening import (
     published_for,
     run_screening,
 )
-from wm_drake.studies.gasket.study import GasketTrials, run_level_zero
+from wm_drake.studies.gasket.study import DEFAULT_LEVELS, GasketTrials, run_level_zero
 from wm_drake.studies.gasket.surface import Setting, models_of, run_settings
 from wm_drake.studies.gasket.words import Words
 from wm_drake.studies.inputs import existing_file, pairs_of, selected_cases
 from wm_drake.studies.proposal import AFTER, compared, is_confirmed, proposal_of
 from wm_drake.studies.run import machine_text
 from wm_drake.studies.study import Task
+from wm_drake.studies.vary import in_vary_file, varying_of
 
 
 class GasketTask(Task):
@@ -56,15 +48,15 @@ class GasketTask(Task):
 
     def __init__(self, options: GasketOptions, machine: Machine) -> None:
         """Read factors, settings, design, loads, responses and published results."""
-        self.options, self.parameters = options, machine.parameters
-        parameters, levels = self.parameters, _factors(machine.parameters, options)
-        self.settings = [_setting(parameters, levels, text) for text in options.check]
-        self.design = _design(options, tuple(factor.name for factor in levels))
+        self.options, self.machine = options, machine
+        factors = _factors(machine, options)
+        self.parameters = factors.machine
+        self.settings = [_setting(factors, text) for text in options.check]
+        self.design = _design(options, factors.names)
         check_degrees_of_freedom(self.design)
-        self.cases = selected_cases(parameters, options.load, True, options.profile)
-        middle = at_levels(parameters, levels, [0] * len(levels))
+        self.cases = selected_cases(self.parameters, options.load, True, options.profile)
         with problems_at("--response", ""):
-            self.trials = GasketTrials(middle, levels, self.cases, options.response)
+            self.trials = GasketTrials(factors, self.cases, options.response)
         self.published, self.source = self._published()
 
     def _every_load(self) -> list[Case]:
@@ -81,7 +73,7 @@ class GasketTask(Task):
         ] or parameters.published
         loads = [case.name for case in self.cases]
         if not options.published:
-            is_other = options.sets or options.factor or options.factors
+            is_other = options.sets or options.factor or options.vary
             loads = [case.name for case in self.cases if is_as_measured(parameters, case)]
             loads = [] if is_other else loads
         known = published_results(tuple(files))
@@ -94,7 +86,8 @@ class GasketTask(Task):
         from wm_drake.batch.ledger import key_of
 
         plan, trials = self.design, self.trials
-        levels = key_of(levels=plan.levels, settings=[f.settings for f in trials.factors])[:8]
+        factors = [(f.keys, f.at, f.entry.sets) for f in trials.factors]
+        levels = key_of(levels=plan.levels, factors=factors)[:8]
         loads = key_of(loads=[(case.load, case.profile) for case in trials.loads])[:8]
         return {
             "machine": machine_text(trials.parameters),
@@ -116,27 +109,29 @@ class GasketTask(Task):
             published = published_for(self.published, screening, self.source)
         zero = self._level_zero(executor)
         every_load = replace(experiment, loads=tuple(self._every_load()))
-        proposed, proposal = self._proposal(screening, models, every_load)
-        comparisons = Comparisons(published, zero, check, proposed, proposal)
+        proposed, proposal, changed = self._proposal(screening, models, every_load)
+        comparisons = Comparisons(
+            published, zero, check, proposed, proposal, self.options.tables, changed,
+            is_level_zero(self.parameters, self.trials.factors),
+        )  # fmt: skip
         return gasket_answer(screening, models, trials, comparisons)
 
     def _level_zero(self, executor: Executor) -> xr.Dataset:
         """Run the machine and level 0 with each treatment of tables."""
         options = self.options
         every = {
-            name: _factors(self.parameters, options.model_copy(update={"tables": name}))
+            name: _factors(self.machine, options.model_copy(update={"tables": name}))
             for name in TABLES
         }
-        zero = run_level_zero(self.parameters, every, self.trials, executor.simulate)
-        return zero.assign_attrs(tables=options.tables)
+        return run_level_zero(self.parameters, every, self.trials, executor.simulate)
 
     def _proposal(
         self, screening: xr.Dataset, models: xr.Dataset, experiment: Experiment
-    ) -> tuple[xr.Dataset, xr.Dataset]:
+    ) -> tuple[xr.Dataset, xr.Dataset, dict[str, float]]:
         """Choose a setting on the fitted models, and run it and level 0 with all loads.
 
         Returns:
-            The runs and the proposal, as of `page.Comparisons`.
+            The runs, the proposal and the changed places, as of `page.Comparisons`.
         """
         factors, parameters = self.trials.factors, self.parameters
         candidates = Candidates(screening, models)
@@ -150,18 +145,14 @@ class GasketTask(Task):
         confirmed = is_confirmed(candidates.aim, responses)
         words = Words(factors, screening)
         changes = [
-            (words.factor(f.name), _change_text(f, text), ", ".join(f.numbers))
+            (words.factor(f.name), _change_text(f, text), ", ".join(f.keys))
             for f, text, _ in chosen
         ]
         if chosen:
             responses = responses.assign(_predicted(runs, responses))
         command = self._command([sets_of(factor, text) for factor, text, _ in chosen])
         proposal = proposal_of(responses, changes, is_confirmed=confirmed, command=command)
-        about = {
-            "factors": [f.name for f, *_ in chosen],
-            "is_machine": is_level_zero(parameters, factors),
-        }
-        return runs.assign_attrs(places=settings[-1].places), proposal.assign_attrs(about)
+        return runs, proposal, {factor.name: place for factor, _, place in chosen}
 
     def _command(self, sets: Sequence[Mapping[str, str]]) -> str:
         """Return the command that runs changes, each the values of `--set`; "" if there is none."""
@@ -176,12 +167,13 @@ class GasketTask(Task):
         return " ".join(words)
 
 
-def _change_text(factor: FactorLevels, text: str) -> str:
+def _change_text(factor: Varied, text: str) -> str:
     """Return the new value of a factor in words, beside the one of the machine."""
     if text.endswith("%"):
         return f"{text} of its table"
-    nominal = next(iter(factor.nominal.values()))
-    return text.replace("*", " ") + (f" in place of {nominal}" if nominal else "")
+    nominal = factor.numbers[0].nominal if factor.numbers else None
+    before = "" if nominal is None else f" in place of {factor.first_unit.reading(nominal)}"
+    return f"{text.replace('*', ' ')}{before}"
 
 
 def _predicted(runs: xr.Dataset, responses: xr.Dataset) -> dict[str, xr.DataArray]:
@@ -191,32 +183,29 @@ def _predicted(runs: xr.Dataset, responses: xr.Dataset) -> dict[str, xr.DataArra
     return {str(name): array.drop_vars("load") for name, array in of_setting.items()}
 
 
-def _factors(parameters: MachineParameters, options: GasketOptions) -> tuple[FactorLevels, ...]:
-    """Return the levels of the factors that the options select."""
-    named, file, treatment = options.factor, options.factors, options.tables
+def _factors(machine: Machine, options: GasketOptions) -> Varying:
+    """Return the factors that the options select, with levels that the machine can have."""
+    named, treatment, name = options.factor, options.tables, options.vary or GASKET
     check_known(treatment, TABLES, f"unknown treatment '{treatment}'", where="--tables")
-    known = load_factors(GASKET_FACTORS if file is None else existing_file(file, "--factors"))
+    path, file = VARY_FILES.path(name), load_vary(name)
+    known = file.entries()
+    if not named:
+        with in_vary_file(path, file):
+            factors = varying_of(machine, known, file.known, tables=treatment)
+            return factors.with_levels("a factor")
+    entries = entries_of_texts(named, known, "--factor", DEFAULT_LEVELS)
     with problems_at("--factor"):
-        chosen = dict(factor_of_text(text, known) for text in named) if named else known
-    if named and len(chosen) < len(named):
-        raise input_error("a factor is given twice", where="--factor")
-    try:
-        return levels_of(parameters, chosen, treatment)
-    except InputError as error:
-        origin = "--factor" if named else str(file) if file else ""
-        raise InputError(
-            replace(p, where=": ".join(filter(None, [origin, p.where]))) for p in error.problems
-        ) from None
+        return varying_of(machine, entries, tables=treatment).with_levels("a factor")
 
 
-def _setting(parameters: MachineParameters, levels: tuple[FactorLevels, ...], text: str) -> Setting:
+def _setting(factors: Varying, text: str) -> Setting:
     """Return the setting of the factors that an option `--check` means."""
-    places = {factor.name: 0.0 for factor in levels}
-    by_name = {factor.name: factor for factor in levels}
+    places = dict.fromkeys(factors.names, 0.0)
+    by_name = {factor.name: factor for factor in factors.every}
     for name, value in pairs_of(text.split(","), "--check"):
         check_known(name, by_name, f"unknown factor '{name}'", where="--check")
         with problems_at("--check"):
-            places[name] = place_of(parameters, by_name[name], value)
+            places[name] = by_name[name].level_of(value)
     return Setting(text, tuple(places.values()))
 
 

@@ -1,18 +1,18 @@
 """Names and values of factors, terms and responses for reading."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import xarray as xr
 
-from wm_drake.parameters import FactorLevels
-from wm_drake.report.quantity import Quantity
+from wm_drake.parameters.varying import Varied
+from wm_drake.report.quantity import Quantity, each_of
 from wm_drake.studies.doe.coding import LEVELS
 
 
 class Words:
     """Names, physical values and units for reading."""
 
-    def __init__(self, factors: Sequence[FactorLevels], screening: xr.Dataset) -> None:
+    def __init__(self, factors: Sequence[Varied], screening: xr.Dataset) -> None:
         """Store the words.
 
         Args:
@@ -20,12 +20,12 @@ class Words:
             screening: As of `screening.run_screening`.
         """
         self._factors = {factor.name: factor for factor in factors}
-        self._responses: Mapping[str, Quantity] = screening.value.attrs["each"]
+        self._responses = each_of(screening.value)
         self._terms = screening.term.values.tolist()
 
     def factor(self, name: str) -> str:
         """Return a factor for reading, such as `linear damping C_L`."""
-        about = self._factors[name].about if name in self._factors else ""
+        about = self._factors[name].entry.about if name in self._factors else ""
         return f"{about.split(',')[0]} {name}" if about else name
 
     def term(self, name: str) -> str:
@@ -34,12 +34,11 @@ class Words:
 
     def quantity(self, factor: str) -> Quantity:
         """Return what a factor is, by its first key."""
-        unit = next(iter(self._factors[factor].units.values()))
-        return Quantity(self.factor(factor), unit)
+        return Quantity(self.factor(factor), self._factors[factor].first_unit)
 
     def numbers(self, factor: str) -> tuple[float, ...]:
-        """Return the physical values of the levels, of its first key. [SI]"""
-        return next(iter(self._factors[factor].numbers.values()))
+        """Return the physical values of the levels, of its first number. [SI]"""
+        return self._factors[factor].first_levels
 
     def number(self, factor: str, level: int) -> str:
         """Return the physical value of a level, without unit."""

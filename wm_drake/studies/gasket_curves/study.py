@@ -14,8 +14,7 @@ from wm_drake.parameters.elements import Bushing, ForceTable, TorqueTable
 from wm_drake.parameters.gasket_drawing import GasketDrawing
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Share, Unit
-from wm_drake.report.formatting import percent
-from wm_drake.report.quantity import HIDDEN, Quantity
+from wm_drake.report.quantity import CHANGE, HIDDEN, Quantity
 from wm_drake.solid.curves import AXIAL, MOTIONS, RADIAL, TILT, TWIST, Curve, Mesh, RimMotion
 from wm_drake.solid.deformed import Deformed
 from wm_drake.studies.inputs import quantities_of
@@ -172,7 +171,6 @@ COUPLING = Quantity("moment about z by displacement along x", Unit("N*m/m", "N*m
 FREQUENCY = Quantity("frequency of the damping", Unit("Hz", "Hz"))
 MODULUS = Quantity("part of the modulus of the curves", form="{:.3g}".format)
 WORK_ERROR = Quantity("work less energy", Share(), form="{:.2g}".format)
-CHANGE = Quantity("secant", Share(), form=lambda value: percent(value).removesuffix(" %"))
 OVERLAP = Quantity("overlap, of the wall", Share(), 2)
 
 

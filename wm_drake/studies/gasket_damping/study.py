@@ -13,21 +13,15 @@ import xarray as xr
 from wm_drake.errors import input_error
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
-from wm_drake.parameters import (
-    GASKET_FACTORS,
-    Change,
-    MachineParameters,
-    SpinProfile,
-    Variation,
-    load_factors,
-    with_values,
-)
+from wm_drake.parameters import MachineParameters, SpinProfile, with_values
 from wm_drake.parameters.csv_files import with_distinct_times
 from wm_drake.parameters.machine import OUTPUT_PERIOD
 from wm_drake.parameters.recorded import ChannelUse, read_recording, resampled
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
-from wm_drake.parameters.variation import number_at
+from wm_drake.parameters.variation import Change, number_at
+from wm_drake.parameters.vary_file import gasket_entries
+from wm_drake.parameters.varying import Varied
 from wm_drake.report.quantity import TIME, Quantity
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.displacements import smooth_envelope
@@ -135,11 +129,12 @@ def planted_damping(parameters: MachineParameters, linear: str, torsional: str) 
 
 def damping_numbers(parameters: MachineParameters) -> SoughtNumbers:
     """Return C_L and C_T, each that of all axes of the gasket, as the unknowns of a fit."""
-    factors, sought = load_factors(GASKET_FACTORS), []
+    entries, sought = gasket_entries(), []
     for name, upper, unit in zip(UNKNOWNS, UPPER.tolist(), UNITS, strict=True):
-        numbers = tuple(number_at(parameters, key) for key in factors[name].keys)
-        variation = Variation(name, numbers, Change.VALUE, unit)
-        sought.append(Sought(variation, Unknown(name, 0.0, upper, unit)))
+        numbers = tuple(number_at(parameters, key) for key in entries[name].keys)
+        ends = {"low": 0.0, "high": upper}
+        varied = Varied(name, entries[name], numbers, Change.VALUE, unit, ends)
+        sought.append(Sought(varied, Unknown(name, 0.0, upper, unit)))
     return SoughtNumbers(parameters, tuple(sought), "identified")
 
 

@@ -1,6 +1,6 @@
 """Show the study of drawings of a gasket: surfaces, what each factor does, the best drawing."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -9,6 +9,7 @@ import xarray as xr
 from wm_drake.parameters.files import yaml_text
 from wm_drake.parameters.gasket_drawing import GasketDrawing
 from wm_drake.parameters.units import Unit
+from wm_drake.report.chart import between, panel
 from wm_drake.report.figure import MEASURED, OURS, Axis, Figure, Line, Panel, Points, in_grid
 from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.quantity import shown, text_of
@@ -29,20 +30,22 @@ METHOD = (
 
 def geometry_answer(
     factors: Sequence[DrawingFactor],
-    drawings: xr.Dataset,
-    surfaces: xr.Dataset,
-    conditions: xr.Dataset,
+    data: Mapping[str, xr.Dataset],
     best: GasketDrawing,
+    name: str,
+    loads: Sequence[str],
 ) -> Answer:
     """Return the answer of the study.
 
     Args:
-        drawings, surfaces, conditions: As of `drawings_data`, `surfaces_data` and `conditions_data`
-            in `wm_drake.studies.gasket_geometry.study`; the last one has the attributes `gasket`,
-            name or file of the drawing, and `loads`, names in one text.
+        data: `drawings`, `surfaces` and `conditions`, as of `drawings_data`, `surfaces_data` and
+            `conditions_data` in `wm_drake.studies.gasket_geometry.study`.
         best: Best drawing that was run.
+        name: Name or file of the drawing.
+        loads: Names of the loads.
     """
-    name, counts = conditions.attrs["gasket"], drawings.kind.values.tolist()
+    drawings, surfaces, conditions = (data[n] for n in ("drawings", "surfaces", "conditions"))
+    counts = drawings.kind.values.tolist()
     too_large = "no drawing that was run keeps all limits; the best one exceeds them the least"
     return Answer(
         f"Drawings of gasket {name}",
@@ -64,7 +67,7 @@ def geometry_answer(
         (
             ("Drawing", name),
             ("Drawings", f"{counts.count('design')} of the design, {counts.count('fresh')} fresh"),
-            ("Loads", conditions.attrs["loads"]),
+            ("Loads", ", ".join(loads)),
             ("Limits", _limits_text(conditions)),
         ),
         METHOD,
@@ -153,18 +156,9 @@ def _over_factors(
     for factor in factors:
         x = factor.quantity.values(factor.value(surfaces["level"].values))
         surface = shown(surfaces.section.sel(factor=factor.name))
-        marks = (
-            Line(x, surface, key="surface, others in the middle"),
-            Points(
-                shown(drawings[factor.name]),
-                shown(drawings[GAP]),
-                color=MEASURED,
-                size=5.0,
-                key="drawings",
-            ),
-        )
-        x_axis, y_axis = Axis(label=factor.quantity.label), Axis(label=RESPONSES[GAP].label)
-        panels.append(Panel(marks=marks, x=x_axis, y=y_axis))
+        line = Line(x, surface, key="surface, others in the middle")
+        style = {"kind": Points, "color": MEASURED, "size": 5.0, "key": "drawings"}
+        panels.append(between([line], panel(drawings, factor.name, {GAP: style})))
     return Plot(
         Figure(panels=in_grid(panels, 2, share="y"), height=220.0),
         "Four panels: the smallest gap over each factor.",

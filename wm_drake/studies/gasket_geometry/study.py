@@ -13,7 +13,7 @@ from wm_drake.parameters.gasket_drawing import GasketDrawing
 from wm_drake.parameters.reading import SI, read_in
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Share, Unit, plain_number
-from wm_drake.report.quantity import Quantity
+from wm_drake.report.quantity import SHARE, Quantity, of_measure
 from wm_drake.solid.curves import MOTIONS, Gasket, Mesh
 from wm_drake.solid.deformed import deformed
 from wm_drake.studies.gasket_curves.study import GasketStiffness, stiffness_of
@@ -36,7 +36,7 @@ RESPONSES = {
     "axial": Quantity("axial stiffness", STIFFNESS, 2),
     "twist": Quantity("twist stiffness", TURN, 2),
     "tilt": Quantity("tilt stiffness", TURN, 2),
-    "smallest_gap": Quantity("smallest gap", MM, 2),
+    "smallest_gap": of_measure("smallest_gap"),
     "largest_amplitude": Quantity("largest amplitude of a sensor", MM, 2),
     "largest_gasket_force": Quantity("largest gasket force", Unit("N", "N"), 2),
     "largest_stretch": Quantity("largest stretch of the rubber", decimals=2),
@@ -46,7 +46,6 @@ RESPONSES = {
 GAP = "smallest_gap"
 """Response that the best drawing makes largest."""
 
-PART = Quantity("part of the variance", Share(), 0)
 ERROR = Quantity("error on fresh, of the range", Share(), 1)
 
 
@@ -253,7 +252,7 @@ def surfaces_data(
     gaps = [surfaces[GAP].at(at) for at in section]
     return xr.Dataset(
         {
-            "share": PART.variable(("response", "source"), shares),
+            "share": SHARE.named("part of the variance").variable(("response", "source"), shares),
             "error_on_fresh": ERROR.variable("response", errors),
             **changes,
             "section": RESPONSES[GAP].variable(("factor", "level"), gaps),

@@ -120,15 +120,12 @@ class GasketGeometryTask(Task):
         levels = np.vstack([levels, proposed])
         every = {name: np.concatenate([responses[name], verified[name]]) for name in responses}
         kinds = ["design"] * count + ["fresh"] * len(self.fresh) + ["best of surface"]
-        data = drawings_data(self.factors, levels, every, surfaces, kinds)
-        conditions = conditions_data(self.limits, every, surfaces[GAP].degree)
-        conditions.attrs |= {
-            "gasket": self.options.file,
-            "loads": ", ".join(case.name for case in self.cases),
-        }
-        best = drawings.changed(self.drawing, self.factors, levels[int(conditions.best)])
-        fitted = surfaces_data(surfaces, self.candidates, data)
-        return geometry_answer(self.factors, data, fitted, conditions, best)
+        data = {"drawings": drawings_data(self.factors, levels, every, surfaces, kinds)}
+        data["conditions"] = conditions_data(self.limits, every, surfaces[GAP].degree)
+        best = drawings.changed(self.drawing, self.factors, levels[int(data["conditions"].best)])
+        data["surfaces"] = surfaces_data(surfaces, self.candidates, data["drawings"])
+        loads = [case.name for case in self.cases]
+        return geometry_answer(self.factors, data, best, self.options.file, loads)
 
     def _best(self, surfaces: dict[str, Surface]) -> FloatArray:
         """Return the levels of the best candidate on the surfaces that can be built."""

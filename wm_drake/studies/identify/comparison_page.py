@@ -4,7 +4,7 @@ import numpy as np
 import xarray as xr
 
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import EACH, HIDDEN, Quantity
+from wm_drake.report.quantity import EACH, HIDDEN, Quantity, each_of, hidden
 from wm_drake.studies.answer import Answer, Part, Plot
 from wm_drake.studies.fitting.page import estimates_of
 from wm_drake.studies.identify.comparison import LawComparison
@@ -103,9 +103,9 @@ def laws_of(comparison: LawComparison) -> xr.Dataset:
         | {name: quantity.variable("law", values) for name, (quantity, values) in numbers.items()},
         {"law": [r.law for r in ranked]},
     )
-    data["bic"].attrs[HIDDEN] = True
+    data = hidden(data, "bic")
     if not comparison.validation:
-        data["rmse_blind"].attrs[HIDDEN] = data["lack_of_fit_blind"].attrs[HIDDEN] = True
+        data = hidden(data, "rmse_blind", "lack_of_fit_blind")
     as_good = ("law", [r in comparison.as_good for r in ranked], {HIDDEN: True})
     supported = ("law", [r is comparison.supported for r in ranked])
     return data.assign(as_good_as_best=as_good, supported=supported)
@@ -166,8 +166,7 @@ def _estimates(comparison: LawComparison) -> LabelledTable:
     data = xr.concat(parts, "row")
     for name, numbers in data.items():
         if EACH in numbers.attrs:  # the unknowns of all laws
-            each = {k: q for part in parts for k, q in part[name].attrs[EACH].items()}
-            numbers.attrs[EACH] = each
+            numbers.attrs[EACH] = {k: q for p in parts for k, q in each_of(p[name]).items()}
     return LabelledTable(
         "estimates",
         data[["law", "unknown", *data.data_vars]],

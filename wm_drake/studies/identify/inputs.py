@@ -7,7 +7,7 @@ from pathlib import Path
 from wm_drake.errors import InputError, Problem, check_known, input_error, nearest_names
 from wm_drake.parameters import DAMPER_LAWS, MeasuredLoop, quantities, read_loops
 from wm_drake.parameters.units import Share, Unit
-from wm_drake.report.quantity import Quantity
+from wm_drake.report.quantity import MASS, Quantity
 from wm_drake.report.terminal import say
 from wm_drake.rigs.measured import MeasuredMotion, inertia_share, measured_motion, without_inertia
 from wm_drake.studies.components import Target, existing_files
@@ -22,8 +22,6 @@ from wm_drake.studies.identify.models import (
 from wm_drake.studies.identify.options import IdentifyOptions
 from wm_drake.studies.inputs import LOOP_WORDS, channel_names, pairs_of, quantities_of
 from wm_drake.studies.rig.study import FREQUENCY
-
-MASS = Unit("kg", "kg")
 
 PART = Quantity("part", Share(), form="{:.3g}".format)
 
@@ -71,7 +69,7 @@ def motions_of(
         for motion in motions:
             inertia, share = inertia_share(motion, driven_mass)
             say(
-                f"{motion.loop.name}: {MASS.reading(driven_mass)} at the driven end take up to "
+                f"{motion.loop.name}: {MASS.text(driven_mass)} at the driven end take up to "
                 f"{FORCE.reading(inertia, 3)}, {PART.text(share)} of the measured force; "
                 "taken out.",
                 err=True,

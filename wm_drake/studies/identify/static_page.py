@@ -6,10 +6,9 @@ from dataclasses import replace
 import xarray as xr
 
 from wm_drake.parameters import MeasuredLoop
-from wm_drake.parameters.units import Share
 from wm_drake.report.figure import MEASURED, QUIET, Figure, Line, Mark, Panel, in_grid
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import HIDDEN, Quantity, quantity_of, shown, text_of
+from wm_drake.report.quantity import SHARE, hidden, quantity_of, shown, text_of
 from wm_drake.rigs import AXES
 from wm_drake.studies.answer import Answer, Part, Plot
 from wm_drake.studies.identify.fragment import Destination, table_entry, written_fragment
@@ -30,7 +29,6 @@ METHOD = (
 PREFIXES = {False: "", True: "rotational_"}
 """Beginning of the names of tables, by whether their curves are about an axis."""
 
-SHARE = Quantity("", Share(), 0)
 
 NOTICED = 0.02
 """Part of the largest force above which a fall of the mean is told."""
@@ -169,9 +167,9 @@ def _measures(prefix: str, curves: Sequence[xr.Dataset]) -> LabelledTable:
     for name, index in (("to", -1), ("from", 0)):
         ends = motion.named(name).variable("axis", [c.position[index].item() for c in curves])
         data = xr.Dataset({name: ends}).merge(data)
-    data["largest_fall"].attrs[HIDDEN] = True
+    data = hidden(data, "largest_fall")
     stiffness = quantity_of(data.stiffness).named("nominal stiffness")
-    data["stiffness"].attrs.update(stiffness.attributes())
+    data["stiffness"] = stiffness.on(data.stiffness)
     return LabelledTable(
         f"{prefix}measures",
         data.assign_coords(axis=[curve.axis for curve in curves]),

@@ -16,13 +16,12 @@ from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import listed, shape_name
 from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.page import as_json, fragment
-from wm_drake.report.quantity import SPEED, Quantity
+from wm_drake.report.quantity import MASS, SPEED, Quantity
 from wm_drake.studies.answer import Answer, Part
 from wm_drake.studies.machine_show.description import Description, description_of
 from wm_drake.studies.machine_show.elements import Damper, Spring, Strut, TelescopicDamper
 from wm_drake.studies.modes.quantities import FREQUENCY
 
-MASS = Quantity("mass", Unit("kg", "kg"))
 LENGTH = Quantity("length", Unit("m", "mm"), 1)
 ANGLE = Quantity("angle", Unit("rad", "deg"), 2)
 TENSION = Quantity("tension", Unit("N", "N"), 1)

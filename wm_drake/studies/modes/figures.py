@@ -10,6 +10,7 @@ import xarray as xr
 
 from wm_drake.model.scene import Outline
 from wm_drake.parameters.types import FloatArray
+from wm_drake.report import chart
 from wm_drake.report import figure as fig
 from wm_drake.report.quantity import SPEED, quantity_of, shown
 from wm_drake.simulation.outputs import point_positions
@@ -179,20 +180,20 @@ def _mode_names(diagram: xr.Dataset, last: float, top: float) -> list[fig.Mark]:
 
 def amplitude_figure(result: MachineModes) -> fig.Figure:
     """Return frequency and damping ratio of each mode over its amplitude."""
-    panels, data = [], result.over_amplitude
-    names = list(dict.fromkeys(data.mode.values.tolist()))
-    for name, quantity in (("frequency", FREQUENCY), ("damping_ratio", DAMPING)):
-        marks: list[fig.Mark] = []
-        for color, mode in zip(fig.COLOURS, names, strict=False):
-            curve = data.isel(row=(data.mode == mode).values)
-            x, y = shown(curve.amplitude), without_rounding(shown(curve[name]))
-            marks.append(fig.Line(x, y, color=color, key=mode))
-        at = float(AMPLITUDE.values(result.amplitude))
-        marks.append(fig.Rule(at, "y", color=fig.MARK, dash="dotted"))
-        x_axis = fig.Axis(label=AMPLITUDE.label, is_log=True)
-        y_axis = fig.Axis(label=quantity.label, range=(0.0, None))
-        panels.append(fig.Panel(name=quantity.words, marks=tuple(marks), x=x_axis, y=y_axis))
+    data = result.over_amplitude
+    damping = data.damping_ratio.copy(data=without_rounding(data.damping_ratio.values))
+    data = data.assign(damping_ratio=damping)
+    at = fig.Rule(float(AMPLITUDE.values(result.amplitude)), "y", color=fig.MARK, dash="dotted")
+    panels = []
+    for name in ("frequency", "damping_ratio"):
+        x, y = {"is_log": True}, {"range": (0.0, None)}
+        curves = chart.panel(data, "amplitude", [name], x=x, y=y, by="mode", key=_mode_of)
+        panels.append(replace(chart.between((), curves, at), name=quantity_of(data[name]).words))
     return fig.Figure(panels=fig.in_grid(panels, 2), height=310.0)
+
+
+def _mode_of(part: xr.Dataset, _: str) -> str:
+    return str(part.mode.values[0])
 
 
 def shapes_figure(modes: list[Mode], outlines: Mapping[str, Outline]) -> fig.Figure:

@@ -5,7 +5,7 @@ import numpy as np
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import number
-from wm_drake.report.quantity import SPEED, Quantity
+from wm_drake.report.quantity import SPEED, Quantity, of_measure
 
 UNDAMPED = 1e-9
 """Damping ratio below which a mode has no damping but errors of rounding."""
@@ -30,7 +30,7 @@ DAMPING_CHANGE = Quantity("change of the damping ratio in 0.01 for 1 % more")
 CRITICAL_SPEED = Quantity("speed", SPEED.unit, 1)
 ORDER = Quantity("order", form="{:g}×".format)
 AMPLITUDE = Quantity("amplitude", MM, form="{:g}".format)
-SMALLEST_GAP = Quantity("smallest gap", MM, 2)
+SMALLEST_GAP = of_measure("smallest_gap")
 PARTICIPATION = Quantity("participation", PERCENT, 0)
 STRAIN_ENERGY = Quantity("strain energy", PERCENT, 1)
 DISSIPATION = Quantity("dissipation", PERCENT, 1)

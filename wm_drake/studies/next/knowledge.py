@@ -11,17 +11,17 @@ from pathlib import Path
 
 import numpy as np
 
-from wm_drake.errors import InputError, input_error, problems_at
+from wm_drake.errors import input_error, problems_at
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
-from wm_drake.parameters import MachineParameters, apply, located
+from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.csv_files import finite_numbers, read_csv, read_header
-from wm_drake.parameters.free import FreeFile, load_free
 from wm_drake.parameters.types import FloatArray
-from wm_drake.studies.calibrate.parameter_map import ParameterMap, parameter_map_of
+from wm_drake.parameters.vary_file import VARY_FILES, load_vary
+from wm_drake.studies.calibrate.parameter_map import ParameterMap, read_parameter_map
 from wm_drake.studies.inputs import existing_file
-from wm_drake.studies.tolerance.distributions import Joint, normal
-from wm_drake.studies.tolerance.variables import UncertainMachine
+from wm_drake.studies.tolerance.variables import joint_of
+from wm_drake.studies.vary import in_vary_file, varying_of
 
 
 @dataclass(frozen=True)
@@ -44,53 +44,31 @@ class Knowledge:
     about: str
 
 
-def of_tolerances(machine: Machine, uncertain: UncertainMachine, about: str) -> Knowledge:
-    """Return what a tolerance file says; its laundry is drawn at each run and not measured.
+def of_file(machine: Machine, name: str) -> Knowledge:
+    """Return what the distributions of a vary file say.
+
+    Laundry and loads are drawn at each run and not measured, so they are left out.
 
     Args:
-        machine: Built machine with the parts of `uncertain`.
+        machine: The built machine.
+        name: Name of a shipped file, or path of one.
 
     Raises:
-        InputError: nothing but laundry scatters.
+        InputError: nothing but laundry varies, or a number has no distribution.
     """
-    kept = [k for k, variable in enumerate(uncertain.variables) if not variable.is_of_load]
-    if not kept:
+    path, file = VARY_FILES.path(name), load_vary(name)
+    entries = file.entries(without=("loads.", "laundry."))
+    if not entries:
         raise input_error(
-            "only the laundry scatters, which no measurement makes sure; allowed is a file with "
-            "quantities of the machine, such as unmeasured",
-            where="--tolerances",
+            "only the laundry varies, which no measurement makes sure; allowed is a file with "
+            "numbers of the machine, such as unmeasured",
+            where="--vary",
         )
-    variations = [uncertain.variables[k].variation for k in kept]
-    factor = uncertain.joint.factor
-    if factor is not None:
-        correlation = factor @ factor.T
-        factor = np.asarray(np.linalg.cholesky(correlation[np.ix_(kept, kept)]))
-    joint = Joint(tuple(uncertain.joint.marginals[k] for k in kept), factor)
-
-    def machine_of(values: FloatArray) -> MachineParameters:
-        return apply(uncertain.parameters, variations, values.tolist())
-
-    names = tuple(variation.name for variation in variations)
-    return Knowledge(machine, names, joint.values, machine_of, about)
-
-
-def of_free_file(machine: Machine, path: Path) -> Knowledge:
-    """Return what the priors of a free file say, each truncated at its bounds."""
-    parameters = _map(machine, path)
-    joint = Joint(
-        tuple(
-            normal(mean, deviation, low, high)
-            for mean, deviation, low, high in zip(
-                parameters.expected,
-                parameters.deviation,
-                parameters.lower,
-                parameters.upper,
-                strict=True,
-            )
-        )
-    )
-
-    return _of_map(parameters, joint.values, f"priors of {path.name}")
+    with in_vary_file(path, file):
+        varying = varying_of(machine, entries, file.known)
+        joint = joint_of(varying, file.correlations)
+    built = build_machine(varying.machine)
+    return Knowledge(built, varying.names, joint.values, varying.machine_at, path.stem)
 
 
 def of_calibration(
@@ -110,32 +88,35 @@ def of_calibration(
     def values(scores: FloatArray) -> FloatArray:
         return np.clip(point + scores @ root.T, parameters.lower, parameters.upper)
 
-    return _of_map(parameters, values, "posterior of a calibration")
+    machine, names = build_machine(parameters.base), tuple(parameters.names)
+    about = "posterior of a calibration"
+    return Knowledge(machine, names, values, parameters.parameters_at, about)
 
 
-def of_calibration_folder(machine: Machine, free: Path, folder: Path) -> Knowledge:
+def of_calibration_folder(machine: Machine, name: str, folder: Path) -> Knowledge:
     """Return what the results of `wm-drake calibrate` in a folder say.
 
     Args:
-        free: Free file of the calibration.
+        name: Name or path of the vary file of the calibration.
 
     Raises:
-        InputError: the folder has no such results, or other quantities than the free file.
+        InputError: the folder has no such results, or other numbers than the file.
     """
-    parameters = _map(machine, free)
+    path = VARY_FILES.path(name)
+    parameters = read_parameter_map(machine, path, load_vary(name))
     estimates, of_pairs = (folder / f"{name}.csv" for name in ("estimates", "correlations"))
     with problems_at("--calibrated"):
         table = read_csv(estimates, read_header(existing_file(estimates, "")))
         columns = {"unknown", "value", "deviation"}
         if not columns <= set(table) or table["unknown"].tolist() != parameters.names:
             raise input_error(
-                f"'{folder}' does not have the quantities of {free.name}; allowed is the folder of "
-                "a calibration with this free file"
+                f"'{folder}' does not have the quantities of {path.name}; allowed is the folder of "
+                "a calibration with this file"
             )
         labels = [unknown.unit.label for unknown in parameters.unknowns]
         if "unit" in table and table["unit"].fillna("").tolist() != labels:
             raise input_error(
-                f"the values in '{folder}' have other units than the free file; allowed are those "
+                f"the values in '{folder}' have other units than the file; allowed are those "
                 "of a calibration with --units si"
             )
         numbers = finite_numbers(table[["value", "deviation"]], estimates)
@@ -145,19 +126,3 @@ def of_calibration_folder(machine: Machine, free: Path, folder: Path) -> Knowled
     point, deviation = (column / units for column in numbers.T)
     covariance = correlation * np.outer(deviation, deviation)
     return of_calibration(parameters, point, covariance)
-
-
-def _of_map(
-    parameters: ParameterMap, values: Callable[[FloatArray], FloatArray], about: str
-) -> Knowledge:
-    """Return what is known of the quantities of a free file."""
-    machine, names = build_machine(parameters.base), tuple(parameters.names)
-    return Knowledge(machine, names, values, parameters.parameters_at, about)
-
-
-def _map(machine: Machine, path: Path) -> ParameterMap:
-    free: FreeFile = load_free(existing_file(path, "--free"))
-    try:
-        return parameter_map_of(machine, free)
-    except InputError as error:
-        raise located(error, path) from None

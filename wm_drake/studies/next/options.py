@@ -11,20 +11,17 @@ class NextOptions(Options):
     machine: str = option(
         "reference", "Name of a shipped machine, or machine file.", "MACHINE", "argument"
     )
-    free: Path | None = option(
-        None, "What is known: priors of a free file, as of wm-drake calibrate.", "FILE"
+    vary: str | None = option(
+        None,
+        "What is known: the distributions of a shipped vary file, or of a YAML file. Default: "
+        "unmeasured, which fits any machine.",
+        "NAME|FILE",
     )
     calibrated: Path | None = option(
         None,
-        "Folder with results of wm-drake calibrate, of this machine and the file of --free: what "
+        "Folder with results of wm-drake calibrate, of this machine and the file of --vary: what "
         "is known after it.",
         "FOLDER",
-    )
-    tolerances: str | None = option(
-        None,
-        "What is known: shipped tolerance file, or a YAML file. Default: unmeasured, which fits "
-        "any machine.",
-        "NAME|FILE",
     )
     answers: tuple[str, ...] = option(
         ("gap",),

@@ -8,11 +8,11 @@ import xarray as xr
 from wm_drake.report import figure as fig
 from wm_drake.report.formatting import listed
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import quantity_of
+from wm_drake.report.quantity import SHARE, quantity_of
+from wm_drake.simulation.measures.responses import GAP
 from wm_drake.studies.answer import Answer, Part, Plot
 from wm_drake.studies.next.study import (
     NEAR_LINEAR,
-    SHARE,
     Model,
     least_gain,
     pairs_of,
@@ -191,7 +191,7 @@ def _plot(one: xr.Dataset) -> Plot:
     for step, place in enumerate(places.tolist()):
         text = f"{_interval(one, step)}"
         marks.append(fig.Text(float(high[step]), place, text, across="left", shift=(10.0, 0.0)))
-    if quantity.words.startswith("smallest gap"):
+    if one.answer.item() == GAP:
         marks.append(fig.Rule(0.0, "y", color=fig.MARK))
     names = ["now", *(f"{k}. {w}" for k, w in enumerate(one.words.values[1:].tolist(), start=1))]
     reach = float(high.max() - low.min())

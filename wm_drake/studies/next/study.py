@@ -29,8 +29,7 @@ import xarray as xr
 
 from wm_drake.errors import input_error
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Share
-from wm_drake.report.quantity import HIDDEN, Quantity
+from wm_drake.report.quantity import HIDDEN, SHARE, Quantity
 from wm_drake.studies.next.measurements import CandidateMeasurement
 from wm_drake.studies.next.question import Question, quantities_of
 
@@ -59,7 +58,6 @@ measurement says something."""
 MOST_PAIRS = 10
 """Number of pairs that are shown."""
 
-SHARE = Quantity("share", Share(), 0)
 COST = Quantity("cost", form="{:g}".format)
 
 

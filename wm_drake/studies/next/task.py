@@ -1,7 +1,6 @@
 """Check the options of the study of what to measure next, and run it."""
 
 from collections.abc import Callable, Collection, Sequence
-from pathlib import Path
 from typing import Any
 
 from wm_drake.errors import InputError, input_error, problems_at
@@ -23,12 +22,7 @@ from wm_drake.studies.answer import Answer, Part
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.inputs import problems_of_file, profile_of
-from wm_drake.studies.next.knowledge import (
-    Knowledge,
-    of_calibration_folder,
-    of_free_file,
-    of_tolerances,
-)
+from wm_drake.studies.next.knowledge import Knowledge, of_calibration_folder, of_file
 from wm_drake.studies.next.measurements import CandidateMeasurement, measurements_of
 from wm_drake.studies.next.options import NextOptions
 from wm_drake.studies.next.page import BLOCK, next_answer, next_part
@@ -36,14 +30,12 @@ from wm_drake.studies.next.question import Question
 from wm_drake.studies.next.study import model_of
 from wm_drake.studies.run import machine_text
 from wm_drake.studies.study import Task
-from wm_drake.studies.tolerance.options import ToleranceOptions
-from wm_drake.studies.tolerance.task import ToleranceTask
 
 FEW, BLOCK_BUDGET = 32, 2
 """Drawn machines and measurements of the block for another page."""
 
 UNMEASURED = "unmeasured"
-"""Shipped tolerance file of what is known of any machine."""
+"""Shipped vary file: what is known of any machine."""
 
 
 class NextTask(Task):
@@ -52,7 +44,6 @@ class NextTask(Task):
     def __init__(self, options: NextOptions, machine: Machine) -> None:
         """Read what is known and what could be measured."""
         self.options = options
-        check_sources(options)
         path = CANDIDATES.path(options.candidates)
         self.file = load_candidates(options.candidates)
         with problems_of_file(path):
@@ -138,33 +129,14 @@ def with_candidates(parameters: MachineParameters, file: CandidateFile) -> Machi
     return parameters.model_copy(update=changes)
 
 
-def check_sources(options: NextOptions) -> None:
-    """Check that the options say in one way what is known.
-
-    Raises:
-        InputError: they contradict each other, or one is missing.
-    """
-    if options.free is not None and options.tolerances is not None:
-        raise input_error("is given beside --free; allowed is one of them", where="--tolerances")
-    if options.calibrated is not None and options.free is None:
-        message = "needs the free file of the calibration; add --free FILE"
-        raise input_error(message, where="--calibrated")
-
-
 def knowledge_of(options: NextOptions, machine: Machine) -> Knowledge:
     """Return what the options say is known."""
-    if options.free is None:
-        return tolerances_of(options.tolerances or UNMEASURED, machine, options.profile)
     if options.calibrated is None:
-        return of_free_file(machine, options.free)
-    return of_calibration_folder(machine, options.free, options.calibrated)
-
-
-def tolerances_of(file: str, machine: Machine, profile: Path | None) -> Knowledge:
-    """Return what a tolerance file says of a machine."""
-    few = ToleranceOptions(file=file, samples=16, sensitivity=0, subset=0, profile=profile)
-    task = ToleranceTask(few, machine)
-    return of_tolerances(task.machine, task.uncertain, f"tolerances {file}")
+        return of_file(machine, options.vary or UNMEASURED)
+    if options.vary is None:
+        message = "needs the vary file of the calibration; add --vary FILE"
+        raise input_error(message, where="--calibrated")
+    return of_calibration_folder(machine, options.vary, options.calibrated)
 
 
 def cases_of(parameters: MachineParameters, profile: SpinProfile) -> tuple[Case, ...]:

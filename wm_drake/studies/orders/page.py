@@ -19,11 +19,12 @@ MAP_COLUMNS = 400
 """Largest number of columns of an order map."""
 
 
-def orders_answer(maps: xr.Dataset) -> Answer:
+def orders_answer(maps: xr.Dataset, source: str) -> Answer:
     """Return the answer of the study.
 
     Args:
         maps: As of `orders_of` in `wm_drake.studies.orders.study`.
+        source: Name of the file.
     """
     unit = quantity_of(maps.amplitude).unit_text
     plots = tuple(
@@ -43,14 +44,14 @@ def orders_answer(maps: xr.Dataset) -> Answer:
         "Largest amplitude of some orders; empty where the samples do not resolve the order.",
     )
     return Answer(
-        f"Orders of {maps.attrs['source']}",
+        f"Orders of {source}",
         summary(maps),
         None,
         (
             Part("Waterfall and order map", plots),
             Part("Largest orders", (largest, LabelledTable("orders", at_orders_shown(maps)))),
         ),
-        (("File", maps.attrs["source"]),),
+        (("File", source),),
         files={"orders.nc": netcdf_bytes(_without_quantities(maps[["amplitude"]]))},
     )
 

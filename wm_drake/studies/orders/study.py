@@ -64,11 +64,11 @@ def read_signals(path: Path, names: ChannelNames | None = None, unit: str = "") 
     angle, turning = _angle(channels.values["speed"], channels.time, path)
     values = {word: np.where(turning, channels.values[word] / factor, np.nan) for word in used}
     unit_read = Unit(shown.replace(" ", "*"), shown.replace(" ", "*"))
-    return _signals(path, unit_read, channels.time, angle, values)
+    return _signals(unit_read, channels.time, angle, values)
 
 
 def _signals(
-    path: Path, unit: Unit, time: FloatArray, angle: FloatArray, values: Mapping[str, FloatArray]
+    unit: Unit, time: FloatArray, angle: FloatArray, values: Mapping[str, FloatArray]
 ) -> xr.Dataset:
     """Return the dataset of `read_signals`; `values` has the signals by name."""
     columns = np.stack(list(values.values()), axis=1)
@@ -78,7 +78,6 @@ def _signals(
             "drum_angle": Quantity("angle of the drum", Unit("rad", "deg")).variable("time", angle),
         },
         {"time": TIME.variable("time", time), "signal": list(values)},
-        {"source": path.name},
     )
 
 
@@ -95,7 +94,7 @@ def _of_record(path: Path) -> xr.Dataset:
     if len(even.time) != len(channels.time):
         raise input_error("its time has gaps", where=str(path))
     values = {name: even.values[name] for name in names}
-    return _signals(path, Unit("m", "mm"), even.time, even.values[""], values)
+    return _signals(Unit("m", "mm"), even.time, even.values[""], values)
 
 
 def _speed_and_signals(recording: Recording) -> tuple[Signal, dict[str, Signal]]:
@@ -170,11 +169,12 @@ def _angle(speed: FloatArray, time: FloatArray, path: Path) -> tuple[FloatArray,
     return cumulative_trapezoid(filled, time, initial=0.0), known
 
 
-def orders_of(signals: xr.Dataset, highest: float) -> xr.Dataset:
+def orders_of(signals: xr.Dataset, highest: float, source: str) -> xr.Dataset:
     """Return order map and frequency map of signals.
 
     Args:
         signals: As of `read_signals`.
+        source: Name of the file, for messages.
 
     Returns:
         Over `time` [s], `order` and `signal`: `amplitude`, with the drum speed of each time as the
@@ -186,7 +186,7 @@ def orders_of(signals: xr.Dataset, highest: float) -> xr.Dataset:
             its samples resolve no order.
     """
     time, angle = signals.time.values, signals.drum_angle.values
-    source, amplitude = signals.attrs["source"], quantity_of(signals.value)
+    amplitude = quantity_of(signals.value)
     orders = order_map(signals.value.values, angle, time, highest=highest)
     if not orders.sizes["time"]:
         turns = abs(angle[-1] - angle[0]) / (2.0 * np.pi)
@@ -212,7 +212,6 @@ def orders_of(signals: xr.Dataset, highest: float) -> xr.Dataset:
             "frequency": FREQUENCY.variable("frequency", spectra.frequency.values),
             "spectrum_speed": SPEED.variable("spectrum_time", speed),
         },
-        {"source": source},
     )
 
 

@@ -16,9 +16,10 @@ class OrdersTask(Task):
         """Read the file."""
         file = existing_file(options.file, "FILE")
         names, unit = channel_names(options)
-        self.signals = read_signals(file, names, unit)
+        self.signals, self.source = read_signals(file, names, unit), file.name
         self.highest = options.highest
 
     def run(self, executor: Executor) -> Answer:  # noqa: ARG002
         """Compute the maps."""
-        return orders_answer(orders_of(self.signals, self.highest))
+        maps = orders_of(self.signals, self.highest, self.source)
+        return orders_answer(maps, self.source)

@@ -1,14 +1,14 @@
 """Quantities of the steady response: words, unit and digits of each, once."""
 
 from wm_drake.parameters.units import Unit
-from wm_drake.report.quantity import SPEED, Quantity
+from wm_drake.report.quantity import SPEED, Quantity, of_measure
 from wm_drake.simulation.mounts import KINDS
 
 MM, NEWTON = Unit("m", "mm"), Unit("N", "N")
 
 AMPLITUDE = Quantity("amplitude", MM, 1)
 FORCE = Quantity("force", NEWTON, 1)
-GAP = Quantity("smallest gap", MM, 1)
+GAP = of_measure("smallest_gap")
 LARGEST_AT = SPEED.named("largest at")
 MULTIPLIER = Quantity("largest multiplier")
 RUN_SPEED = Quantity("speed in the run", SPEED.unit, 0)

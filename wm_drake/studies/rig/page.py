@@ -31,15 +31,19 @@ METHOD = (
 
 
 def rig_answer(
-    run: RigRun, measures: xr.Dataset, masses: xr.Dataset | None, beyond: Sequence[str]
+    run: RigRun,
+    measures: xr.Dataset,
+    masses: xr.Dataset | None,
+    beyond: Sequence[str],
+    verdict: str,
 ) -> Answer:
     """Return the answer of a bench test.
 
     Args:
-        measures: As of `measures_data` in `wm_drake.studies.rig.study`; with errors that [A]
-            prints, the attribute `verdict` is a sentence on them.
+        measures: As of `measures_data` in `wm_drake.studies.rig.study`.
         masses: As of `effect_of_masses` there; None without masses.
         beyond: Sentences on tables that the motions leave.
+        verdict: Sentence on the errors that [A] prints; "" without.
     """
     derived = LabelledTable(
         "measures",
@@ -48,7 +52,7 @@ def rig_answer(
         "Quantities derived from each loop. Energy: area of the loop. Equivalent damping: "
         "coefficient of the viscous damper that dissipates the same energy per cycle. Dynamic "
         "stiffness and loss angle: amplitude ratio and phase lead of the fundamental of the force "
-        f"with respect to the motion. {measures.attrs.get('verdict', '')}".strip(),
+        f"with respect to the motion. {verdict}".strip(),
         is_in_terminal=True,
     )
     key, value, source = zip(*run.numbers, strict=True)

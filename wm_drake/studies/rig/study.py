@@ -8,8 +8,8 @@ import pandas as pd
 import xarray as xr
 
 from wm_drake.parameters.components import COMPONENTS_FOLDER
-from wm_drake.parameters.units import Share, Unit
-from wm_drake.report.quantity import TIME, Quantity
+from wm_drake.parameters.units import Unit
+from wm_drake.report.quantity import SHARE, TIME, Quantity
 from wm_drake.rigs import Bench, BushingBench, ForceLoop, Harmonic, RigRun
 from wm_drake.studies.rig.quantities import LINEAR, loop_quantities
 
@@ -22,7 +22,7 @@ DRIVEN_MASS = Quantity("mass at the driven end", Unit("kg", "kg"), form="{:g}".f
 ENERGY = Quantity("energy per cycle", Unit("J", "mJ"))
 LOSS_ANGLE = Quantity("loss angle", Unit("rad", "deg"), 1)
 RMSE_OF_A = Quantity("RMSE in [A]", decimals=4)
-CHANGE = Quantity("largest difference by peak", Share(), form="{:.2g}".format)
+BY_PEAK = SHARE.named("largest difference by peak", form="{:.2g}".format)
 
 WITHIN = "[A] calls all of them within 10 % of the largest force"
 VERDICTS = {
@@ -127,7 +127,7 @@ def effect_of_masses(run: RigRun, massless: RigRun) -> xr.Dataset:
         "peak_force": (load.named("peak force"), np.abs(loops).max(axis=1)),
         "rms_difference": (load.named("root mean square of the difference"), rms),
         "largest_difference": (load.named("largest difference"), largest),
-        "largest_difference_by_peak": (CHANGE, by_peak),
+        "largest_difference_by_peak": (BY_PEAK, by_peak),
     }
     return xr.Dataset({name: q.variable("loop", values) for name, (q, values) in numbers.items()})
 

@@ -81,14 +81,15 @@ class RigTask(Task):
         numbers = _numbers(self.component)
         with executor.progress(len(self.motions), "loops") as progress:
             run = run_rig(self.title, self.bench, self.motions, numbers, progress)
-        measures, masses = measures_data(run), None
+        measures, masses, verdict = measures_data(run), None, ""
         if self.is_of_a:
             errors = printed_errors(self.kind, self.bench, self.motions)
             measures["printed_rmse"] = RMSE_OF_A.variable("loop", errors)
-            measures.attrs["verdict"] = printed_verdict(self.kind, self.bench)
+            verdict = printed_verdict(self.kind, self.bench)
         if self.massless is not None:
             masses = effect_of_masses(run, run_rig(self.title, self.massless, self.motions))
-        return rig_answer(run, measures, masses, beyond_tables(self.bench, self.motions))
+        beyond = beyond_tables(self.bench, self.motions)
+        return rig_answer(run, measures, masses, beyond, verdict)
 
 
 def _motions(kind: str, bench: Bench, options: RigOptions) -> list[Harmonic]:

@@ -13,14 +13,20 @@ from wm_drake.parameters.measured import EXPERIMENT
 from wm_drake.report import figure as fig
 from wm_drake.report.formatting import MISSING, listed
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import SPEED, Quantity, of_measure, quantity_of
+from wm_drake.report.quantity import CHANGE, SHARE, SPEED, Quantity, of_measure, quantity_of
 from wm_drake.report.table import readable
 from wm_drake.simulation.displacements import envelopes, smooth_envelope
 from wm_drake.simulation.measures.registry import tabulated
 from wm_drake.simulation.records import Record
 from wm_drake.studies.answer import Answer, Part, Plot
 from wm_drake.studies.spin import figures
-from wm_drake.studies.spin.data import CHANGE, DISPLACEMENT, amplitudes_of, experiment_of, rows_of
+from wm_drake.studies.spin.data import (
+    DIFFERENCE,
+    DISPLACEMENT,
+    amplitudes_of,
+    experiment_of,
+    rows_of,
+)
 from wm_drake.studies.spin.page import Files, spin_answer
 from wm_drake.studies.spin.study import GAP, CaseResult, SpinRuns, band_text
 
@@ -61,7 +67,7 @@ LARGE_STEADY = 1e-3
 An assumption: a part of a smaller one is below what can be seen on a tub.
 """
 
-STEADY_CHANGE = Quantity("difference", CHANGE.unit, 1)
+STEADY_CHANGE = SHARE.named("difference", decimals=1)
 STEADY_SIZE = Quantity("difference", DISPLACEMENT.unit, 2)
 
 
@@ -149,7 +155,7 @@ def differences_of(variants: Variants, references: Mapping[str, str]) -> xr.Data
     return rows_of(
         dict(zip(("load", "measure", "of", "unit"), zip(*keys, strict=True), strict=True)),
         value=Quantity("value").variable(dims, values),
-        change=CHANGE.variable(dims, (values - reference) / size),
+        change=DIFFERENCE.variable(dims, (values - reference) / size),
         measured_change=CHANGE.named("measured difference").variable(dims, of_keys),
     ).assign_coords(variant=names)
 
@@ -164,7 +170,7 @@ def _numbers(runs: SpinRuns) -> dict[tuple[str, str, str, str], float]:
         if window := steady_window(case.case.profile):
             steady = steady_amplitudes(case.record, window)
             speed = SPEED.text(abs(case.case.profile.speed_at(window[1])))
-            shown[f"{STEADY}{speed}"] = steady.assign_attrs(of_measure("amplitude").attributes())
+            shown[f"{STEADY}{speed}"] = of_measure("amplitude").on(steady)
         for words, array in shown.items():
             quantity = quantity_of(array)
             labels = itertools.product(*(map(str, array[dim].values) for dim in array.dims))
@@ -253,7 +259,7 @@ def summary(variants: Variants, data: xr.Dataset) -> str:
 
 
 def _of_variant(name: str, runs: SpinRuns) -> str:
-    ended = [case for case in runs.results if not case.record.attrs["diverged"]]
+    ended = [case for case in runs.results if not case.diverged]
     if not ended:
         return f"Every run of {name} diverged."
     amplitude = max(float(case.measures.amplitude.fillna(0.0).max()) for case in ended)

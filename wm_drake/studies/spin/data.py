@@ -9,9 +9,9 @@ import xarray as xr
 from wm_drake.parameters import measured_amplitudes
 from wm_drake.parameters.measured import BAND, EXPERIMENT
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Share, Unit
-from wm_drake.report.formatting import percent, shape_name
-from wm_drake.report.quantity import SPEED, TIME, Quantity, of_measure
+from wm_drake.parameters.units import Unit
+from wm_drake.report.formatting import shape_name
+from wm_drake.report.quantity import CHANGE, MASS, SHARE, SPEED, TIME, Quantity, of_measure
 from wm_drake.simulation.mount_forces import mount_forces, rms_table, speed_ranges
 from wm_drake.simulation.vibration import sensor_accelerations
 from wm_drake.studies.spin.study import CaseResult, SpinRuns, band_text
@@ -28,8 +28,7 @@ TORQUE = Quantity("torque", Unit("N*m", "N*m"), 2)
 ACCELERATION = Quantity("acceleration", Unit("m/s^2", "m/s^2"), 2)
 ANGLE = Quantity("angle", Unit("rad", "deg"), 1)
 PLACE = Quantity("place", MM, 0)
-MASS = Quantity("mass", Unit("kg", "kg"), 3)
-CHANGE = Quantity("difference", Share(), form=lambda value: percent(value).removesuffix(" %"))
+DIFFERENCE = CHANGE.named("difference")
 """Relative difference from a reference, [B] Eq. (1); its text has the sign."""
 
 
@@ -49,7 +48,7 @@ def amplitudes_of(runs: SpinRuns) -> xr.Dataset:
     measured = measured_amplitudes(runs.parameters)
     labels, bands, sizes = list[tuple[str, str, str]](), list[str](), list[FloatArray]()
     for case in runs.results:
-        name, gasket = case.case.name, case.record.attrs["gasket"]
+        name, gasket = case.case.name, case.gasket
         of_case = measured[(measured["load"] == name) & (measured["gasket"] == gasket)]
         for row in of_case.to_dict("records") if runs.is_compared(case) else ():
             labels.append((name, gasket, row["source"]))
@@ -67,7 +66,7 @@ def amplitudes_of(runs: SpinRuns) -> xr.Dataset:
 
 def row_of(data: xr.Dataset, case: CaseResult, source: str) -> xr.Dataset | None:
     """Return the row of a case and source of `amplitudes_of` or `differences_of`; None without."""
-    labels = {"load": case.case.name, "gasket": case.record.attrs["gasket"], "source": source}
+    labels = {"load": case.case.name, "gasket": case.gasket, "source": source}
     rows = np.logical_and.reduce([data[name].values == label for name, label in labels.items()])
     if not rows.any():
         return None
@@ -103,9 +102,9 @@ def differences_of(amplitudes: xr.Dataset) -> xr.Dataset:
     values = amplitudes.amplitude.values
     difference = values[rows] / values[references] - 1.0
     kept = amplitudes.isel(row=rows).drop_vars(["amplitude", BAND])
-    mean = Quantity("mean absolute difference", Share(), 0)
+    mean = SHARE.named("mean absolute difference")
     return kept.assign(
-        difference=CHANGE.variable(("row", "sensor"), difference),
+        difference=DIFFERENCE.variable(("row", "sensor"), difference),
         mean_absolute=mean.variable("row", np.abs(difference).mean(axis=1)),
     )
 
@@ -194,7 +193,7 @@ def loads_of(runs: SpinRuns) -> xr.Dataset:
     every = [mass for _, mass in masses]
     return rows_of(
         {"load": [label for label, _ in masses]},
-        mass=MASS.variable("row", [mass.mass for mass in every]),
+        mass=MASS.named("mass", decimals=3).variable("row", [mass.mass for mass in every]),
         radius=DISPLACEMENT.named("radius").variable("row", [mass.radius for mass in every]),
         y=DISPLACEMENT.named("y").variable("row", [mass.y for mass in every]),
         phase=ANGLE.named("phase").variable("row", [mass.phase for mass in every]),
@@ -226,10 +225,10 @@ def about_runs(runs: SpinRuns) -> xr.Dataset:
     seconds = Quantity("computing time", TIME.unit, 2)
     return xr.Dataset(
         {
-            "gasket": ("load", [case.record.attrs["gasket"] for case in cases]),
+            "gasket": ("load", [case.gasket for case in cases]),
             "engine": ("load", [runs.engine] * len(cases)),
             "band": ("load", [band_text(case).replace("–", " to ") for case in cases]),
-            "diverged": ("load", [case.record.attrs["diverged"] for case in cases]),
+            "diverged": ("load", [case.diverged for case in cases]),
             "wall": seconds.variable("load", [case.wall_s for case in cases]),
         },
         {"load": runs.labels},

@@ -8,10 +8,9 @@ import xarray as xr
 from wm_drake.elements.motor import evaluate_motor, packed_limit
 from wm_drake.parameters.drive import motor_of
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Share
 from wm_drake.report import figure as fig
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import SPEED, TIME, Quantity, of_measure
+from wm_drake.report.quantity import SHARE, SPEED, TIME, Quantity, of_measure
 from wm_drake.simulation.drive import CAPTURE_LAG, CAPTURE_TIME, over_revolutions
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.records import profile_of
@@ -70,7 +69,7 @@ def drive_table(runs: SpinRuns, *, is_motor: bool) -> LabelledTable:
         "with its speed; largest power; work over the run. Ripple: largest difference between "
         "highest and lowest speed in a revolution, in parts of the mean, from 60 rpm on. Caught: "
         f"mean speed and torque of a drum that stays for {CAPTURE_TIME:g} s or longer more than "
-        f"{Quantity('', Share()).text(CAPTURE_LAG)} below the wanted speed (Sommerfeld effect)."
+        f"{SHARE.text(CAPTURE_LAG)} below the wanted speed (Sommerfeld effect)."
     )
     data, marked = drive_data(runs.measures), ("is_caught", "alarm")
     return LabelledTable("drive", data, "Drive", caption, marked=marked, is_in_terminal=is_motor)

@@ -18,7 +18,7 @@ from wm_drake.simulation.displacements import (
     orbit_window,
 )
 from wm_drake.simulation.outputs import point_positions
-from wm_drake.simulation.records import Record
+from wm_drake.simulation.records import Record, rest_pose_of
 from wm_drake.studies.spin.data import DISPLACEMENT, FORCE, MOMENT, PLACE
 from wm_drake.studies.spin.study import GAP
 
@@ -165,9 +165,7 @@ def gaps_figure(gaps: xr.Dataset) -> fig.Figure:
 
 def axis_path(record: Record, y: float) -> FloatArray:
     """Return the displacement from rest of the drum-axis point at depth y. (n, 3) [m]"""
-    at_rest = point_positions(
-        np.asarray(record.attrs["rest_pose"])[None, :], np.array([[0.0, y, 0.0]])
-    )[:, 0]
+    at_rest = point_positions(rest_pose_of(record)[None, :], np.array([[0.0, y, 0.0]]))[:, 0]
     return axis_motion(record, y) - at_rest
 
 

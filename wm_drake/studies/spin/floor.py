@@ -62,7 +62,7 @@ def floor_warnings(runs: SpinRuns) -> list[str]:
     warnings = []
     for case in runs.results:
         feet = case.measures.feet
-        if feet is None or case.record.attrs["diverged"]:
+        if feet is None or case.diverged:
             continue
         if case.measures.walk is not None:
             warnings += walk_warning(case)

@@ -14,7 +14,7 @@ from wm_drake.parameters.plausibility import unusual_numbers
 from wm_drake.report.formatting import slack_warning
 from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.page import versions_of
-from wm_drake.report.quantity import SPEED, Quantity
+from wm_drake.report.quantity import CHANGE, SHARE, SPEED, Quantity
 from wm_drake.report.table import readable
 from wm_drake.simulation.balance import rings_of
 from wm_drake.simulation.displacements import have_one_orbit
@@ -25,7 +25,6 @@ from wm_drake.studies.answer import Answer, Part, Plot, WritesFile
 from wm_drake.studies.modes.page import natural_modes_table
 from wm_drake.studies.spin import figures
 from wm_drake.studies.spin.data import (
-    CHANGE,
     DISPLACEMENT,
     FORCE,
     MOMENT,
@@ -252,7 +251,7 @@ def _inputs_part(runs: SpinRuns) -> Part:
 
 def summary(runs: SpinRuns, amplitudes: xr.Dataset) -> str:
     """Return one paragraph about the cases that reached their end."""
-    ended = [case for case in runs.results if not case.record.attrs["diverged"]]
+    ended = [case for case in runs.results if not case.diverged]
     count, diverged = len(runs.results), len(runs.results) - len(ended)
     cases = "1 case was" if count == 1 else f"{count} cases were"
     speed = SPEED.text(max(case.case.profile.highest_speed for case in runs.results))
@@ -322,7 +321,7 @@ def _agreement(runs: SpinRuns, cases: list[CaseResult], amplitudes: xr.Dataset) 
     if not compared.size:
         return _why_not_compared(runs)
     worst = compared[int(np.abs(compared.values).argmax())]
-    mean = Quantity("", CHANGE.unit, 0).text(abs(compared).mean())
+    mean = SHARE.text(abs(compared).mean())
     return (
         f"{compared.size} amplitudes can be compared with the experiment. The mean absolute "
         f"difference is {mean}. The largest difference is {CHANGE.text(worst)}, at sensor "

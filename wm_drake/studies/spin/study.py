@@ -21,13 +21,12 @@ from wm_drake.model.machine import Machine
 from wm_drake.model.scene import Scene
 from wm_drake.parameters import MachineParameters, Sensor
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Unit
-from wm_drake.report.quantity import SPEED, STEP, TIME, Quantity
+from wm_drake.report.quantity import SPEED, STEP, TIME, of_measure
 from wm_drake.simulation.cases import Case, is_as_measured
 from wm_drake.simulation.convergence import Accuracy
 from wm_drake.simulation.displacements import band_of, largest_motion
 from wm_drake.simulation.measures import MEASURES, Measures, measure
-from wm_drake.simulation.records import Record, sample_period
+from wm_drake.simulation.records import Record, sample_period, why_diverged
 
 if TYPE_CHECKING:
     from wm_drake.studies.modes.study import NaturalModes
@@ -50,7 +49,17 @@ class CaseResult:
     @property
     def has_gasket(self) -> bool:
         """Whether the case was run with the gasket."""
-        return bool(self.record.attrs["gasket"] == "yes")
+        return self.gasket == "yes"
+
+    @property
+    def gasket(self) -> str:
+        """Whether it was run with the gasket: yes or no."""
+        return str(self.record.attrs["gasket"])
+
+    @property
+    def diverged(self) -> str:
+        """Time and reason if the run diverged, else ""."""
+        return why_diverged(self.record)
 
     @property
     def title(self) -> str:
@@ -83,7 +92,7 @@ class CaseResult:
         return float(np.interp(time, self.record.time.values, self.record.drum_speed.values))
 
 
-GAP = Quantity("smallest gap", Unit("m", "mm"), 1)
+GAP = of_measure("smallest_gap")
 
 
 def gap_size(distance: float) -> str:
@@ -156,11 +165,7 @@ class SpinRuns:
 
     def failures(self) -> tuple[str, ...]:
         """Return a line for each case that diverged."""
-        return tuple(
-            f"{case.case.name}: {case.record.attrs['diverged']}"
-            for case in self.results
-            if case.record.attrs["diverged"]
-        )
+        return tuple(f"{case.case.name}: {case.diverged}" for case in self.results if case.diverged)
 
 
 def _of_parts(case: CaseResult) -> xr.Dataset:

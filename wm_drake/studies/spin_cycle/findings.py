@@ -7,9 +7,9 @@ import xarray as xr
 
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.unbalance_cases import UnbalanceCase
-from wm_drake.parameters.units import Share, Unit
+from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import listed, slack_warning
-from wm_drake.report.quantity import Quantity, text_of
+from wm_drake.report.quantity import SHARE, Quantity, text_of
 from wm_drake.simulation.feet import MARGINS
 from wm_drake.simulation.spring_tension import slack_springs
 from wm_drake.simulation.vibration import MOST_MISSING
@@ -17,8 +17,8 @@ from wm_drake.studies.answer import diverged_runs
 from wm_drake.studies.spin.study import gap_size
 from wm_drake.studies.spin_cycle.study import (
     ERROR,
+    GRAMS,
     INTEGRATED,
-    MASS,
     PHASE,
     average_errors,
     disagreement,
@@ -33,7 +33,7 @@ LARGE_DISAGREEMENT = 0.01
 def case_description(case: UnbalanceCase) -> str:
     """Return the masses and the phase of a case, for example `400 g at the front`."""
     masses = [
-        f"{MASS.text(mass)} {where}"
+        f"{GRAMS.text(mass)} {where}"
         for mass, where in ((case.front, "at the front"), (case.rear, "at the rear"))
         if mass > 0.0
     ]
@@ -123,7 +123,7 @@ def missing_warnings(computed: xr.DataArray, measured: xr.DataArray) -> list[str
     return [
         f"The errors leave regions out, which have no measured value or were not completed by the "
         f"run: {'; '.join(parts)}. A record counts for a region if at most "
-        f"{Quantity('', Share(), 0).text(MOST_MISSING)} of it is missing at its end."
+        f"{SHARE.text(MOST_MISSING)} of it is missing at its end."
     ]
 
 
@@ -147,7 +147,7 @@ def _imperfections(parameters: MachineParameters) -> list[str]:
     """Return a sentence for each imperfection of a machine."""
     texts, faults = [], parameters.imperfections
     if faults.residual_imbalance.mass > 0.0:
-        mass = Quantity("", MASS.unit, 1).text(faults.residual_imbalance.mass)
+        mass = Quantity("", GRAMS.unit, 1).text(faults.residual_imbalance.mass)
         texts.append(f"The drum has a residual imbalance of {mass}.")
     if faults.phase_error != 0.0:
         angle = Quantity("", PHASE.unit, 1).number(faults.phase_error)

@@ -28,7 +28,7 @@ from wm_drake.studies.spin_cycle.options import SpinCycleDataOptions
 MEASURES = ("regions", "gap", "spring tensions", "mounts", "cabinet")
 """Measures of each run, as for `simulate_many`."""
 
-MASS = Quantity("mass", Unit("kg", "g"), 0)
+GRAMS = Quantity("mass", Unit("kg", "g"), 0)
 PHASE = Quantity("phase", Unit("rad", "deg"), 0)
 ERROR = Quantity("average error", Share(), 1)
 INTEGRATED = Quantity("direct vs. integrated", Share(), 2)
@@ -80,12 +80,12 @@ def run_spin_cycle(
         region_displacement="rms", region_displacement_integrated="rms_from_acceleration"
     )
     for name in ("rms", "rms_from_acceleration"):
-        data[name].attrs |= RMS.attributes()
+        data[name] = RMS.on(data[name])
     published = [case.published_error_percent for case in cases]
     errors = ERROR.to_si([np.nan if error is None else error for error in published])
     labels = {
-        "front": MASS.named("front mass").variable("case", [case.front for case in cases]),
-        "rear": MASS.named("rear mass").variable("case", [case.rear for case in cases]),
+        "front": GRAMS.named("front mass").variable("case", [case.front for case in cases]),
+        "rear": GRAMS.named("rear mass").variable("case", [case.rear for case in cases]),
         "phase": PHASE.variable("case", [case.phase for case in cases]),
     }
     data["published_error"] = ERROR.named("average error, [A] Table 9").variable("case", errors)

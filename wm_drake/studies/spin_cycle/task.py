@@ -4,6 +4,7 @@ from functools import partial
 from typing import Any
 
 from wm_drake.model.machine import Machine
+from wm_drake.studies.answer import Answer
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import runnable_profile
 from wm_drake.studies.spin_cycle.measured import DIMS, RMS
@@ -15,7 +16,7 @@ from wm_drake.studies.spin_cycle.study import (
     measures_of,
     run_spin_cycle,
 )
-from wm_drake.studies.study import Result, Task
+from wm_drake.studies.study import Task
 
 
 class SpinCycleTask(Task):
@@ -35,7 +36,7 @@ class SpinCycleTask(Task):
         """Return what determines the runs."""
         return {"profile": self.profile}
 
-    def run(self, executor: Executor) -> Result:
+    def run(self, executor: Executor) -> Answer:
         """Run all cases."""
         parameters = self.machine.parameters
         measures = measures_of(parameters)

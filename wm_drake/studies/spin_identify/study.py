@@ -15,6 +15,7 @@ from wm_drake.parameters import MachineParameters, SpinProfile
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.unbalance_cases import UnbalanceCase
 from wm_drake.parameters.units import Share
+from wm_drake.parameters.vary import Entry
 from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.calibrate.blocks import Block, BlockModel
@@ -57,7 +58,7 @@ def unknowns_of(parameters: MachineParameters, texts: Sequence[str]) -> tuple[So
             "of this machine",
             where="--unknown",
         )
-    return tuple(sought_of(parameters, keys) for keys in TABLE_8)
+    return tuple(sought_of(parameters, "+".join(keys), Entry(keys=keys)) for keys in TABLE_8)
 
 
 def planted_values(sought: Sequence[Sought], seed: int) -> FloatArray:

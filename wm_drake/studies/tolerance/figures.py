@@ -7,9 +7,8 @@ import numpy as np
 import xarray as xr
 
 from wm_drake.report import figure as fig
-from wm_drake.report.quantity import quantity_of, shown
+from wm_drake.report.quantity import SHARE, quantity_of, shown
 from wm_drake.studies.tolerance.shares import band_of
-from wm_drake.studies.tolerance.study import WHOLE_SHARE
 
 MOST_POINTS = 400
 """Largest number of points of a curve."""
@@ -17,7 +16,7 @@ MOST_POINTS = 400
 MOST_STEPS = 5
 """Number of heights at which the loads are drawn, so that their names do not overlap."""
 
-BELOW = WHOLE_SHARE.named("runs below")
+BELOW = SHARE.named("runs below")
 
 
 def distributions_figure(measures: xr.Dataset, limits: Mapping[str, Sequence[float]]) -> fig.Figure:

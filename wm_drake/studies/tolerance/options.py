@@ -10,7 +10,7 @@ class ToleranceOptions(Options):
 
     file: str = option(
         "laundry",
-        "Shipped tolerance file (laundry, heavy_laundry, laundry_and_parts), or a YAML file.",
+        "Shipped vary file (laundry, heavy_laundry, laundry_and_parts), or a YAML file.",
         "NAME|FILE",
         "argument",
     )

@@ -6,10 +6,12 @@ import numpy as np
 import xarray as xr
 
 from wm_drake.parameters import MachineParameters
+from wm_drake.parameters.limits import Limit
 from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import MISSING, listed
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import Quantity, quantity_of, text_of
+from wm_drake.report.quantity import SHARE, Quantity, quantity_of, text_of
+from wm_drake.simulation.measures.responses import Response
 from wm_drake.studies.answer import Answer, Part, Plot
 from wm_drake.studies.tolerance.figures import distributions_figure, gap_figure, sobol_figure
 from wm_drake.studies.tolerance.study import (
@@ -17,12 +19,13 @@ from wm_drake.studies.tolerance.study import (
     GAP_SIZE,
     SMALLEST_GAP,
     SUBSET,
-    WHOLE_SHARE,
     ToleranceTrials,
+    judged,
     laundry_masses,
     name_of,
     statistics_of,
 )
+from wm_drake.studies.tolerance.variables import distribution_text
 
 MOST_PANELS = 9
 """Largest number of distributions in one figure."""
@@ -53,25 +56,26 @@ def tolerance_answer(
     samples: xr.Dataset,
     indices: xr.Dataset,
     contact: xr.Dataset,
-    limits: xr.Dataset,
+    limits: Sequence[tuple[Limit, Response, float]],
 ) -> Answer:
     """Return the answer of the study.
 
     Args:
-        samples, indices, contact, limits: As of `ToleranceTrials` and `judged` in
+        samples, indices, contact, limits: As of `ToleranceTrials` and `limits_of` in
             `wm_drake.studies.tolerance.study`.
     """
+    kept = judged(samples, limits)
     measures = samples[[name_of(response) for response in trials.chosen]]
     machine, settings = trials.uncertain.parameters, trials.settings
     count = int(np.sum(samples.failed.values != ""))
     return Answer(
         f"Tolerances of machine {machine.name}",
-        " ".join(summary(trials, indices, contact, limits)),
+        " ".join(summary(trials, indices, contact, kept)),
         machine,
         (
             *_distributions(trials, samples, measures, limits, contact),
             _causes(trials, indices),
-            Part("Limits", _limits(trials, limits)),
+            Part("Limits", _limits(trials, kept)),
             _contact(contact),
             Part("Distributions in numbers", _statistics(measures)),
             Part("Sobol indices", _indices(trials, indices)),
@@ -105,7 +109,7 @@ def contact_sentences(contact: xr.Dataset) -> list[str]:
     """Return sentences about how often the tub touches, and where."""
     if contact.probability == 0.0:
         sentence = (
-            f"The tub touches the housing in none of {contact.attrs['samples']} runs, so in at "
+            f"The tub touches the housing in none of {text_of(contact.samples)} runs, so in at "
             f"most {text_of(contact.probability_upper)} of all such runs (with 95 % confidence)."
         )
     else:
@@ -120,7 +124,7 @@ def probability(contact: xr.Dataset) -> str:
         return f"0 to {upper} of the runs (95 % confidence; none was seen)"
     how = "estimated by a search for rare contact"
     if contact.method == CRUDE:
-        how = f"{text_of(contact.touching)} of {contact.attrs['samples']} runs"
+        how = f"{text_of(contact.touching)} of {text_of(contact.samples)} runs"
     ends = f"{text_of(contact.probability_lower)} to {text_of(contact.probability_upper)}"
     return f"{text_of(contact.probability)} of the runs (95 % interval {ends}; {how})"
 
@@ -130,14 +134,14 @@ def _where(contact: xr.Dataset) -> list[str]:
     if contact.method == SUBSET and contact.rare_touches.any():
         share, begin = contact.rare_touches, "of the runs that touch do so"
     elif contact.touches.any():
-        share = contact.touches * contact.attrs["samples"] / contact.touching
+        share = contact.touches * contact.samples / contact.touching
         begin = "of the runs that touch do so"
     else:
         share, begin = contact.nearest, "of the runs have the smallest gap"
     if not share.any():
         return []
     at = int(share.argmax("pair"))
-    return [f"{WHOLE_SHARE.text(share[at])} {begin} at {pair_words(contact.isel(pair=at))}."]
+    return [f"{SHARE.text(share[at])} {begin} at {pair_words(contact.isel(pair=at))}."]
 
 
 def pair_words(pair: xr.Dataset) -> str:
@@ -151,7 +155,7 @@ def rare_sentences(contact: xr.Dataset) -> str:
         return ""
     steps = ", ".join(map(GAP_SIZE.text, contact.threshold.values))
     text = (
-        f"Of {contact.attrs['samples']} samples {text_of(contact.touching)} touch, too few to "
+        f"Of {text_of(contact.samples)} samples {text_of(contact.touching)} touch, too few to "
         f"count. Subset simulation took {text_of(contact.rare_runs)} runs in "
         f"{contact.sizes['level'] + 1} levels. Each level holds the tenth of the runs with the "
         f"smallest gaps of the level before: at most {steps}"
@@ -186,7 +190,8 @@ def leading(indices: xr.Dataset) -> xr.Dataset | None:
 def _sensitivity_sentences(trials: ToleranceTrials, indices: xr.Dataset) -> list[str]:
     of = leading(indices)
     if of is None:
-        return [indices.attrs["refused"]] if indices.attrs["refused"] else []
+        reason = trials.why_missing(indices)
+        return [reason] if reason else []
     parts = [v.name for v in trials.uncertain.variables if not v.is_of_load]
     tightened = _named(trials, of.sel(quantity=of["quantity"].isin(parts)))
     what = "nothing; only the load scatters in this file"
@@ -201,10 +206,10 @@ def _sensitivity_sentences(trials: ToleranceTrials, indices: xr.Dataset) -> list
 
 def _named(trials: ToleranceTrials, of: xr.Dataset) -> str:
     """Return the quantities with the largest total indices, and these; "" if all are small."""
-    words = {v.name: v.quantity.words for v in trials.uncertain.variables}
+    words = trials.uncertain.words
     of = of.isel(quantity=of.total.values >= LEAST_TOTAL).isel(quantity=slice(MOST_NAMED))
     pairs = zip(of["quantity"].values.tolist(), of.total.values, strict=True)
-    return ", ".join(f"{words[name]} ({WHOLE_SHARE.text(total)})" for name, total in pairs)
+    return ", ".join(f"{words[name]} ({SHARE.text(total)})" for name, total in pairs)
 
 
 def _title(trials: ToleranceTrials, of: xr.Dataset) -> str:
@@ -297,8 +302,8 @@ def warnings(
             f"Only {text_of(contact.touching)} runs touch; more samples, or --subset, make the "
             "interval narrower."
         )
-    if indices.attrs["refused"] and trials.settings.sensitivity:
-        texts.append(indices.attrs["refused"])
+    if trials.settings.sensitivity and (reason := trials.why_missing(indices)):
+        texts.append(reason)
     if indices:
         wide = (indices.total_upper - indices.total_lower > 2.0 * WIDE_INTERVAL).any("quantity")
         if wide.any():
@@ -313,11 +318,13 @@ def _distributions(
     trials: ToleranceTrials,
     samples: xr.Dataset,
     measures: xr.Dataset,
-    limits: xr.Dataset,
+    limits: Sequence[tuple[Limit, Response, float]],
     contact: xr.Dataset,
 ) -> tuple[Part, Part]:
     """Return the smallest gap beside the loads of the machine, and the other measures."""
-    numbers, pictures = limits.attrs.get("numbers", {}), []
+    numbers, pictures = dict[str, list[float]](), []
+    for _, response, number in limits:
+        numbers.setdefault(name_of(response), []).append(number)
     gap: list[Plot | LabelledTable] = []
     if SMALLEST_GAP in measures and measures.smallest_gap.notnull().sum() > 1:
         caption = (
@@ -355,12 +362,12 @@ def _causes(trials: ToleranceTrials, indices: xr.Dataset) -> Part:
             "intervals. A total index above the first-order index is an effect together with "
             "other quantities."
         )
-        words = {v.name: v.quantity.words for v in trials.uncertain.variables}
+        words = trials.uncertain.words
         names = [words[name] for name in of["quantity"].values.tolist()]
         each = zip(names, of.total, strict=True)
         texts = ", ".join(f"{name} {text_of(total)}" for name, total in each)
         plots = [Plot(sobol_figure(of, names), f"Total indices: {texts}.", caption)]
-    return Part("What causes the scatter", plots, indices.attrs["refused"])
+    return Part("What causes the scatter", plots, trials.why_missing(indices))
 
 
 def _limits(trials: ToleranceTrials, limits: xr.Dataset) -> tuple[LabelledTable, ...]:
@@ -435,7 +442,7 @@ def _indices(trials: ToleranceTrials, indices: xr.Dataset) -> tuple[LabelledTabl
     """Return the Sobol indices; on the page the total ones, a column for each quantity."""
     if not indices:
         return ()
-    words = {v.name: v.quantity.words for v in trials.uncertain.variables} | _titles(trials)
+    words = trials.uncertain.words | _titles(trials)
     caption = (
         "Total Sobol indices of all measures. First-order indices and 95 % intervals are in "
         "sobol.csv."
@@ -451,10 +458,10 @@ def _quantities(trials: ToleranceTrials) -> LabelledTable:
     """Return what scatters."""
     variables = trials.uncertain.variables
     texts = {
-        "what": [v.quantity.words for v in variables],
-        "keys": [", ".join(v.variation.keys) or "load" for v in variables],
-        "distribution": [v.text for v in variables],
-        "source": [v.source or MISSING for v in variables],
+        "what": list(trials.uncertain.words.values()),
+        "keys": [", ".join(v.keys) or v.name for v in variables],
+        "distribution": [distribution_text(v) for v in variables],
+        "source": [v.entry.source or MISSING for v in variables],
     }
     return LabelledTable(
         "quantities",

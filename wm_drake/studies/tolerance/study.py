@@ -8,11 +8,10 @@ import numpy as np
 import xarray as xr
 
 from wm_drake.errors import InputError, Problem, input_error
-from wm_drake.parameters.tolerances import LAUNDRY, Limit, fraction
+from wm_drake.parameters.limits import Limit, fraction
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Share, Unit
 from wm_drake.report.formatting import shape_name, significant
-from wm_drake.report.quantity import Quantity
+from wm_drake.report.quantity import SHARE, Quantity, of_measure
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures.responses import GAP, Response
 from wm_drake.studies.experiment import Experiment, responses
@@ -26,7 +25,7 @@ from wm_drake.studies.tolerance.shares import (
     percentile_of,
     share_of,
 )
-from wm_drake.studies.tolerance.variables import UncertainMachine
+from wm_drake.studies.tolerance.variables import UncertainMachine, quantity_of
 
 RARE = 1e-3
 """Share of runs with contact below which it is estimated by subset simulation."""
@@ -94,14 +93,12 @@ SMALLEST_GAP = "smallest_gap"
 PLACES = ("nearest_pair", "contact_gap")
 """Variables of the table of runs that tell where the tub touches."""
 
-PERCENT = Share()
-SHARE = Quantity("share", PERCENT, form=lambda value: significant(value, 3 if value >= 10.0 else 2))
+OF_RUNS = SHARE.named("share", form=lambda value: significant(value, 3 if value >= 10.0 else 2))
 """Share of runs, with two significant digits, three from 10 % on."""
-LIMIT_SHARE = Quantity("share", PERCENT, form=lambda value: significant(value, 3))
-WHOLE_SHARE = Quantity("share", PERCENT, 0)
+OF_LIMIT = SHARE.named("share", form=lambda value: significant(value, 3))
 COUNT = Quantity("runs", decimals=0)
 INDEX = Quantity("index", decimals=2)
-GAP_SIZE = Quantity("smallest gap", Unit("m", "mm"), 1)
+GAP_SIZE = of_measure("smallest_gap")
 
 
 def name_of(response: Response) -> str:
@@ -146,7 +143,7 @@ class ToleranceTrials:
 
     Attributes:
         chosen: What is measured of each run.
-        about: Description in the tolerance file.
+        about: Description in the vary file.
     """
 
     uncertain: UncertainMachine
@@ -181,7 +178,7 @@ class ToleranceTrials:
         data = self.runs(self.scores[0], "samples")
         values = self.uncertain.joint.values(self.scores[0])
         pairs = zip(self.uncertain.variables, values.T, strict=True)
-        drawn = {v.name: v.quantity.variable("sample", column) for v, column in pairs}
+        drawn = {v.name: quantity_of(v).variable("sample", column) for v, column in pairs}
         places = data[[name for name in PLACES if name in data]]
         return places.assign(drawn).assign(self.measures(data)).assign(failed=data.diverged)
 
@@ -199,13 +196,11 @@ class ToleranceTrials:
         Returns:
             Over `measure` and `quantity`: `first`, the share of the variance that the quantity
             causes alone, `total`, alone and together with others, and the ends of their 95 %
-            intervals, `first_lower` and so on. Attribute `refused`: why those of some or all
-            measures are missing, "" if none is.
+            intervals, `first_lower` and so on; without those that `why_missing` tells.
         """
         count, (a, b) = self.settings.sensitivity, self.scores
         if not count or self.uncertain.joint.factor is not None:
-            why = CORRELATED if count else "Sobol indices were not requested (--sensitivity 0)."
-            return xr.Dataset(attrs={"refused": why})
+            return xr.Dataset()
         names = [variable.name for variable in self.uncertain.variables]
         scores = exchanged(a[:count], b[:count]).reshape(len(names) + 1, count, -1)
         # runs of one sample follow each other: those that differ in the laundry share a machine
@@ -218,8 +213,6 @@ class ToleranceTrials:
             indices = sobol_indices(at_a, at_others.values.T.ravel(), seed=self.settings.seed)
             if indices is not None:
                 estimated[name] = [vars(index) for index in indices]
-        missing = ", ".join(name for name in data if name not in estimated)
-        reason = f"No Sobol indices of {missing}: a run failed, or the measure does not vary."
         return xr.Dataset(
             {
                 part: INDEX.named(words).variable(
@@ -229,8 +222,19 @@ class ToleranceTrials:
                 if estimated
             },
             {"measure": list(estimated), "quantity": names},
-            {"refused": reason if missing else ""},
         )
+
+    def why_missing(self, indices: xr.Dataset) -> str:
+        """Return why Sobol indices of some or all measures are missing; "" if none is."""
+        if not self.settings.sensitivity:
+            return "Sobol indices were not requested (--sensitivity 0)."
+        if self.uncertain.joint.factor is not None:
+            return CORRELATED
+        names = [name_of(response) for response in self.chosen]
+        missing = ", ".join(name for name in names if name not in indices["measure"].values)
+        if not missing:
+            return ""
+        return f"No Sobol indices of {missing}: a run failed, or the measure does not vary."
 
     def contact(self, samples: xr.Dataset) -> xr.Dataset:
         """Return how often the tub touches. A run that failed counts as contact.
@@ -245,7 +249,7 @@ class ToleranceTrials:
             Over `pair`, the most frequent first: as of `pairs_of`. With a subset simulation: over
             `level`, its `threshold` [m]; `rare_runs`, `rare_smallest` gap of the last level [m],
             `rare_deviation`, the coefficient of variation, and over `pair` `rare_touches`, share of
-            its contacts. Attribute `samples`: their number. Empty without shapes.
+            its contacts. `samples`: their number. Empty without shapes.
         """
         if not samples.sizes.get("pair", 0):
             return xr.Dataset()
@@ -266,14 +270,14 @@ class ToleranceTrials:
         }
         pairs = xr.Dataset(
             {
-                **{name: SHARE.named(w).variable((), v) for name, (w, v) in named.items()},
+                **{name: OF_RUNS.named(w).variable((), v) for name, (w, v) in named.items()},
                 "method": ((), method),
                 "touching": COUNT.named("samples that touch").variable((), crude.count),
                 **pairs_of(samples),
                 **more,
+                "samples": COUNT.named("samples").variable((), samples.sizes["sample"]),
             },
             {"pair": samples["pair"].values},
-            {"samples": samples.sizes["sample"]},
         )
         seen = pairs.touches + pairs.nearest + pairs.get("rare_touches", 0.0) > 0.0
         order = np.lexsort((-pairs.nearest.values, -pairs.touches.values))
@@ -284,7 +288,7 @@ class ToleranceTrials:
         loads, profile = self.uncertain.parameters.loads, self.uncertain.case.profile
         cases = (Case(name, load, profile) for name, load in loads.items())
         gaps = self.experiment.over({"load": list(loads)}, cases, "loads").smallest_gap
-        return gaps.assign_attrs(GAP_SIZE.attributes())
+        return GAP_SIZE.on(gaps)
 
     def _gaps(self, scores: FloatArray) -> FloatArray:
         """Return the smallest gap at scores; NaN where a run failed. [m]"""
@@ -307,10 +311,8 @@ class ToleranceTrials:
                 (), rare.evaluations
             ),
             "rare_smallest": GAP_SIZE.variable((), rare.smallest),
-            "rare_deviation": WHOLE_SHARE.named("coefficient of variation").variable(
-                (), rare.deviation
-            ),
-            "rare_touches": WHOLE_SHARE.named(words).variable("pair", touches),
+            "rare_deviation": SHARE.named("coefficient of variation").variable((), rare.deviation),
+            "rare_touches": SHARE.named(words).variable("pair", touches),
         }
 
 
@@ -356,7 +358,9 @@ def pairs_of(samples: xr.Dataset) -> dict[str, xr.Variable]:
             name: xr.Variable("pair", list(map(shape_name, of)), Quantity(words).attributes())
             for name, (words, of) in texts.items()
         },
-        **{name: SHARE.named(w).variable("pair", values) for name, (w, values) in numbers.items()},
+        **{
+            name: OF_RUNS.named(w).variable("pair", values) for name, (w, values) in numbers.items()
+        },
     }
 
 
@@ -394,10 +398,9 @@ def judged(measures: xr.Dataset, limits: Sequence[tuple[Limit, Response, float]]
     Returns:
         Over `row`: `quantity`, `limit`, `allowed` share, share that `breaks` it with the ends of
         its 95 % interval, `lower` and `upper`, and `verdict`: "pass" if the whole interval is
-        allowed, "fail" if none of it is, else "undecided". Attribute `numbers`: limits by measure.
-        [SI]
+        allowed, "fail" if none of it is, else "undecided".
     """
-    rows, numbers = [], dict[str, list[float]]()
+    rows = []
     for limit, response, number in limits:
         values = measures[name_of(response)].values
         allowed = fraction(limit.allowed_share, "allowed_share")
@@ -409,7 +412,6 @@ def judged(measures: xr.Dataset, limits: Sequence[tuple[Limit, Response, float]]
         )
         words = (limit.quantity, f"{side} {response.unit.reading(number)}", word)
         rows.append((*words, allowed, broken.estimate, broken.lower, broken.upper))
-        numbers.setdefault(name_of(response), []).append(number)
     if not rows:
         return xr.Dataset()
     columns = dict(zip(LIMIT_COLUMNS, zip(*rows, strict=True), strict=True))
@@ -417,16 +419,15 @@ def judged(measures: xr.Dataset, limits: Sequence[tuple[Limit, Response, float]]
     return xr.Dataset(
         {
             **{name: ("row", list(columns[name])) for name in ("quantity", "limit")},
-            **{n: LIMIT_SHARE.named(w).variable("row", columns[n]) for n, w in heads.items()},
+            **{n: OF_LIMIT.named(w).variable("row", columns[n]) for n, w in heads.items()},
             "verdict": ("row", list(columns["verdict"])),
-        },
-        attrs={"numbers": numbers},
+        }
     )
 
 
 def laundry_masses(samples: xr.Dataset) -> tuple[float, float] | None:
     """Return the smallest and largest mass of the laundry of samples [kg]; None without it."""
-    if f"{LAUNDRY}.mass" not in samples:
+    if "laundry.mass" not in samples:
         return None
-    masses = samples[f"{LAUNDRY}.mass"]
+    masses = samples["laundry.mass"]
     return float(masses.min()), float(masses.max())

@@ -4,19 +4,12 @@ from collections.abc import Sequence
 from typing import Any
 
 from wm_drake.engines.compiled.step_check import check_step
-from wm_drake.errors import problems_at
-from wm_drake.model.bodies import with_sdf_values
+from wm_drake.errors import input_error, problems_at
 from wm_drake.model.build import build_machine
-from wm_drake.model.key_patterns import keys_like
 from wm_drake.model.machine import Machine
-from wm_drake.parameters.tolerances import (
-    TOLERANCES,
-    Limit,
-    Tolerances,
-    check_load,
-    load_limits,
-    load_tolerances,
-)
+from wm_drake.parameters import MachineParameters, SpinProfile
+from wm_drake.parameters.limits import Limit, load_limits
+from wm_drake.parameters.vary_file import VARY_FILES, VaryFile, check_loads, load_vary
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.measures.responses import Response, chosen_responses, has_gap, measures_of
@@ -24,7 +17,7 @@ from wm_drake.simulation.steps import checked_step
 from wm_drake.studies.answer import Answer
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.experiment import Experiment
-from wm_drake.studies.inputs import existing_file, problems_of_file, profile_of
+from wm_drake.studies.inputs import existing_file, profile_of
 from wm_drake.studies.run import machine_text
 from wm_drake.studies.study import Task
 from wm_drake.studies.tolerance.options import ToleranceOptions
@@ -34,24 +27,24 @@ from wm_drake.studies.tolerance.study import (
     DEFAULT,
     ToleranceSettings,
     ToleranceTrials,
-    judged,
     limits_of,
 )
 from wm_drake.studies.tolerance.variables import UncertainMachine, uncertain_machine
+from wm_drake.studies.vary import in_vary_file, varying_of
 
 
 class ToleranceTask(Task):
     """The study with checked options."""
 
     def __init__(self, options: ToleranceOptions, machine: Machine) -> None:
-        """Read tolerances and limits, and check the uncertain quantities at their ends."""
+        """Read numbers and limits, and check the uncertain numbers at their ends."""
         sensitivity = options.sensitivity
         if sensitivity is None:
             sensitivity = min(512, options.samples)
         self.settings = ToleranceSettings(
             options.samples, sensitivity, options.subset, options.seed
         )
-        self.tolerances = matched(load_tolerances(options.file), machine)
+        self.file = load_vary(options.file)
         limits: tuple[Limit, ...] = ()
         if options.limits is not None:
             limits = load_limits(existing_file(options.limits, "--limits"))
@@ -63,19 +56,12 @@ class ToleranceTask(Task):
     def _uncertain(
         self, options: ToleranceOptions, machine: Machine
     ) -> tuple[Machine, UncertainMachine]:
-        """Return the built machine and its uncertain quantities, checked at their ends."""
-        parameters, tolerances = machine.parameters, self.tolerances
-        spin = profile_of(parameters, options.profile)
-        path = TOLERANCES.path(options.file)
-        check_load(tolerances, parameters, path)
-        load = next(iter(parameters.loads.values()))
-        if tolerances.load:
-            load = parameters.loads[tolerances.load]
-        keys = [key for quantity in tolerances.quantities.values() for key in quantity.keys]
-        with problems_of_file(path):
-            full = with_sdf_values(machine.drawn.plant, parameters, keys)
-            case = Case(tolerances.load or "laundry", load, spin)
-            uncertain = uncertain_machine(full, tolerances, case)
+        """Return the built machine and its uncertain numbers, checked at their ends."""
+        spin = profile_of(machine.parameters, options.profile)
+        with in_vary_file(VARY_FILES.path(options.file), self.file):
+            case = sampled_case(machine.parameters, self.file, spin)
+            varying = varying_of(machine, self.file.entries(without=()), self.file.known)
+            uncertain = uncertain_machine(varying, self.file, case)
             built = build_machine(uncertain.parameters)
             step = checked_step(uncertain.parameters, None)
             uncertain.check(lambda case: check_step(built.set_up(parameters=case.parameters), step))
@@ -86,7 +72,7 @@ class ToleranceTask(Task):
         """Return what determines the runs."""
         return {
             "machine": machine_text(self.uncertain.parameters),
-            "tolerances": self.tolerances,
+            "tolerances": self.file,
             "profile": self.uncertain.case.profile,
             "measures": ", ".join(self.measures),
             "seed": str(self.settings.seed),
@@ -95,7 +81,7 @@ class ToleranceTask(Task):
     def trials(self, executor: Executor) -> ToleranceTrials:
         """Return the runs of the uncertain machine."""
         experiment = Experiment(self.machine, self.measures, executor.simulate)
-        about = self.tolerances.about
+        about = self.file.about
         return ToleranceTrials(self.uncertain, self.responses, experiment, self.settings, about)
 
     def run(self, executor: Executor) -> Answer:
@@ -105,25 +91,23 @@ class ToleranceTask(Task):
         indices, contact = trials.indices(samples), trials.contact(samples)
         if contact:
             contact = contact.assign(gap_of_load=trials.gaps_of_loads())
-        limits = judged(samples, self.limits)
-        return tolerance_answer(trials, samples, indices, contact, limits)
+        return tolerance_answer(trials, samples, indices, contact, self.limits)
 
 
-def matched(tolerances: Tolerances, machine: Machine) -> Tolerances:
-    """Return tolerances with the keys of a machine in place of patterns with *.
+def sampled_case(parameters: MachineParameters, file: VaryFile, profile: SpinProfile) -> Case:
+    """Return the case that samples change: a load of the machine, or any if laundry is drawn.
 
-    A quantity of which no pattern fits a number of the machine is left out.
+    Raises:
+        InputError: the file has neither laundry nor one load of the machine.
     """
-    keys = {
-        name: tuple(dict.fromkeys(k for key in quantity.keys for k in keys_like(machine, key)))
-        for name, quantity in tolerances.quantities.items()
-    }
-    quantities = {
-        name: quantity.model_copy(update={"keys": keys[name]})
-        for name, quantity in tolerances.quantities.items()
-        if keys[name]
-    }
-    return tolerances.model_copy(update={"quantities": quantities})
+    check_loads(file, parameters)
+    if file.has_laundry:
+        return Case("laundry", next(iter(parameters.loads.values())), profile)
+    if len(file.loads) != 1:
+        named = ", ".join(file.loads or parameters.loads)
+        message = f"samples need one load, or laundry; write 'loads: NAME' with one of {named}"
+        raise input_error(message, key="loads")
+    return Case(file.loads[0], parameters.loads[file.loads[0]], profile)
 
 
 def _measures(

@@ -16,7 +16,7 @@ class VerdictOptions(Options):
     )
     laundry: str = option(
         "laundry",
-        "What scatters beside the loads of the machine: shipped tolerance file (laundry, "
+        "What scatters beside the loads of the machine: shipped vary file (laundry, "
         "heavy_laundry, laundry_and_parts), or a YAML file.",
         "NAME|FILE",
     )

@@ -143,16 +143,16 @@ def _short(
     if tried.sizes["key"]:
         rows.append(("What decides it", _influences_text(tried.isel(key=slice(MOST_NAMED)))))
     words = {response.name: response.title for response in question.responses}
-    made, why = proposal(question, states, tried), why_text(question, states, tried)
+    made, why = proposal(question, states, tried), why_text(question, tried)
     part = proposal_part(made, why, words, rows)
     word = word_of(question, states, laundry)
     numbers = LabelledTable("numbers", numbers_of(question, states, word))
     return replace(part, shown=(*part.shown, numbers))
 
 
-def why_text(question: VerdictQuestion, states: xr.Dataset, tried: xr.Dataset) -> str:
+def why_text(question: VerdictQuestion, tried: xr.Dataset) -> str:
     """Return why a change is proposed, in a sentence."""
-    keys = list(states.attrs["changes"])
+    keys = list(question.changes)
     if keys:
         return f"Smallest gap with each changed alone: {_influences_text(tried.sel(key=keys))}."
     change = FACTOR.text(question.change)

@@ -5,8 +5,9 @@ time, more and less; the best ones are then combined one after the other, as lon
 rule of `wm_drake.studies.proposal` chooses among them.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -15,26 +16,25 @@ from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.elements import CurveTable
 from wm_drake.parameters.keys import quantities
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Share, Unit
+from wm_drake.parameters.units import Share
 from wm_drake.parameters.variation import value_at
 from wm_drake.report.formatting import shape_name, three_digits
-from wm_drake.report.quantity import Quantity
+from wm_drake.report.quantity import CHANGE, Quantity, of_measure
 from wm_drake.simulation.measures.kind import Better
 from wm_drake.simulation.measures.responses import Response
 from wm_drake.studies.experiment import Experiment, quantity_of, responses
 from wm_drake.studies.proposal import (
     AFTER,
     BEFORE,
-    CHANGE,
     Aim,
     compared,
     proposal_of,
     worst_of,
 )
 from wm_drake.studies.tolerance.shares import share_of
-from wm_drake.studies.tolerance.study import COUNT, SHARE, crude_ends
+from wm_drake.studies.tolerance.study import COUNT, OF_RUNS, crude_ends
 
-SMALLEST_GAP = Quantity("smallest gap", Unit("m", "mm"), 1)
+SMALLEST_GAP = of_measure("smallest_gap")
 FACTOR = Quantity("factor", Share())
 
 PARTS = ("spring_types", "damper_types", "bushing_types", "gasket")
@@ -64,6 +64,7 @@ class VerdictQuestion:
         responses: Responses that tell what a change costs, and the gap.
         laundry: Description of the random laundry.
         command: Command that gives a verdict on the machine again.
+        changes: Values of the proposed change, as text by key path; empty without a proposal.
     """
 
     machine: MachineParameters
@@ -72,6 +73,14 @@ class VerdictQuestion:
     responses: tuple[Response, ...]
     laundry: str
     command: str
+    changes: Mapping[str, str]
+
+
+class ChangedRuns(NamedTuple):
+    """Runs over `load` with a change of the machine: its values, as text by key path."""
+
+    runs: xr.Dataset
+    changes: Mapping[str, str]
 
 
 def smallest(runs: xr.Dataset) -> xr.DataArray:
@@ -115,8 +124,8 @@ def influences(experiment: Experiment, keys: Iterable[str], change: float) -> xr
 
 def proposed(
     experiment: Experiment, base: xr.Dataset, tried: xr.Dataset, chosen: Sequence[Response]
-) -> xr.Dataset | None:
-    """Return the runs of the proposed change, as of `wm_drake.studies.proposal`.
+) -> ChangedRuns | None:
+    """Return the proposed change, as of `wm_drake.studies.proposal`.
 
     The candidates are the single changes, and the best one with the best additions to it.
 
@@ -127,8 +136,7 @@ def proposed(
         chosen: Responses that a change may not make worse, and the gap.
 
     Returns:
-        Runs over `load`; attribute `changes`, values as text by key path. None if no change is
-        clearly better.
+        None if no change is clearly better.
     """
     goals, parts = goals_of(chosen), [values_of(runs, chosen) for runs in (base, tried)]
     ranges = np.concatenate([part.reshape(-1, len(goals)) for part in parts])
@@ -139,44 +147,44 @@ def proposed(
     value = aim.value(worst.reshape(-1, len(goals))).reshape(worst.shape[:2])
     ranked = np.argsort(-value.max(axis=1), kind="stable")[:MOST_TRIED]
     singles = [tried.isel(key=k, side=value[k].argmax()) for k in ranked.tolist()]
-    runs = [one.assign_attrs(changes={one["key"].item(): one.text.item()}) for one in singles]
-    candidates = [*runs, *_combined(experiment, aim, runs, chosen)]
-    values = np.array([worst_of(values_of(one, chosen), goals) for one in candidates])
-    number = aim.proposed(values, [len(one.attrs["changes"]) for one in candidates])
+    single = [ChangedRuns(one, {one["key"].item(): one.text.item()}) for one in singles]
+    candidates = [*single, *_combined(experiment, aim, single, chosen)]
+    values = np.array([worst_of(values_of(one.runs, chosen), goals) for one in candidates])
+    number = aim.proposed(values, [len(one.changes) for one in candidates])
     return None if number is None else candidates[number]
 
 
 def _combined(
-    experiment: Experiment, aim: Aim, singles: Sequence[xr.Dataset], chosen: Sequence[Response]
-) -> list[xr.Dataset]:
-    """Return the runs of the best single change with each addition, then of the best pair, ...
+    experiment: Experiment, aim: Aim, singles: Sequence[ChangedRuns], chosen: Sequence[Response]
+) -> list[ChangedRuns]:
+    """Return the best single change with each addition, then of the best pair, ...
 
     They end where no addition is better.
 
     Args:
         experiment: Runs of the machine with all loads.
         aim: What a change shall reach.
-        singles: Runs of single changes, the best one first, as of `proposed`.
+        singles: Single changes, the best one first.
         chosen: Responses.
     """
-    best, runs = singles[0], list[xr.Dataset]()
-    useful = {key: text for one in singles for key, text in one.attrs["changes"].items()}
+    best, combined = singles[0], list[ChangedRuns]()
+    useful = {key: text for one in singles for key, text in one.changes.items()}
     for _ in range(MOST_COMBINED - 1):
-        made = best.attrs["changes"]
+        made = best.changes
         more = [{**made, key: text} for key, text in useful.items() if key not in made]
         named = {"; ".join(f"{k}={t}" for k, t in each.items()): each for each in more}
         machines = experiment.allowed(named)
         if not machines:
             break
         data = experiment.at(list(machines), machines.values(), "combinations")
-        added = [data.sel(point=name).assign_attrs(changes=named[name]) for name in machines]
-        values = [worst_of(values_of(one, chosen), aim.goals) for one in (best, *added)]
+        added = [ChangedRuns(data.sel(point=name), named[name]) for name in machines]
+        values = [worst_of(values_of(one.runs, chosen), aim.goals) for one in (best, *added)]
         first, *others = aim.value(np.array(values)).tolist()
-        runs += added
+        combined += added
         if max(others) <= first:
             break
         best = added[int(np.argmax(others))]
-    return runs
+    return combined
 
 
 def goals_of(chosen: Sequence[Response]) -> dict[str, Better]:
@@ -198,7 +206,7 @@ def proposal(question: VerdictQuestion, states: xr.Dataset, tried: xr.Dataset) -
         states: As of `states_of`.
         tried: As of `influences`.
     """
-    chosen, changes = question.responses, states.attrs["changes"]
+    chosen, changes = question.responses, question.changes
     each = {r.name: replace(quantity_of(r), form=three_digits) for r in chosen}
     dims = ("setting", "load", "response")
     labels = {
@@ -219,7 +227,7 @@ def proposal(question: VerdictQuestion, states: xr.Dataset, tried: xr.Dataset) -
     return proposal_of(runs, texts, is_confirmed=bool(changes), command=command)
 
 
-def states_of(base: xr.Dataset, changed: xr.Dataset | None) -> xr.Dataset:
+def states_of(base: xr.Dataset, changed: ChangedRuns | None) -> xr.Dataset:
     """Return the runs of the machine as it is, and with the proposed change, over `state`.
 
     Args:
@@ -227,13 +235,11 @@ def states_of(base: xr.Dataset, changed: xr.Dataset | None) -> xr.Dataset:
         changed: As of `proposed`.
 
     Returns:
-        The states that exist, of `STATES`. Attribute `changes`: values as text by key path, empty
-        without a proposal.
+        The states that exist, of `STATES`.
     """
-    runs = [base] if changed is None else [base, changed]
+    runs = [base] if changed is None else [base, changed.runs]
     alike = [run[[*base.data_vars]].reset_coords(drop=True) for run in runs]
-    states = xr.concat(alike, xr.Variable("state", list(STATES[: len(runs)])))
-    return states.assign_attrs(changes={} if changed is None else changed.attrs["changes"])
+    return xr.concat(alike, xr.Variable("state", list(STATES[: len(runs)])))
 
 
 def laundry_of(samples: Sequence[xr.Dataset], clearance: float) -> xr.Dataset:
@@ -254,9 +260,9 @@ def laundry_of(samples: Sequence[xr.Dataset], clearance: float) -> xr.Dataset:
     numbers = {
         "smallest_gap": (SMALLEST_GAP, gaps.min(axis=1)),
         "count": (COUNT.named("runs with too small a gap"), [share.count for share in shares]),
-        "probability": (SHARE.named("probability"), probability),
-        "lower": (SHARE.named("95 % from"), lower),
-        "upper": (SHARE.named("to"), upper),
+        "probability": (OF_RUNS.named("probability"), probability),
+        "lower": (OF_RUNS.named("95 % from"), lower),
+        "upper": (OF_RUNS.named("to"), upper),
     }
     data = xr.Dataset({name: q.variable("state", values) for name, (q, values) in numbers.items()})
     states = list(STATES[: len(samples)])

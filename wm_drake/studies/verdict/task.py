@@ -16,8 +16,8 @@ from wm_drake.studies.answer import Answer, Part
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.inputs import profile_of, selected_cases
-from wm_drake.studies.next.knowledge import Knowledge
-from wm_drake.studies.next.task import UNMEASURED, next_block, tolerances_of
+from wm_drake.studies.next.knowledge import Knowledge, of_file
+from wm_drake.studies.next.task import UNMEASURED, next_block
 from wm_drake.studies.study import Task
 from wm_drake.studies.tolerance.options import ToleranceOptions
 from wm_drake.studies.tolerance.study import CONTACTS, laundry_masses
@@ -103,15 +103,16 @@ class VerdictTask(Task):
         tried = influences(experiment, changeable(parameters), change)
         changed = proposed(experiment, base, tried, self.responses)
         if changed is not None:
-            better = build_machine(with_values(parameters, changed.attrs["changes"]))
+            better = build_machine(with_values(parameters, changed.changes))
             samples.append(self._laundry(better).trials(executor).samples())
         question = VerdictQuestion(
             parameters,
             self.clearance,
             change,
             self.responses,
-            self.laundry.tolerances.about,
+            self.laundry.file.about,
             self._command,
+            {} if changed is None else changed.changes,
         )
         answer = verdict_answer(
             question,
@@ -124,10 +125,9 @@ class VerdictTask(Task):
 
     def _next(self, executor: Executor) -> Part:
         """Return what to measure next, if the machine is known from drawings and catalogues."""
-        profile = self.options.profile
 
         def known() -> Knowledge:
-            return tolerances_of(UNMEASURED, self.machine, profile)
+            return of_file(self.machine, UNMEASURED)
 
         return next_block(executor, known, _study_next(self.options), self.cases[0].profile)
 
