@@ -5,9 +5,11 @@ Property tests run the same examples every time.
 
 import functools
 import os
+import re
 import shlex
 import sys
 from dataclasses import dataclass
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -103,6 +105,20 @@ def wm_drake(monkeypatch, capsys, tmp_path):
         return CommandResult(ended.value.code or 0, *capsys.readouterr())
 
     return run
+
+
+@pytest.fixture
+def check_refused(wm_drake):
+    """Return a function that checks that a machine file is refused with one message."""
+
+    def check(text, message):
+        Path("mine.yaml").write_text(text, encoding="utf-8")
+        ended = wm_drake("machine check mine.yaml")
+        assert ended.code == 2
+        assert len(ended.messages) <= 2
+        assert re.search(message, ended.err), ended.err
+
+    return check
 
 
 @pytest.fixture

@@ -3,6 +3,8 @@
 import xarray as xr
 
 from wm_drake.batch import simulate_many
+from wm_drake.parameters import with_value
+from wm_drake.simulation.cases import Case
 from wm_drake.simulation.runs import simulate
 
 
@@ -19,3 +21,17 @@ def check_runs_alone(machine, cases):
     for case, record in zip(cases, records, strict=True):
         xr.testing.assert_identical(record, simulate(machine, case))
     return table
+
+
+def cases_with(machine, key, values, profile):
+    """Return a case with the load "middle" for each value of a number of a machine."""
+    parameters = machine.parameters
+    return [
+        Case(
+            f"{value:g}",
+            parameters.loads["middle"],
+            profile,
+            parameters=with_value(parameters, key, value),
+        )
+        for value in values
+    ]

@@ -59,9 +59,7 @@ def mermaid(diagram: Diagram) -> str:
     systems = diagram.GetSystems()
     lines = ["flowchart LR"]
     for system in systems:
-        kind = type(system).__name__.split("_")[0]
-        if hasattr(system, "kind"):  # one system serves elements of all kinds
-            kind = system.kind.title
+        kind = type(system).__name__
         lines.append(
             f'  {system.get_name()}["{system.get_name().replace("_", " ")}<br/><i>{kind}</i>"]'
         )

@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 import wm_drake
-from wm_drake.studies.study import Study
+from wm_drake.registry import edge
+from wm_drake.studies.study import SHIPPED, Study
 
 PACKAGE = Path(wm_drake.__file__).parent
 ORDER = (
@@ -152,6 +153,34 @@ def test_imports_point_upwards():
     assert [
         fault for module in modules() if module[0] != "wm_drake" for fault in faults(*module)
     ] == []
+
+
+def is_edge(name):
+    """Return whether a full name is one of the edge, see `wm_drake/edge.ini`."""
+    return any(f"{name}.".startswith(f"{module}.") for module in edge("modules"))
+
+
+def test_the_core_imports_nothing_of_the_edge():
+    known = [name for name, _, _ in modules()]
+    assert all(module in known for module in edge("modules"))
+    assert [
+        f"{name} imports {target}"
+        for name, source, is_package in modules()
+        if not is_edge(name)
+        for target in imported(name, source, is_package)
+        if is_edge(target)
+    ] == []
+
+
+def test_the_core_registers_nothing_of_the_edge():
+    assert not any(is_edge(f"wm_drake.studies.{place.partition(':')[0]}") for place in SHIPPED)
+    places = [
+        place
+        for group in ("elements", "studies", "blocks")
+        for place in edge(f"wm_drake.{group}").values()
+    ]
+    assert len(places) >= 11
+    assert all(is_edge(place.partition(":")[0]) for place in places)
 
 
 def test_no_modules_import_each_other_in_a_circle():

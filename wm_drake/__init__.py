@@ -42,6 +42,8 @@ _HOMES = {
     "modes": "studies.modes.study",
     "natural_modes": "studies.modes.natural",
     "progress_bar": "report.progress",
+    "PageBlock": "studies.blocks",
+    "register_block": "studies.blocks",
     "register_element": "elements.kind",
     "register_study": "studies.study",
     "register_measure": "simulation.measures",
@@ -57,8 +59,8 @@ _HOMES = {
 }
 
 _FOR_EXTENSIONS = {
-    *("Element", "ElementKind", "Output", "State", "FmuOptions", "Scene"),
-    *("register_element", "register_measure", "register_study", "progress_bar"),
+    *("Element", "ElementKind", "Output", "State", "FmuOptions", "PageBlock", "Scene"),
+    *("register_block", "register_element", "register_measure", "register_study", "progress_bar"),
     *("advance_to", "filtered_displacement", "natural_modes", "run_spin"),
 }
 """Public names that `dir` leaves out: for those who extend the package or look inside a run. They

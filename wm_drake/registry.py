@@ -1,10 +1,17 @@
 """Named declarations that a package of a user can extend: element kinds, measures, studies."""
 
+import configparser
+import functools
 import importlib.metadata
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Generic, Protocol, TypeVar
 
 from wm_drake.errors import WmDrakeError, input_error, nearest_names
+
+EDGE = Path(__file__).with_name("edge.ini")
+"""File with what this package adds to its core, in the form of entry points; the core works without
+it."""
 
 
 class Named(Protocol):
@@ -19,7 +26,7 @@ Declaration = TypeVar("Declaration", bound=Named)
 
 
 class Registry(Mapping[str, Declaration], Generic[Declaration]):
-    """Declarations by name: those of this package, then those that users register.
+    """Declarations by name: those of the core, of the edge (`EDGE`), then those of users.
 
     A user registers a declaration with a function of the public face (`wm_drake.register_element`,
     `register_measure`, `register_study`), or in the metadata of a package with an entry point:
@@ -38,7 +45,7 @@ class Registry(Mapping[str, Declaration], Generic[Declaration]):
         Args:
             word: What a declaration is called in messages, such as "element kind".
             group: Group of entry points.
-            shipped: Declarations of this package, as `module:name`. They are imported at the first
+            shipped: Declarations of the core, as `module:name`. They are imported at the first
                 look-up, because a registry may be in an earlier room than they.
         """
         self._word, self._group, self._shipped = word, group, shipped
@@ -73,7 +80,8 @@ class Registry(Mapping[str, Declaration], Generic[Declaration]):
     def _all(self) -> dict[str, Declaration]:
         if not self._is_loaded:
             self._is_loaded = True
-            shipped = (importlib.metadata.EntryPoint(v, v, self._group) for v in self._shipped)
+            pairs = [*((place, place) for place in self._shipped), *edge(self._group).items()]
+            shipped = (importlib.metadata.EntryPoint(*pair, self._group) for pair in pairs)
             for entry in (*shipped, *importlib.metadata.entry_points(group=self._group)):
                 self._register_entry_point(entry)
         return self._declarations
@@ -100,3 +108,15 @@ class Registry(Mapping[str, Declaration], Generic[Declaration]):
 
     def __len__(self) -> int:
         return len(self._all())
+
+
+def edge(section: str) -> dict[str, str]:
+    """Return the entries of a section of `EDGE`: places of declarations by name, or `modules`."""
+    return dict(_edge()[section]) if _edge().has_section(section) else {}
+
+
+@functools.cache
+def _edge() -> configparser.ConfigParser:
+    parser = configparser.ConfigParser(allow_no_value=True, delimiters=("=",))
+    parser.read(EDGE, encoding="utf-8")
+    return parser

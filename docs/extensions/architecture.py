@@ -1,7 +1,8 @@
 """Picture of the architecture: the rooms of the package and their imports, read from the sources.
 
 The rooms stand in the order of their imports, so the package can be read downwards. An arc leads
-from a room up to one that it imports; the more imports, the wider the arc.
+from a room up to one that it imports; the more imports, the wider the arc. Rooms and studies of the
+edge (`wm_drake/edge.ini`), which the core does not import, have a colour of their own.
 """
 
 import ast
@@ -11,8 +12,12 @@ from html import escape
 from math import log2
 from pathlib import Path
 
+from wm_drake.registry import edge
+
 PACKAGE = Path(__file__).parents[2] / "wm_drake"
 LIBRARIES = {"pydrake": "Drake", "numba": "numba", "plotly": "plotly", "matplotlib": "matplotlib"}
+EDGE = "#b34700"
+"""Colour of the edge."""
 ROW, LEFT, WIDTH = 30, 230, 1060
 """Distance of two rooms, place of their names, and width of the picture. [px]"""
 
@@ -46,8 +51,15 @@ def svg() -> str:
         y = height[room]
         about = ast.get_docstring(ast.parse((PACKAGE / room / "__init__.py").read_text())) or " "
         used = [f"{name} {n}" for name, n in rooms[room].items() if name in LIBRARIES.values()]
+        of_edge = sorted(m.split(".")[2] for m in edge("modules") if f".{room}." in m)
+        if of_edge:
+            parts.append(
+                f'<text x="{LEFT + 90}" y="{y + 13}" font-size="10" fill="{EDGE}">edge: '
+                f"{', '.join(of_edge)}</text>"
+            )
+        colour = EDGE if f"{PACKAGE.name}.{room}" in edge("modules") else "currentColor"
         parts.append(
-            f'<text x="{LEFT}" y="{y}" font-weight="bold">{room}</text>'
+            f'<text x="{LEFT}" y="{y}" font-weight="bold" fill="{colour}">{room}</text>'
             f'<text x="{LEFT + 90}" y="{y}">{escape(about.splitlines()[0])}</text>'
             f'<text x="{WIDTH - 5}" y="{y}" text-anchor="end" fill="#888">{", ".join(used)}</text>'
         )

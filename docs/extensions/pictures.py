@@ -421,8 +421,8 @@ def tubes() -> Figure:
 def cabinet() -> Figure:
     """Draw the cabinet of the reference machine on its feet."""
     values = described("reference")["cabinet"]
-    centre = 1e3 * np.array(values["centre_of_mass_W"])
-    floor = 1e3 * values["floor_z_W"]
+    centre = 1e3 * np.array(values["centre_of_mass"])
+    floor = 1e3 * values["floor"]
     figure = Figure(figsize=(9.0, 3.6))
     above, front = figure.subplots(1, 2)
     for name, foot in values["feet"].items():

@@ -154,23 +154,6 @@ def test_a_wrong_drawing_is_one_message(wm_drake, changes, message):
     assert not Path("out").exists()
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ("nosuch", "nosuch: no such file, and no shipped gasket drawing"),
-        ("folded --axial '0 mm'", "--axial: '0 mm': allowed is one number above 0"),
-        ("folded --twist '3 mm'", "--twist"),
-        ("folded --frequency '-1 Hz'", "--frequency: '-1 Hz': allowed is one number above 0"),
-        ("folded --set gasket=null", "the machine has no gasket"),
-    ],
-)
-def test_wrong_options_are_refused(wm_drake, words, message):
-    ended = wm_drake(f"gasket curves {words} --out out")
-    assert (ended.code, ended.out) == (2, "")
-    assert message in ended.err
-    assert not Path("out").exists()
-
-
 def test_a_load_step_without_equilibrium_keeps_what_was_computed(wm_drake, monkeypatch):
     solve = solid_curves.Solver.solve
 

@@ -1,6 +1,9 @@
 """`calibrate` with records: planted numbers are recovered, wrong structures are called wrong."""
 
 import json
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +17,7 @@ from wm_drake.parameters.recorded_sensors import RecordedSensor
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.recorded_signal import recorded_signal
 from wm_drake.simulation.runs import simulate
-from wm_drake.studies.calibrate.records import turned_load
+from wm_drake.studies.calibrate.records import RecordModel, turned_load
 
 SENSORS = ("S1_x", "S1_z", "S3_x", "S3_z")
 FRICTION = "damper_types.friction.friction_force"
@@ -240,3 +243,29 @@ def test_options_that_do_not_fit_targets_are_refused(wm_drake, words, message):
     ended = wm_drake("calibrate", *words)
     assert ended.code == 2
     assert message in ended.err
+
+
+@pytest.mark.slow
+def test_a_fit_that_is_killed_goes_on_with_what_it_has(wm_drake, monkeypatch):
+    (file,) = plant({FRICTION: 50.0}, repeats=1)
+    command = f"calibrate {file} --test test.yaml --profile p.yaml --unknown {FRICTION} --by rms"
+    words = [sys.executable, "-m", "wm_drake", *command.split(), "--out", "killed"]
+    process, stored = subprocess.Popen(words), Path("killed/ledger.sqlite-wal")
+    while not stored.exists() or stored.stat().st_size < 50_000:
+        assert process.poll() is None
+        time.sleep(0.05)
+    process.kill()
+    process.wait()
+    computed, points, counts, found = RecordModel._at, [], [], []
+
+    def counted(model, new):
+        points.extend(new)
+        return computed(model, new)
+
+    monkeypatch.setattr(RecordModel, "_at", counted)
+    for out in ("killed --resume", "whole"):
+        found.append(json.loads(wm_drake(f"{command} --json --out {out}").out)["estimates"])
+        counts.append(len(points))
+        points.clear()
+    assert found[0] == found[1]
+    assert counts[0] < counts[1]

@@ -43,6 +43,7 @@ def candidate(kind, what, accuracy):
     return {"c.yaml": f"candidates: {{m: {{kind: {kind}, {what}, accuracy: {accuracy}}}}}\n"}
 
 
+WALL = "meridian: [{radius: 160 mm, y: 0 mm, thickness: 2 mm}, {radius: 160 mm, y: 30 mm, thickness: 2 mm}]\nrubber: {c1: 0.3 MPa}\n"
 STRAIGHT = [f"{0.01 * k},{(k % 20 - 10) ** 2},{k % 20}" for k in range(100)]
 FILES = {
     "p.yaml": PROFILE,
@@ -144,6 +145,8 @@ CASES = {  # command -> arguments, message, more files
         ("gasket --axis round --matrix A", "--axis: no axis 'round'"),
         ("gasket --axis x --name old --matrix A", "--name: a machine has one gasket"),
         ("gasket --axis x --arm '100 mm' -f 1Hz -a 1mm", "arm: an arm drives a rotation"),
+        ("gasket --axis tilt --matrix A", "--matrix: [A] does not rotate the gasket"),
+        ("bushing --machine free_stroke --axis twist --matrix A", "--matrix: [A] does not twist the bushing"),
     ],
     "identify damper": [
         ("none.csv", "none.csv: no such file"),
@@ -199,6 +202,7 @@ CASES = {  # command -> arguments, message, more files
         ("--factor gasket.stifness_x", "gasket.stifness_x: unknown key 'stifness_x' (did you mean 'stiffness_x'?"),
         ("--factor K_Lx", "--factor: 'K_Lx' is given twice"),
         ("--response gpa", "--response: no response 'gpa' (did you mean 'gap'"),
+        ("--response regions", "a spin profile with regions"),
         ("--tables curved", "unknown treatment 'curved'"),
         ("--vary nosuch.yaml", "nosuch.yaml: no such file"),
         ("--published k.csv", "'much' is not a finite number", {"k.csv": "load,response,term,percent,effects\nmiddle,Dx,C_L,50,much\n"}),
@@ -261,6 +265,23 @@ CASES = {  # command -> arguments, message, more files
         ("--vary free.yaml --candidates c.yaml", "candidates.m.component: no component 'damper_types.frction' (did you mean 'damper_types.friction'?", candidate("bench", "component: damper_types.frction, frequency: 1 Hz, amplitude: 1 mm", "5 %")),
         ("--vary free.yaml --candidates c.yaml", "candidates.m.axis: no axis 'radial'; allowed are x, y, z", candidate("bench", "component: gasket, axes: [radial], frequency: 1 Hz, amplitude: 1 mm", "5 %")),
         ("--vary free.yaml --candidates c.yaml", "c.yaml:1: candidates.m", candidate("weigh", "keys: [bodies.tub.mass]", "1 g")),
+    ],
+    "study cycle --out out": [("--load midle", "middle")],
+    "gasket curves --out out": [
+        ("nosuch", "nosuch: no such file, and no shipped gasket drawing"),
+        ("folded --axial '0 mm'", "--axial: '0 mm': allowed is one number above 0"),
+        ("folded --twist '3 mm'", "--twist"),
+        ("folded --frequency '-1 Hz'", "--frequency: '-1 Hz': allowed is one number above 0"),
+        ("folded --set gasket=null", "the machine has no gasket"),
+    ],
+    "study gasket-geometry --out out": [
+        ("nosuch", "no shipped gasket drawing"),
+        ("wall.yaml", "rubber.shore_a: needs shore_a", {"wall.yaml": WALL}),
+        ("folded --set gasket=null", "the machine has no gasket"),
+        ("folded --limit smallest_gap_mm=3", "'smallest_gap_mm': allowed are radial_N_per_mm"),
+        ("folded --limit largest_stretch=x", "'largest_stretch=x': allowed is a number above 0"),
+        ("bellows --folds 3", "with folds repeated 3 times"),
+        ("folded --load nosuch", "neither a load of machine"),
     ],
     "study modes --out out": [
         ("--amplitude '0 mm'", "no amplitude"),

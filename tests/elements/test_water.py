@@ -1,7 +1,5 @@
 """Loads that dry: law, both engines, energy that leaves with the water, records and measures."""
 
-import re
-
 import numpy as np
 import pytest
 from both_engines import BothEngines, check_alike, difference
@@ -186,12 +184,8 @@ def test_more_wet_masses_than_were_built_are_refused():
         ("time_constant", "time_konstant", "time_konstant"),
     ],
 )
-def test_errors_of_a_machine_file_name_the_key(old, new, message, tmp_path, wm_drake):
-    path = tmp_path / "mine.yaml"
-    path.write_text(FILE.replace(old, new), encoding="utf-8")
-    result = wm_drake("machine", "check", path)
-    assert result.code == 2
-    assert re.search(message, result.err), result.err
+def test_errors_of_a_machine_file_name_the_key(old, new, message, check_refused):
+    check_refused(FILE.replace(old, new), message)
 
 
 def test_a_page_refuses_a_load_that_dries(tmp_path, wm_drake):

@@ -2,21 +2,21 @@
 
 import json
 import os
-import re
 import subprocess
 import sys
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pytest
 from both_engines import check_alike, difference
 from drag_damper import DRAG_DAMPER
 from drake_spectrum import drake_spectrum
+from element_ports import check_derivatives
 from energy_book import EnergyBook, dense_record
 from maxwell_strut import MAXWELL_STRUT
 from moving_cabinet import with_moving_cabinet
-from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, InitializeAutoDiff
-from side_by_side import check_runs_alone
+from side_by_side import cases_with, check_runs_alone
 
 import wm_drake as wm
 from wm_drake.elements.kind import Ends
@@ -29,8 +29,9 @@ from wm_drake.parameters.files import machine_yaml
 from wm_drake.parameters.keys import quantities
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.runs import simulate
+from wm_drake.studies.machine_show.description import description_schema
 from wm_drake.studies.modes.linearisation import Linearisation
-from wm_drake.systems.element_system import ElementSystem
+from wm_drake.systems.element_system import element_system
 
 FRAMES = {"tub_frame": "damper_left_tub", "housing_frame": "damper_left_housing"}
 DRAG = {"kind": "drag_damper", **FRAMES, "coefficient": 4000.0}  # N s^2/m^2
@@ -91,13 +92,8 @@ def test_a_kind_is_registered_once():
         ("damper_left_tub", "damper_left_housing", "is not fixed to the tub"),
     ],
 )
-def test_errors_of_a_machine_file_name_line_and_key(old, new, message, tmp_path, wm_drake):
-    path = tmp_path / "mine.yaml"
-    path.write_text(FILE.replace(old, new), encoding="utf-8")
-    result = wm_drake("machine", "check", path)
-    assert result.code == 2
-    assert len(result.messages) <= 2
-    assert re.search(message, result.err), result.err
+def test_errors_of_a_machine_file_name_line_and_key(old, new, message, check_refused):
+    check_refused(FILE.replace(old, new), message)
 
 
 def test_numbers_are_found_changed_and_written(tmp_path):
@@ -122,8 +118,17 @@ def test_schema_and_manual_have_the_keys():
 
 
 def test_description_of_the_machine_has_the_elements(with_kind):
-    description = wm.describe(with_kind)
+    description, schema = wm.describe(with_kind), description_schema()
+    jsonschema.validate(description, schema)
     assert set(description["elements"]) == set(with_kind.parameters.elements)
+    for name, element in with_kind.parameters.elements.items():
+        described = description["elements"][name]
+        assert described["kind"] == element.kind
+        ends = np.subtract(described["tub_point_T"], described["housing_point_W"])
+        assert described["length_at_rest"] == pytest.approx(np.linalg.norm(ends), rel=0.05)
+    coefficient = schema["$defs"]["drag_damper"]["properties"]["coefficient"]
+    assert coefficient["unit"] == "N s^2/m^2"
+    assert coefficient["description"].startswith("Tension over the square")
 
 
 def test_both_engines_agree_at_random_states(with_kind):
@@ -151,16 +156,8 @@ def test_both_engines_move_alike(integrator, sponges):
 
 def test_eight_runs_side_by_side_are_single_runs():
     machine = build_machine(with_elements())
-    parameters = machine.parameters
-    cases = [
-        Case(
-            f"{number}",
-            parameters.loads["middle"],
-            PROFILE,
-            parameters=wm.with_value(parameters, "elements.first.coefficient", 250.0 * number),
-        )
-        for number in range(1, 10)
-    ]
+    values = 250.0 * np.arange(1, 10)
+    cases = cases_with(machine, "elements.first.coefficient", values, PROFILE)
     table = check_runs_alone(machine, cases)
     assert len(set(table.gasket_force.sel(axis="x").values)) == 9
 
@@ -171,21 +168,10 @@ def test_derivatives_of_the_system_are_those_of_differences(kind, numbers):
     point, ground = np.array([-0.1, 0.02, -0.2]), np.array([-0.25, 0.03, -0.5])
     ends = Ends(point, np.eye(3), ground, np.eye(3))
     placed = kind.place(ends, kind.parameters.model_validate(numbers))
-    system = ElementSystem(kind, placed.packed(), np.zeros(placed.state_size))
+    system = element_system(kind, placed.packed(), np.zeros(placed.state_size))
     rng = np.random.default_rng(1)
     state = rng.uniform(-0.2, 0.2, 14 + placed.state_size)
-
-    def force(system, values):
-        context = system.CreateDefaultContext()
-        system.GetInputPort("plant_state").FixValue(context, values[:14])
-        if placed.state_size:
-            context.SetContinuousState(values[14:])
-        return system.GetOutputPort("generalized_force").Eval(context)
-
-    slopes = ExtractGradient(force(system.ToScalarType[AutoDiffXd](), InitializeAutoDiff(state)))
-    steps = 1e-6 * np.eye(len(state))
-    differences = [(force(system, state + h) - force(system, state - h)) / 2e-6 for h in steps]
-    np.testing.assert_allclose(slopes, np.transpose(differences), rtol=1e-6, atol=1e-4)
+    check_derivatives(system, state, step=1e-6, part=1e-6)
 
 
 def test_modes_are_those_of_drakes_linearize(with_kind):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from drum_rings import check_both_engines, with_rings
-from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, InitializeAutoDiff
+from element_ports import check_derivatives
 from scipy.spatial.transform import Rotation
 
 import wm_drake as wm
@@ -11,7 +11,7 @@ from wm_drake.elements.ball_ring import BALL_RING, DAMPING_RATIO, FULL_CONTACT, 
 from wm_drake.elements.kind import DrumPlace
 from wm_drake.errors import InputError
 from wm_drake.parameters import Load, MachineParameters, SpinProfile, load_machine
-from wm_drake.systems.element_system import ElementSystem
+from wm_drake.systems.element_system import element_system
 
 RING = {
     "kind": "ball_ring",
@@ -68,7 +68,7 @@ def test_both_engines_agree_at_random_states(name):
 def law_at(state, motion, ring):
     """Return generalized force and rates of a ring alone from the state of tub and drum (14)."""
     placed = BALL_RING.place(PLACE, BallRing.model_validate(ring))
-    system = ElementSystem(placed.kind, placed.packed(), np.zeros(placed.state_size))
+    system = element_system(placed.kind, placed.packed(), np.zeros(placed.state_size))
     context = system.CreateDefaultContext()
     system.GetInputPort("plant_state").FixValue(context, motion)
     context.SetContinuousState(state)
@@ -130,25 +130,12 @@ def test_power_and_momentum_balance(balls):
 def test_derivatives_of_the_system_are_those_of_differences():
     placed = BALL_RING.place(PLACE, BallRing.model_validate({**RING, "balls": 2}))
     system, rng = (
-        ElementSystem(placed.kind, placed.packed(), np.zeros(14)),
+        element_system(placed.kind, placed.packed(), np.zeros(14)),
         np.random.default_rng(1),
     )
     sizes = np.array([0.2] * 3 + [0.05] * 3 + [2.0] + [0.5] * 6 + [20.0])
     state = np.concatenate([sizes * rng.uniform(-1.0, 1.0, 14), moved(2, rng)])
-
-    def outputs(system, values):
-        context = system.CreateDefaultContext()
-        system.GetInputPort("plant_state").FixValue(context, values[:14])
-        context.SetContinuousState(values[14:])
-        ports = ("generalized_force", "moment", "angle")
-        rates = system.EvalTimeDerivatives(context).CopyToVector()
-        return np.concatenate([*(system.GetOutputPort(p).Eval(context) for p in ports), rates])
-
-    slopes = ExtractGradient(outputs(system.ToScalarType[AutoDiffXd](), InitializeAutoDiff(state)))
-    steps = 1e-7 * np.eye(len(state))
-    differences = [(outputs(system, state + h) - outputs(system, state - h)) / 2e-7 for h in steps]
-    scale = np.maximum(np.abs(slopes).max(axis=1, keepdims=True), 1e-9)
-    np.testing.assert_allclose(slopes / scale, np.transpose(differences) / scale, atol=1e-5)
+    check_derivatives(system, state, ("generalized_force", "moment", "angle"))
 
 
 @pytest.fixture(scope="module")

@@ -29,11 +29,6 @@ def test_name_parameters_and_built_machine_run_alike(short):
     )
 
 
-def test_unknown_machine_is_refused_with_its_neighbour():
-    with pytest.raises(InputError, match="did you mean 'reference'"):
-        wm.simulate("referense", "middle")
-
-
 def test_text_of_a_machine_is_short(short):
     machine = wm.build_machine(short)
     for shown in (short, machine, machine.set_up()):

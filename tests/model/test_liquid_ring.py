@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from drum_rings import check_both_engines, with_rings
-from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, InitializeAutoDiff
+from element_ports import check_derivatives
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 from simple_machines import DAMPING, MASS, STIFFNESS, constant_speed, isotropic_machine, unbalance
@@ -19,7 +19,7 @@ from wm_drake.elements.liquid_ring import (
 )
 from wm_drake.laws.table import stiffness_force
 from wm_drake.parameters import load_machine
-from wm_drake.systems.element_system import ElementSystem
+from wm_drake.systems.element_system import element_system
 
 RING = {
     "kind": "liquid_ring",
@@ -116,7 +116,7 @@ def test_both_engines_agree_at_random_states(name):
 def system_of(ring, place=PLACE):
     """Return the system of a ring alone, and its context."""
     placed = LIQUID_RING.place(place, ring)
-    system = ElementSystem(placed.kind, placed.packed(), np.zeros(placed.state_size))
+    system = element_system(placed.kind, placed.packed(), np.zeros(placed.state_size))
     return system, system.CreateDefaultContext(), placed
 
 
@@ -170,20 +170,7 @@ def test_derivatives_of_the_system_are_those_of_differences():
     system, rng = system_of(ring_of())[0], np.random.default_rng(1)
     sizes = np.array([0.2] * 3 + [0.05] * 3 + [2.0] + [0.5] * 6 + [20.0])
     state = np.concatenate([sizes * rng.uniform(-1.0, 1.0, 14), moved(rng)])
-
-    def outputs(system, values):
-        context = system.CreateDefaultContext()
-        system.GetInputPort("plant_state").FixValue(context, values[:14])
-        context.SetContinuousState(values[14:])
-        ports = ("generalized_force", "moment", "spin")
-        rates = system.EvalTimeDerivatives(context).CopyToVector()
-        return np.concatenate([*(system.GetOutputPort(p).Eval(context) for p in ports), rates])
-
-    slopes = ExtractGradient(outputs(system.ToScalarType[AutoDiffXd](), InitializeAutoDiff(state)))
-    steps = 1e-7 * np.eye(len(state))
-    differences = [(outputs(system, state + h) - outputs(system, state - h)) / 2e-7 for h in steps]
-    scale = np.maximum(np.abs(slopes).max(axis=1, keepdims=True), 1e-9)
-    np.testing.assert_allclose(slopes / scale, np.transpose(differences) / scale, atol=1e-5)
+    check_derivatives(system, state, ("generalized_force", "moment", "spin"))
 
 
 def settled(ring, speed, duration, first=0.0):

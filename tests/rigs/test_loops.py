@@ -38,7 +38,7 @@ from wm_drake.rigs import (
 )
 from wm_drake.rigs.loops import steady_deformations
 from wm_drake.rigs.run import stroke_points
-from wm_drake.systems.element_system import ElementSystem
+from wm_drake.systems.element_system import element_system
 
 MSTV = damper_of("mstv", friction_damping=0.0)  # fit of [C]; f_max assumed
 SPONGE = ForceTable(  # assumed
@@ -293,7 +293,7 @@ def test_the_dampers_system_under_drakes_integrator_gives_the_loop_of_the_bench(
     )
     state = builder.AddSystem(Multiplexer([7, 7]))
     system = builder.AddSystem(
-        ElementSystem(parameters.kind, parameters.packed(), np.zeros(parameters.state_size))
+        element_system(parameters.kind, parameters.packed(), np.zeros(parameters.state_size))
     )
     builder.Connect(sine.get_output_port(0), state.get_input_port(0))
     builder.Connect(sine.get_output_port(1), state.get_input_port(1))
@@ -317,12 +317,10 @@ def test_the_dampers_system_under_drakes_integrator_gives_the_loop_of_the_bench(
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Harmonic(0.0, 1e-3), "frequency: is 0; allowed is > 0"),
         (lambda: Harmonic(1.0, -1e-3), "amplitude: is -0.001; allowed is > 0"),
         (lambda: damper_bench(CoulombDamper(law="coulomb", friction_force=60.0), 0.01), "sponge_mass: only the law mstv or free_stroke"),
         (lambda: damper_bench(MSTV, -0.01), "sponge_mass: is -0.01 kg"),
         (lambda: bushing_bench(gasket(), "radial"), "axis: no axis 'radial'; allowed are x, y, z, about_x"),
-        (lambda: bushing_bench(gasket(), "x", arm=0.1), "arm: an arm drives a rotation"),
         (
             lambda: force_loop(bushing_bench(gasket(), "about_x", arm=0.1), Harmonic(1.0, 0.1)),
             "amplitude: is 0.1 m; allowed is less than the arm",

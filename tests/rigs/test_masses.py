@@ -59,16 +59,3 @@ def test_command_writes_the_effect_of_masses(wm_drake):
     largest = 2.15 * (2.0 * np.pi * 7.0) ** 2 * 5e-3
     table = pd.read_csv("out/masses.csv")
     assert table.largest_difference_N[0] == pytest.approx(largest, rel=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("component", "axis", "message"),
-    [
-        (("gasket",), "tilt", "[A] does not rotate the gasket"),
-        (("bushing", "--machine", "free_stroke"), "twist", "[A] does not twist the bushing"),
-    ],
-)
-def test_a_matrix_of_a_is_refused_where_it_has_no_test(wm_drake, component, axis, message):
-    ended = wm_drake("rig", *component, "--axis", axis, "--matrix", "A")
-    assert ended.code == 2
-    assert ended.err.startswith(f"--matrix: {message}")

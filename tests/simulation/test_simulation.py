@@ -287,11 +287,6 @@ def test_unknown_engine_or_unfit_step_is_refused(machine, arguments):
         simulate(machine, "middle", **arguments)
 
 
-def test_unknown_load_names_the_nearest(machine):
-    with pytest.raises(InputError, match="did you mean 'middle'"):
-        simulate(machine, "midle")
-
-
 def test_a_case_of_changed_parameters_runs_with_them(machine, reference):
     force = tuple(0.5 * f for f in reference.gasket.stiffness_y.force)
     softer = with_value(reference, "gasket.stiffness_y.force", force)

@@ -14,6 +14,7 @@ from wm_drake.simulation.cases import case_of
 from wm_drake.simulation.displacements import envelopes
 from wm_drake.simulation.measures import measure
 from wm_drake.simulation.runs import simulate
+from wm_drake.studio import server
 from wm_drake.studio.guard import LARGEST_BODY
 from wm_drake.studio.server import Studio, application
 
@@ -121,6 +122,25 @@ def test_every_number_can_be_turned_or_is_left_out(client):
     found = client.post("api/ranking", json={"page": "test", "state": state(), "keys": keys})
     assert found.status_code == 200
     assert [arrow["key"] for arrow in found.json()["arrows"]] == keys[:3]
+
+
+def test_numbers_that_are_not_there_cost_no_run(client, monkeypatch):
+    monkeypatch.setattr(server, "arrows", None)
+    keys = [f"springs.{n}.stiffness" for n in range(100)]
+    found = client.post("api/ranking", json={"page": "test", "state": state(), "keys": keys})
+    assert found.json() == {"arrows": []}
+
+
+def test_long_names_are_shortened_in_every_message(client):
+    name = "x" * 3000
+    for answer in (
+        client.get(f"api/machine?id={name}"),
+        client.post(f"api/studies/{name}/cancel", json={}),
+        client.post(f"api/studies/{name}/resume", json={}),
+        client.get(f"reports/{name}/report.html"),
+    ):
+        assert answer.status_code == 422
+        assert len(answer.text) < 700
 
 
 def test_number_that_was_zero_builds_its_element(client, answer):

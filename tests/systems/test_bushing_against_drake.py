@@ -22,7 +22,7 @@ from wm_drake.elements.bushing import (
     packed_bushing_law,
 )
 from wm_drake.parameters.elements import Bushing
-from wm_drake.systems.element_system import ElementSystem
+from wm_drake.systems.element_system import element_system
 
 STIFFNESS = np.array([8e3, 3e3, 6e3])  # N/m
 ROTATIONAL_STIFFNESS = np.array([73.0, 890.0, 150.0])  # N m/rad
@@ -73,7 +73,7 @@ def our_bushing(stiffness_only):
         numbers[f"damping_{axis}"] = damping * DAMPING[i]
         numbers[f"rotational_damping_{axis}"] = damping * ROTATIONAL_DAMPING[i]
     law = packed_bushing_law(Bushing(tub_frame="tub_side", housing_frame="ground_side", **numbers))
-    return ElementSystem(
+    return element_system(
         SIX_COMPONENT_BUSHING,
         SixComponentBushingParameters(P_WG, R_WG.matrix(), P_WG, R_WG.matrix(), law).packed(),
     )

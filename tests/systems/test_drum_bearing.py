@@ -16,7 +16,7 @@ from wm_drake.elements.bearing import (
 )
 from wm_drake.elements.bushing import packed_bushing_law
 from wm_drake.parameters import Bearing
-from wm_drake.systems.element_system import ElementSystem
+from wm_drake.systems.element_system import element_system
 
 POINT = np.array([0.02, 0.15, -0.01])  # m
 R_TB = RotationMatrix(RollPitchYaw([0.2, 0.0, -0.1])).matrix()
@@ -26,7 +26,7 @@ PACKED = DrumBearingParameters(POINT, R_TB, POINT, R_TB, LAW).packed()
 
 @pytest.fixture(scope="module")
 def system():
-    return ElementSystem(DRUM_BEARING, PACKED)
+    return element_system(DRUM_BEARING, PACKED)
 
 
 def states(count, seed):
@@ -126,7 +126,7 @@ def loose():
     """Return a bearing with a clearance, and little stiffness within it."""
     law = packed_bushing_law(Bearing(**BEARING | {"radial_stiffness": 1e4}).as_bushing())
     placed = DrumBearingParameters(POINT, R_TB, POINT, R_TB, law, **CLEARANCE)
-    return ElementSystem(DRUM_BEARING, placed.packed())
+    return element_system(DRUM_BEARING, placed.packed())
 
 
 def test_beyond_the_clearance_shaft_and_bearing_touch(loose):

@@ -26,7 +26,7 @@ from wm_drake.elements.state_map import StateMap, sponge_part, tub_part
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.elements import Bushing, EndBushing, ForceTable
 from wm_drake.simulation.histories import output_history
-from wm_drake.systems.element_system import ElementSystem
+from wm_drake.systems.element_system import element_system
 from wm_drake.systems.speed_source import REFLECTED_INERTIA, MotorTorque, SpeedSource
 from wm_drake.systems.spin_profile_source import SpinProfileSource
 from wm_drake.systems.tub_force import TubForce
@@ -135,7 +135,7 @@ class Element:
 
     def system(self, packed=None):
         packed = self.packed if packed is None else packed
-        return ElementSystem(self.kind, packed, self.state)
+        return element_system(self.kind, packed, self.state)
 
 
 ELEMENTS = {
@@ -154,7 +154,7 @@ every_element = pytest.mark.parametrize("element", ELEMENTS.values(), ids=ELEMEN
 @pytest.mark.parametrize("stiffness", [5200.0, SPRING_CURVE])  # N/m
 def test_a_spring_pulls_its_hooks_together(stiffness):
     placed = spring_parameters(stiffness)
-    spring = ElementSystem(SPRING_STRUT, placed.packed())
+    spring = element_system(SPRING_STRUT, placed.packed())
     curve = PchipInterpolator(SPRING_CURVE.displacement, SPRING_CURVE.force)
     for x in random_plant_states(10, seed=21):
         _, arm, p_WA, v_WA = tub_motion(x, placed.p_ToA_T)
@@ -187,7 +187,7 @@ def line_of(damper, x):
 )  # fmt: skip
 def test_a_damper_without_sponge_resists_its_elongation_rate(name, full_force, transition):
     placed = damper_parameters(DAMPERS[name], EndBushing())
-    damper = ElementSystem(FRICTION_DAMPER_STRUT, placed.packed())
+    damper = element_system(FRICTION_DAMPER_STRUT, placed.packed())
     for x in random_plant_states(10, seed=22):
         arm, e, _, rate, _, _ = line_of(placed, x)
         tension = 20.0 * rate + full_force * transition(rate / 0.2)  # N
@@ -204,7 +204,7 @@ def test_end_bushings_bend_back_a_strut_and_their_moments_are_balanced(damper):
     placed = damper_parameters(damper)
     state = [0.0] * int(placed.has_sponge)
     bent, free = (
-        ElementSystem(FRICTION_DAMPER_STRUT, p.packed(), state)
+        element_system(FRICTION_DAMPER_STRUT, p.packed(), state)
         for p in (placed, damper_parameters(damper, EndBushing()))
     )
     axis = placed.p_ToA_T - placed.p_WH
@@ -239,7 +239,7 @@ def test_end_bushings_bend_back_a_strut_and_their_moments_are_balanced(damper):
 
 def test_a_bushing_acts_at_its_tub_side_point_along_the_axes_of_its_housing_frame():
     placed = bushing_parameters()
-    bushing = ElementSystem(SIX_COMPONENT_BUSHING, placed.packed())
+    bushing = element_system(SIX_COMPONENT_BUSHING, placed.packed())
     curve = PchipInterpolator(GASKET.stiffness_y.displacement, GASKET.stiffness_y.force)
     R_WG = placed.ground_side_rotation
     for x in random_plant_states(10, seed=26):
@@ -373,7 +373,7 @@ def test_parameters_of_another_length_are_refused(element):
 def test_a_disengaged_element_exerts_nothing_at_all(damper):
     if damper is None:
         system, state = (
-            ElementSystem(SIX_COMPONENT_BUSHING, bushing_parameters(engaged=0.0).packed()),
+            element_system(SIX_COMPONENT_BUSHING, bushing_parameters(engaged=0.0).packed()),
             (),
         )
     else:
@@ -381,7 +381,7 @@ def test_a_disengaged_element_exerts_nothing_at_all(damper):
             damper, EndBushing(), engaged=0.0
         )  # its end bushings would act on
         state = [2e-3] if placed.has_sponge else []  # m
-        system = ElementSystem(FRICTION_DAMPER_STRUT, placed.packed(), np.zeros(placed.state_size))
+        system = element_system(FRICTION_DAMPER_STRUT, placed.packed(), np.zeros(placed.state_size))
     context = context_of(system, random_plant_states(1, seed=32)[0], state)
     assert not np.any(port(system, context, "generalized_force"))
     assert not np.any(own_outputs(system, context))

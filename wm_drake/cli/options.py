@@ -48,7 +48,7 @@ def command_of(study: Study) -> Callable[..., None]:
     keyword = inspect.Parameter.KEYWORD_ONLY
     parameters = [
         inspect.Parameter("context", keyword, annotation=typer.Context),
-        *parameters_of(study.options),
+        *parameters_of(study.all_options),
         *parameters_of(
             options_of_driver(study), out=Path(study.folder or f"wm-drake-{study.name}")
         ),

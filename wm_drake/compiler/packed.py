@@ -14,7 +14,7 @@ at)`` of the array and the index where it begins, which a law passes on: ``stiff
 
 import linecache
 from collections import namedtuple
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -48,11 +48,14 @@ class PackedPart:
         structure: Function (p, at) that returns the whole numbers which must be equal in all
             machines of a batch, such as the number of points of a table.
         fixed_size: How many numbers the part has, if all machines have as many; else None.
+        inside: Function (p, at) that returns the layout of its numbers and the index where they
+            begin; None without a layout.
     """
 
     size: Any
     structure: Callable[[_FloatArray, int], list[int]]
     fixed_size: int | None = None
+    inside: "Callable[[Any, int], tuple[PackedLayout, int]] | None" = None
 
 
 SCALAR = Fixed(1, is_tuple=False)
@@ -71,7 +74,8 @@ def ARRAY(size: int) -> Fixed:  # a kind, like the constants above
 
 def LAYOUT(layout: "PackedLayout") -> PackedPart:
     """Return the kind of a field that holds the numbers of another layout."""
-    return PackedPart(layout.size, layout.structure, layout._fixed_size)
+    inside = lambda _, at: (layout, at)  # noqa: E731
+    return PackedPart(layout.size, layout.structure, layout._fixed_size, inside)
 
 
 class PackedLayout:
@@ -85,6 +89,7 @@ class PackedLayout:
         write: Law (p, at, fields) that writes them; None if a field is a part.
         size: Law (p, at) that returns how many numbers there are; None if the last part has no
             size.
+        units: SI unit of fields that are numbers of a machine file, by name.
     """
 
     def __init__(self, name: str, **fields: Fixed | PackedPart) -> None:
@@ -96,6 +101,7 @@ class PackedLayout:
         self.name = name
         self.fields: Mapping[str, Fixed | PackedPart] = fields
         self.offsets: dict[str, int] = {}
+        self.units: dict[str, str] = {}
         self._fixed_size: int | None = None
         self.read: Any
         self.write: Any = None
@@ -205,6 +211,28 @@ class PackedLayout:
     def unpack(self, packed: Any, at: int = 0) -> Any:
         """Return the numbers that begin at an index as a named tuple, for Python code."""
         return generic(self.read)(packed, at)
+
+    def places(
+        self, packed: Any, at: int = 0
+    ) -> Iterator[tuple[str, int, Fixed | PackedPart, str]]:
+        """Yield name, index, kind and unit of each field, and of the fields of its parts.
+
+        Before the name of a field of a part stands the name of the part and a dot, unless it is
+        `law`: the numbers of a law belong to the component.
+        """
+        for field, kind in self.fields.items():
+            if isinstance(kind, Fixed):
+                yield field, at, kind, self.units.get(field, "")
+                at += kind.size
+                continue
+            if kind.inside is None:
+                yield field, at, kind, self.units.get(field, "")
+            else:
+                layout, begin = kind.inside(packed, at)
+                before = "" if field == "law" else f"{field}."
+                for name, place, of_part, unit in layout.places(packed, begin):
+                    yield f"{before}{name}", place, of_part, unit
+            at += generic(kind.size)(packed, at) if kind.size else 0
 
     def replaced(self, packed: _FloatArray, **values: Any) -> _FloatArray:
         """Return a copy of packed numbers with fields of fixed size and offset replaced."""

@@ -19,7 +19,7 @@ from wm_drake.compiler.vectors import (
     subtract,
 )
 from wm_drake.compiler.vectors import transpose as transposed
-from wm_drake.elements.kind import ElementKind, Output
+from wm_drake.elements.kind import FRAMES, ElementKind, Output
 from wm_drake.elements.layouts import layout_of, packed_fields, packed_once
 from wm_drake.elements.motion import tub_motion, write_generalized_force
 from wm_drake.elements.strut import wrench_at_origin
@@ -232,12 +232,18 @@ WRENCH_OUTPUTS = (
 )
 """Outputs of a bushing; G is the frame on the housing, along whose axes the stiffness acts."""
 
+BUSHING_FRAMES = tuple(
+    replace(one, path=path) for one, path in zip(FRAMES, BUSHING.fields, strict=False)
+)
+"""Frames of a bushing in its place; its law holds along the axes of that on the housing."""
+
 SIX_COMPONENT_BUSHING = ElementKind(
     name="six_component_bushing",
     parameters=Bushing,
     layout=BUSHING,
     outputs=WRENCH_OUTPUTS,
     words="six-component bushing between frames of the tub and of the housing",
+    described=BUSHING_FRAMES,
     picture="points",
     on_plant=evaluate_six_component_bushing,
 )

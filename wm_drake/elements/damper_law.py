@@ -111,5 +111,5 @@ sponge_with_mass = _choice(
 mass, of a law that has one on the bench; returns tension and velocity of the slider at the end of
 the step. [m, m/s, m/s, s, kg -> N, m/s]"""
 
-LAW = PackedPart(None, law_structure)
+LAW = PackedPart(None, law_structure, inside=lambda p, at: (_LAYOUTS[law_of(p, at).number], at + 1))
 """Kind of a field that holds a packed damper law; the last of a layout."""

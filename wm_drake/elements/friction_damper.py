@@ -15,10 +15,10 @@ from wm_drake.elements.damper_law import (
     law_structure,
     packed_damper_law,
 )
-from wm_drake.elements.kind import ElementKind, Ends, Output
+from wm_drake.elements.kind import Described, ElementKind, Ends, Output
 from wm_drake.elements.layouts import layout_of, packed_fields, packed_once
 from wm_drake.elements.motion import tub_motion, write_generalized_force
-from wm_drake.elements.strut import strut_line, transverse, wrench_at_origin
+from wm_drake.elements.strut import STRUT_ENDS, strut_line, transverse, wrench_at_origin
 from wm_drake.laws.strut import bending_moment, transverse_couple
 from wm_drake.parameters.damper_laws import DamperNumbers
 from wm_drake.parameters.elements import Damper, EndBushing
@@ -85,14 +85,18 @@ class FrictionDamperParameters:
     def _end_bushing_without_friction(self) -> EndBushing:
         return self.end_bushing.model_copy(update={"friction_torque": 0.0})
 
+    @property
+    def axis(self) -> FloatArray:
+        """Unit vector from the housing end to the tub end, as drawn."""
+        return (self.p_ToA_T - self.p_WH) / math.dist(self.p_ToA_T, self.p_WH)
+
     @packed_once
     def packed(self) -> FloatArray:
         """Return the numbers of `FRICTION_DAMPER`."""
-        line = self.p_ToA_T - self.p_WH
         return FRICTION_DAMPER.pack(
             p_ToA_T=self.p_ToA_T,
             p_WH=self.p_WH,
-            axis=line / math.dist(self.p_ToA_T, self.p_WH),
+            axis=self.axis,
             engaged=self.engaged,
             end_bushing=packed_fields(END_BUSHING, self.end_bushing),
             law=self.packed_law,
@@ -207,5 +211,15 @@ FRICTION_DAMPER_STRUT = ElementKind(
     outputs=(Output("force", "N", "tension of a damper, > 0"),),
     acts_at_rest=False,
     words="damper as a massless strut between a point of the tub and a point of the housing",
+    described=(
+        *STRUT_ENDS,
+        Described(
+            "neutral_direction",
+            "Direction as drawn. Both end bushings are neutral when the strut has this direction "
+            "in W (housing end) and in T (tub end).",
+            "axis",
+            shape=(3,),
+        ),
+    ),
     on_plant=evaluate_friction_damper,
 )

@@ -15,6 +15,7 @@ states, equilibrium, forces on the cabinet, records and pictures.
 """
 
 import functools
+import operator
 from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -105,6 +106,31 @@ class State:
 
 
 @dataclass(frozen=True)
+class Described:
+    """A number of a placed element that the description of a machine has beside its parameters.
+
+    Attributes:
+        name: Key. A suffix `_T` or `_W` is the frame.
+        words: What it is.
+        path: Where a placed element has it, by default the name.
+        unit: SI unit; empty for a direction.
+        shape: () for a number, (3,) for a vector, (3, 3) for a rotation.
+    """
+
+    name: str
+    words: str
+    path: str = ""
+    unit: str = ""
+    shape: tuple[int, ...] = ()
+
+    def of(self, placed: Any) -> Any:
+        """Return it of a placed element, as a number or lists; None for one that is not finite."""
+        value = operator.attrgetter(self.path or self.name)(placed)
+        plain = np.asarray(np.nan if value is None else value, dtype=float)
+        return plain.tolist() if np.isfinite(plain).all() else None
+
+
+@dataclass(frozen=True)
 class RingPicture:
     """How pictures draw a ring on the drum: circles about its axis, and what moves in it as balls.
 
@@ -120,6 +146,24 @@ class RingPicture:
     across: str
     places: Callable[[Any, Mapping[str, FloatArray]], FloatArray]
     is_liquid: bool = False
+
+
+_ON_TUB = (
+    Described("tub_point_T", "Point on the tub.", "ends.tub_point", "m", (3,)),
+    Described("tub_rotation_T", "Rotation of its frame.", "ends.tub_rotation", "", (3, 3)),
+)
+FRAMES = (
+    *_ON_TUB,
+    Described("housing_point_W", "Point on the housing.", "ends.housing_point", "m", (3,)),
+    Described("housing_rotation_W", "Rotation of its frame.", "ends.housing_rotation", "", (3, 3)),
+)
+"""The two frames of an element between tub and housing."""
+DRUM_PLACE = (
+    replace(_ON_TUB[0], words="Point of the drum axis."),
+    replace(_ON_TUB[1], words="y is the drum axis, z points to the top of the drum at angle 0."),
+    Described("gravity_W", "Acceleration of free fall.", "ends.gravity", "m/s^2", (3,)),
+)
+"""The place of an element on the drum."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,6 +189,8 @@ class ElementKind:
         acts_at_rest: Whether its force counts in the static equilibrium; False for a damper.
         frictionless: Values of fields of the layout that take the dry friction out, for modes.
         words: What an element of the kind is, for pages.
+        described: What the description of a machine has of its elements beside the numbers of the
+            machine file, which it has by itself; by default the two frames.
         picture: What pictures draw: a strut between the two points, or nothing but its end points.
         ring: How pictures draw a ring on the drum. The place in T of each of its balls, from the
             point of the drum axis, is in three states whose names begin with `place_x`, `place_y`
@@ -172,6 +218,7 @@ class ElementKind:
     acts_at_rest: bool = True
     frictionless: Mapping[str, Any] = field(default_factory=dict)
     words: str = ""
+    described: tuple[Described, ...] = ()
     picture: Literal["strut", "points"] = "strut"
     ring: RingPicture | None = None
     on_plant: Any = None
@@ -192,6 +239,8 @@ class ElementKind:
             if not self.name.isidentifier():
                 raise ValueError(f"element kind '{self.name}': the name must be an identifier")
             object.__setattr__(self, "on_plant", _on_plant(self))
+        if not self.described and self.evaluate is not None:
+            object.__setattr__(self, "described", DRUM_PLACE if self.on_drum else FRAMES)
         if self.place is None and self.numbers is not None:
             object.__setattr__(self, "place", functools.partial(_placed, self))
 

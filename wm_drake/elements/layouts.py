@@ -11,6 +11,7 @@ from wm_drake.compiler.packed import SCALAR, PackedLayout
 from wm_drake.laws.table import CURVE, pack_number, pack_table
 from wm_drake.parameters.drive import TorqueLimit, TorqueLimitTable
 from wm_drake.parameters.elements import ForceTable, TorqueTable
+from wm_drake.parameters.keys import unit_of
 from wm_drake.parameters.monotone import monotone_cubics
 from wm_drake.parameters.types import FloatArray
 
@@ -24,7 +25,17 @@ def layout_of(name: str, kind: type[BaseModel], fields: Sequence[str]) -> Packed
     """
     numbers = [field for field in fields if kind.model_fields[field].annotation is float]
     curves = [field for field in fields if field not in numbers]
-    return PackedLayout(name, **dict.fromkeys(numbers, SCALAR), **dict.fromkeys(curves, CURVE))
+    layout = PackedLayout(name, **dict.fromkeys(numbers, SCALAR), **dict.fromkeys(curves, CURVE))
+    layout.units.update(units_of(kind))
+    return layout
+
+
+def units_of(kind: type[BaseModel]) -> dict[str, str]:
+    """Return the SI unit of each field of a type of a machine file that is a number or a curve."""
+    units = {
+        name: unit_of(field.annotation, field.metadata) for name, field in kind.model_fields.items()
+    }
+    return {name: unit.si for name, unit in units.items() if unit is not None}
 
 
 def packed_once(pack: Callable[[Any], FloatArray]) -> Callable[[Any], FloatArray]:

@@ -30,6 +30,7 @@ from wm_drake.compiler.vectors import (
 from wm_drake.compiler.vectors import transpose as transposed
 from wm_drake.elements.bushing import (
     BUSHING,
+    BUSHING_FRAMES,
     WRENCH_OUTPUTS,
     SixComponentBushingParameters,
     packed_bushing_law,
@@ -339,6 +340,7 @@ SIX_COMPONENT_BUSHING_OF_RUBBER = ElementKind(
     place=placed_bushing,
     outputs=WRENCH_OUTPUTS,
     words="six-component bushing of rubber, with a state for the stretch of each branch in use",
+    described=BUSHING_FRAMES,
     picture="points",
     on_plant=evaluate_rubber_bushing,
 )

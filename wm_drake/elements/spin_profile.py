@@ -1,5 +1,7 @@
 """Prescribed motion of the drum in closed form: the speed of a spin profile is piecewise linear."""
 
+from bisect import bisect_right
+
 import numpy as np
 
 from wm_drake.parameters import SpinProfile
@@ -22,6 +24,27 @@ def drum_acceleration(profile: SpinProfile, time: FloatArray) -> FloatArray:
     corners = np.array(profile.time)
     prescribed = np.array(profile.acceleration())[_piece(corners, time)]
     return np.where(time > corners[-1], 0.0, prescribed)
+
+
+def drum_at(profile: SpinProfile, time: float) -> tuple[float, float]:
+    """Return the prescribed angular acceleration and speed of the drum at one time.
+
+    A simulation calls it at each stage of each step, so it makes no arrays. The numbers are those
+    of `drum_acceleration` and `drum_motion`.
+
+    Args:
+        profile: Drum speed over time.
+        time: [s] After the end of the profile the speed is constant.
+
+    Returns:
+        Acceleration [rad/s^2] and speed [rad/s].
+    """
+    corners, speed = profile.time, profile.speed
+    if time > corners[-1]:
+        return 0.0, speed[-1]
+    piece = min(max(bisect_right(corners, time) - 1, 0), len(corners) - 2)
+    acceleration = (speed[piece + 1] - speed[piece]) / (corners[piece + 1] - corners[piece])
+    return acceleration, speed[piece] + acceleration * (time - corners[piece])
 
 
 def drum_motion(profile: SpinProfile, time: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -8,10 +8,10 @@ from wm_drake.compiler.compilation import law
 from wm_drake.compiler.elementary import numbers
 from wm_drake.compiler.packed import SCALAR, VECTOR, PackedLayout
 from wm_drake.compiler.vectors import rotate, scale
-from wm_drake.elements.kind import ElementKind, Ends, Output
+from wm_drake.elements.kind import Described, ElementKind, Ends, Output
 from wm_drake.elements.layouts import packed_once, packed_stiffness
 from wm_drake.elements.motion import tub_motion, write_generalized_force
-from wm_drake.elements.strut import strut_line, wrench_at_origin
+from wm_drake.elements.strut import STRUT_ENDS, strut_line, wrench_at_origin
 from wm_drake.laws.spring import spring_tension
 from wm_drake.laws.table import CURVE, stiffness_force
 from wm_drake.parameters.elements import Spring, SpringType
@@ -28,6 +28,7 @@ SPRING = PackedLayout(
 )
 """Tub hook (T) and housing hook (W) [m], rest length [m], preload [N], tension from which it is
 taut [N], stiffness [N/m or a table]."""
+SPRING.units.update(preload="N", stiffness="N/m")
 read_spring = SPRING.read
 
 SLACK_TRANSITION = 1e-3
@@ -181,5 +182,12 @@ SPRING_STRUT = ElementKind(
     place=placed_spring,
     outputs=(Output("force", "N", "tension of a spring, > 0"),),
     words="suspension spring between a point of the tub and a point of the housing",
+    described=(
+        *STRUT_ENDS,
+        Described("length_at_preload", "Length as drawn.", "rest_length", "m"),
+        Described("preload", "Tension as drawn.", unit="N"),
+        Described("taut_from", "Null for tension-compression.", unit="N"),
+        Described("free_length", "Length at which h is 0; null without one.", unit="m"),
+    ),
     on_plant=evaluate_spring_strut,
 )

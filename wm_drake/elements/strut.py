@@ -3,6 +3,13 @@
 from wm_drake.compiler.compilation import law
 from wm_drake.compiler.elementary import sqrt
 from wm_drake.compiler.vectors import add, cross, dot, scale, subtract
+from wm_drake.elements.kind import Described
+
+STRUT_ENDS = (
+    Described("tub_point_T", "Point on the tub.", "p_ToA_T", "m", (3,)),
+    Described("housing_point_W", "Point on the housing.", "p_WH", "m", (3,)),
+)
+"""Ends of a strut in its place."""
 
 
 @law

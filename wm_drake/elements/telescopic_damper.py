@@ -22,7 +22,7 @@ from wm_drake.elements.damper_law import (
     law_of,
     law_structure,
 )
-from wm_drake.elements.kind import ElementKind, Output
+from wm_drake.elements.kind import Described, ElementKind, Output
 from wm_drake.elements.layouts import packed_once
 from wm_drake.elements.motion import (
     GENERALIZED_FORCE_SIZE,
@@ -246,6 +246,24 @@ def telescopic_damper_history(states, element_states, p, forces):
     keep(p_numbers)
 
 
+_BUSHINGS = (
+    ("tub_point_T", "Tub bushing, on the tub.", "tub_bushing.tub_side_point"),
+    ("outer_point_outer_tube", "It on the outer tube.", "tub_bushing.ground_side_point"),
+    ("inner_point_outer_tube", "Housing bushing.", "housing_bushing.tub_side_point"),
+    ("housing_point_W", "It on the housing.", "housing_bushing.ground_side_point"),
+    ("tub_bushing_on_tub_rotation_T", "Its frame.", "tub_bushing.tub_side_rotation"),
+    ("tub_bushing_law_rotation_outer_tube", "Of its law.", "tub_bushing.ground_side_rotation"),
+    ("housing_bushing_on_inner_tube_rotation_outer_tube", "", "housing_bushing.tub_side_rotation"),
+    ("housing_bushing_law_rotation_W", "Of its law.", "housing_bushing.ground_side_rotation"),
+)
+"""Key of each place of the bushings, meaning, and where it is; the last word is the frame: that of
+the inner tube is given in the frame of the outer one, at extension 0."""
+DESCRIBED = (
+    Described("axis_outer_tube", "Direction of extension.", "axis", shape=(3,)),
+    *(Described(*one, "m", (3,)) for one in _BUSHINGS[:4]),
+    *(Described(*one, "", (3, 3)) for one in _BUSHINGS[4:]),
+)
+
 TELESCOPIC_DAMPER_TUBES = ElementKind(
     name="telescopic_damper",
     parameters=TelescopicDamper,
@@ -258,6 +276,7 @@ TELESCOPIC_DAMPER_TUBES = ElementKind(
         Output("housing_bushing_moment", "N m", "moment on the housing", size=3),
     ),
     words="damper of two tubes that are bodies, each on a bushing",
+    described=DESCRIBED,
     on_plant=evaluate_telescopic_damper,
     trees=2,
 )

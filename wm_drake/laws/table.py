@@ -104,6 +104,43 @@ def table_range(packed, at):
     return float(read_piece(packed, at + 1).begin), float(read_end(packed, last).x)
 
 
+def slope_at_zero(packed, at):
+    """Return the slope of a packed stiffness at displacement 0. [N/m or N m/rad]"""
+    n = whole_number(packed[at])
+    if n == 0:
+        return packed[at + 1]
+    pieces = [read_piece.py_func(packed, at + 1 + PIECE_SIZE * i) for i in range(n - 1)]
+    end = read_end.py_func(packed, at + 1 + PIECE_SIZE * (n - 1))
+    if end.x < 0.0:
+        return end.slope
+    if pieces[0].begin > 0.0:
+        return pieces[0].a
+    piece = [piece for piece in pieces if piece.begin <= 0.0][-1]
+    t = -piece.begin
+    return piece.a + t * (2.0 * piece.b + t * 3.0 * piece.c)
+
+
+def scale_to(packed, at, slope):
+    """Set a packed stiffness that is a number; scale a table until its slope at 0 is this one.
+
+    Args:
+        packed, at: Array that is changed, and where the stiffness begins.
+        slope: [N/m or N m/rad]
+
+    Raises:
+        ZeroDivisionError: a table has no slope at 0.
+    """
+    n = whole_number(packed[at])
+    if n == 0:
+        packed[at + 1] = slope
+        return
+    factor = slope / slope_at_zero(packed, at)
+    last = at + 1 + PIECE_SIZE * (n - 1)
+    of_pieces = [k for k in range(at + 1, last) if (k - at - 1) % PIECE_SIZE]  # all but `begin`
+    for k in (*of_pieces, last + 1):
+        packed[k] = packed[k] * factor
+
+
 def number_of_points(packed, at):
     """Return how many points a packed stiffness has, 0 for a number, in a list."""
     return [whole_number(packed[at])]

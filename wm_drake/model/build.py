@@ -21,7 +21,7 @@ from wm_drake.model.wiring import Link, Wiring
 from wm_drake.parameters import Load, MachineParameters, MotorDrive, load_machine
 from wm_drake.parameters.drive import motor_of
 from wm_drake.systems.cabinet import Cabinet
-from wm_drake.systems.element_system import ElementSystem
+from wm_drake.systems.element_system import ElementSystem, element_system
 from wm_drake.systems.motor import Belt, Motor, SpeedController
 from wm_drake.systems.sensors import DRUM_OUTPUTS, Sensors
 from wm_drake.systems.speed_source import MotorTorque, SpeedSource
@@ -87,7 +87,7 @@ def add_washing_machine(
     wiring = Wiring(builder, plant, layout, prefix)
     by_label, on_tub, links = _element_systems(placed, parameters.profile.speed[0])
     drive = motor_of(parameters.drive)
-    friction = ElementSystem(DRUM_FRICTION, packed_friction(drive)) if drive else None
+    friction = element_system(DRUM_FRICTION, packed_friction(drive)) if drive else None
     tub_force, sensors = TubForce(), Sensors(resting.measured_points)
     others = [("tub_force", tub_force), *([("drum_friction", friction)] if friction else [])]
     tub_state = wiring.tub_state()
@@ -95,7 +95,7 @@ def add_washing_machine(
     if resting.cabinet is not None:
         cabinet, feet = (
             Cabinet(),
-            ElementSystem(FEET, resting.cabinet.packed(), np.zeros(SLIP_SIZE)),
+            element_system(FEET, resting.cabinet.packed(), np.zeros(SLIP_SIZE)),
         )
         on_cabinet = Link("cabinet", cabinet, len(layout.trees) - 1)
         wiring.connect_elements(tub_state, others, [*links, on_cabinet])
@@ -196,7 +196,7 @@ def _element_systems(
     by_label, on_tub, links = dict[str, ElementSystem](), list[tuple[str, Any]](), list[Link]()
     for label, element, kind, tree in placed.by_tree():
         initial = initial_state(element, drum_rate)
-        system = by_label[label] = ElementSystem(kind, element.packed(), initial)
+        system = by_label[label] = element_system(kind, element.packed(), initial)
         if tree:
             links.append(Link(label, system, tree))
         else:

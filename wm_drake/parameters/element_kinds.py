@@ -78,11 +78,7 @@ class HasParameters(Protocol):
 ELEMENT_KINDS: Registry[HasParameters] = Registry(
     "element kind",
     "wm_drake.elements",
-    [
-        "wm_drake.elements.ball_ring:BALL_RING",
-        "wm_drake.elements.liquid_ring:LIQUID_RING",
-        "wm_drake.elements.stop:STOP",
-    ],
+    ["wm_drake.elements.stop:STOP"],
 )
 """Registered element kinds, `wm_drake.elements.kind.ElementKind`, by name."""
 

@@ -46,7 +46,23 @@ def recorded_signal(record: Record, sensor: RecordedSensor, point: FloatArray) -
     Returns:
         (n,) at the samples of the record, in SI units of the quantity.
     """
-    motion, acceleration = tub_motion_of(record)
+    return _along(record, tub_motion_of(record), sensor, point, sensor.axis)[0]
+
+
+def _along(
+    record: Record,
+    tub: tuple[FloatArray, FloatArray],
+    sensor: RecordedSensor,
+    point: FloatArray,
+    axes: str,
+) -> list[FloatArray]:
+    """Return what the recorder of a sensor writes if its axis is that of each letter.
+
+    Args:
+        tub: States and accelerations of the tub, from `tub_motion_of`.
+        point: Position p_ToQ_T of the sensor in T. (3,) [m]
+    """
+    motion, acceleration = tub
     rest = rest_pose_of(record)
     if sensor.quantity == "displacement":
         vectors = point_displacements(motion, point[None], rest)[:, 0]
@@ -57,9 +73,12 @@ def recorded_signal(record: Record, sensor: RecordedSensor, point: FloatArray) -
         vectors = point_accelerations(motion, acceleration, point[None])[:, 0]
         if sensor.gravity == "included":
             vectors[:, 2] += gravity_of(record)
-    true = np.einsum("ni,ni->n", vectors, sensor_axis(sensor, motion[:, :3], rest[:3]))
-    sign = -1.0 if sensor.polarity == "negative" else 1.0
-    return sign * sensor.gain * _through_recorder(true, sample_period(record), sensor)
+    sign, signals = -1.0 if sensor.polarity == "negative" else 1.0, []
+    for axis in axes:
+        turned = sensor.model_copy(update={"axis": axis})
+        true = np.einsum("ni,ni->n", vectors, sensor_axis(turned, motion[:, :3], rest[:3]))
+        signals.append(sign * sensor.gain * _through_recorder(true, sample_period(record), sensor))
+    return signals
 
 
 def turned_signals(
@@ -72,11 +91,10 @@ def turned_signals(
     Args:
         points: Positions of the sensors in T, (3,) each. [m]
     """
-    columns = [
-        recorded_signal(record, sensor.model_copy(update={"axis": axis}), points[name])
-        for name, sensor in sensors.items()
-        for axis in (sensor.axis, *(other for other in "xyz" if other != sensor.axis))
-    ]
+    tub, columns = tub_motion_of(record), list[FloatArray]()
+    for name, sensor in sensors.items():
+        axes = sensor.axis + "xyz".replace(sensor.axis, "")
+        columns += _along(record, tub, sensor, points[name], axes)
     return np.stack(columns, axis=1).reshape(len(record.time), len(sensors), 3)
 
 

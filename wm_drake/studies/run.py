@@ -16,6 +16,7 @@ from wm_drake.engines import DEFAULT_ENGINE
 from wm_drake.errors import InputError, InputNotice, Problem, check_known, input_error
 from wm_drake.report.provenance import command_line
 from wm_drake.report.terminal import QUIET, say
+from wm_drake.studies.blocks import blocks_of
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.facts import PAGE, Facts
 from wm_drake.studies.inputs import (
@@ -171,7 +172,7 @@ def order_of(study: Study, given: Mapping[str, Any], command: str = "") -> Order
         others["machine"] = str(others["machine"])
     sizes = study.quick if running.get("quick") else {}
     try:
-        return Order(study, study.options(**{**sizes, **others}), model(**running), command)
+        return Order(study, study.all_options(**{**sizes, **others}), model(**running), command)
     except ValidationError as error:
         raise input_error_of(error) from None
 
@@ -217,6 +218,7 @@ def _executed(order: Order) -> tuple["Answer", Facts, tuple[str, ...]]:
     for text in about_machines:
         say(f"warning: {text}", err=True)
     task = study.begin(options, *machines)
+    begun = [block.begin(task) for block in blocks_of(study.command)]
     run = CommandRun(
         study.folder_owner,
         order.run.overwrite,
@@ -226,6 +228,8 @@ def _executed(order: Order) -> tuple["Answer", Facts, tuple[str, ...]]:
     )
     with _figures_in(order.run.figures), _notices_once(), _executor(order, run) as executor:
         result = task.run(executor)
+        for extend in filter(None, begun):
+            result = extend(executor, result)
         if executor.ledger is not None:
             executor.ledger.mark_finished()
         step, integrator = _stepping(machine)

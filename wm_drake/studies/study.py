@@ -25,16 +25,18 @@ it calls as often as it needs: once for a plain study, many times for an adaptiv
 of libraries and bisections are written as plain functions, and tests make up the runs.
 """
 
+import functools
 import pkgutil
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from wm_drake.engines import DEFAULT_ENGINE
 from wm_drake.registry import Registry
+from wm_drake.studies.blocks import blocks_of
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     from wm_drake.parameters import MachineParameters
@@ -97,9 +99,6 @@ ENGINE: Any = option(
     DEFAULT_ENGINE,
     "Engine that integrates the motion: compiled, or drake (the reference, seconds a run).",
     "NAME",
-)
-LIVE: Any = option(
-    False, "Let the page run the machine too: folded, with sliders, without a server."
 )
 SEED: Any = option(0, "Seed of all random numbers.", "N", ge=0, le=2**32 - 1)
 
@@ -164,6 +163,16 @@ class Study:
     has_machine: bool = True
     folder: str = ""
 
+    @functools.cached_property
+    def all_options(self) -> type[OptionModel]:
+        """Return the options with those of the blocks that packages add to the page."""
+        added: dict[str, Any] = {
+            k: v for block in blocks_of(self.command) for k, v in block.options.items()
+        }
+        if not added:
+            return self.options
+        return create_model(self.options.__name__, __base__=self.options, **added)
+
     @property
     def command(self) -> str:
         """Words of the command after the program's name."""
@@ -176,17 +185,12 @@ class Study:
 
 
 SHIPPED = (
-    "balancer.options:BALANCER",
     "calibrate.options:CALIBRATE",
     "cycle.options:CYCLE",
-    "design.options:DESIGN",
     "drive.options:DRIVE",
     "gasket.options:GASKET",
-    "gasket_curves.options:GASKET_CURVES",
     "gasket_damping.options:GASKET_DAMPING",
-    "gasket_geometry.options:GASKET_GEOMETRY",
     "modes.options:MODES",
-    "next.options:NEXT",
     "response.options:RESPONSE",
     "spin.options:SPIN",
     "spin_cycle.options:SPIN_CYCLE",
@@ -194,7 +198,7 @@ SHIPPED = (
     "tolerance.options:TOLERANCE",
     "verdict.options:VERDICT",
 )
-"""Studies of this package: module below `wm_drake.studies`, and name."""
+"""Studies of the core: module below `wm_drake.studies`, and name."""
 
 STUDIES: Registry[Study] = Registry(
     "study", "wm_drake.studies", [f"wm_drake.studies.{place}" for place in SHIPPED]

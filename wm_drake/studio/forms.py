@@ -49,7 +49,7 @@ def arguments(name: str, given: dict[str, str]) -> list[str]:
         parts = tuple(part.strip() for part in text.split(","))
         values[field] = parts if _is_repeatable(options[field]) else text
     try:
-        STUDIES[name].options(**{k: value for k, value in values.items() if k != "quick"})
+        STUDIES[name].all_options(**{k: value for k, value in values.items() if k != "quick"})
     except ValidationError as error:
         raise input_error_of(error) from None
     return [word for k, value in values.items() for word in _words(k, options[k], value)]
@@ -76,7 +76,7 @@ def _fields(study: Study) -> list[dict[str, Any]]:
 def _options(study: Study) -> dict[str, FieldInfo]:
     """Return the options of a study, and `--quick`."""
     quick = options_of_driver(study).model_fields["quick"]
-    return {**study.options.model_fields, "quick": quick}
+    return {**study.all_options.model_fields, "quick": quick}
 
 
 def _kind(option: FieldInfo) -> str | None:

@@ -13,8 +13,8 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 LARGEST_BODY = 1 << 18
 """Largest body of a request. [byte]"""
 
-BODY_TIMEOUT = 10.0
-"""Time in which the body of a request must arrive. [s]"""
+BODY_TIMEOUT = 2.0
+"""Time in which the body of a request must arrive, from this computer. [s]"""
 
 _HEADERS = (
     (
@@ -148,8 +148,8 @@ def _with_headers(send: Send) -> Send:
     return sent
 
 
-HEAD_TIMEOUT = 10.0
-"""Time in which the head of a request must arrive. [s]"""
+HEAD_TIMEOUT = 2.0
+"""Time in which the head of a request must arrive, from this computer. [s]"""
 
 
 class TimedConnection(H11Protocol):

@@ -21,7 +21,7 @@ from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 
 from wm_drake.batch.runs import Runner
-from wm_drake.errors import InputError, input_error
+from wm_drake.errors import LONGEST_LINE, InputError, input_error, shortened
 from wm_drake.live.exported import STATIC
 from wm_drake.live.machine import OpenMachine
 from wm_drake.live.state import PageState, Text
@@ -145,6 +145,7 @@ class Studio:
     async def _rank(self, key: str, state: PageState, keys: list[str]) -> list[dict[str, Any]]:
         take = partial(self.turns.take, f"ranking {key}", background=True)
         machine, _, runner = await take(lambda: self.opened(state.machine))
+        keys = [name for name in dict.fromkeys(keys) if name in machine.sliders]
         effects: list[dict[str, Any]] = []
         for begin in range(0, len(keys), LANES):
             part = keys[begin : begin + LANES]
@@ -310,13 +311,14 @@ def _json(content: Any, status: int = 200) -> Response:
 
 
 async def _wrong(_request: Request, error: Exception) -> Response:
-    """Return the problems of an input, each with the key of its value."""
+    """Return the problems of an input, each with the key of its value; long names are shortened."""
     assert isinstance(error, InputError)  # the handler of this type
     problems = []
     for problem in error.problems:
         is_of_file = problem.where and not problem.where.startswith("case ")
         place = f"{problem.where}: " if is_of_file else ""
-        problems.append({"key": problem.key, "message": f"{place}{problem.message}"})
+        message = shortened(f"{place}{problem.message}", LONGEST_LINE)
+        problems.append({"key": shortened(problem.key, LONGEST_LINE), "message": message})
     exists = isinstance(error, ExistsAlreadyError)
     return _json({"problems": problems, "exists": exists}, 409 if exists else 422)
 

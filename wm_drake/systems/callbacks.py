@@ -14,12 +14,17 @@ NO_SLOTS: tuple[str, ...] = ()
 """`__slots__` of the class of a system: a system has the dictionary of Drake's class."""
 
 
-def callback(method: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a function that calls a bound method and does not hold the object of the method."""
+def callback(method: Callable[..., Any], *more: Any) -> Callable[..., Any]:
+    """Return a function that calls a bound method and does not hold the object of the method.
+
+    Args:
+        method: The bound method.
+        more: Further arguments of each call.
+    """
     system: Any = weakref.ref(method.__self__)  # type: ignore[attr-defined]
     function: Any = method.__func__  # type: ignore[attr-defined]
 
     def call(*arguments: Any) -> Any:
-        return function(system(), *arguments)
+        return function(system(), *arguments, *more)
 
     return call

@@ -37,6 +37,8 @@ def define_system(name: str, module: str) -> Callable[[Callable[[type], Any]], A
         thread = threading.Thread(target=lambda: [template[scalar] for scalar in SCALARS])
         thread.start()
         thread.join()
+        plain = template[float]
+        plain.__name__ = plain.__qualname__ = name.rstrip("_")  # as Drake's own systems of doubles
         return template
 
     return decorate

@@ -7,7 +7,7 @@ from pydrake.autodiffutils import AutoDiffXd
 from pydrake.common.value import Value
 from pydrake.systems.framework import AbstractParameterIndex, LeafSystem_
 
-from wm_drake.elements.spin_profile import drum_acceleration, drum_motion
+from wm_drake.elements.spin_profile import drum_at
 from wm_drake.errors import input_error
 from wm_drake.parameters import SpinProfile
 from wm_drake.systems.callbacks import NO_SLOTS, callback
@@ -59,15 +59,13 @@ def SpinProfileSource_(T: type) -> Any:
 
         def _calc_acceleration(self, context: Any, output: Any) -> None:
             time = context.get_time()
-            value = drum_acceleration(self.get_profile(context), np.array(_number(time)))
-            output.SetFromVector([0.0 * time + float(value)])
+            acceleration, _ = drum_at(self.get_profile(context), _number(time))
+            output.SetFromVector([0.0 * time + acceleration])
 
         def _calc_speed(self, context: Any, output: Any) -> None:
-            time, profile = context.get_time(), self.get_profile(context)
-            at = np.array([min(_number(time), profile.duration)])
-            speed = drum_motion(profile, at)[0][0]
-            slope = drum_acceleration(profile, np.array(_number(time)))
-            output.SetFromVector([(time - _number(time)) * float(slope) + float(speed)])
+            time = context.get_time()
+            acceleration, speed = drum_at(self.get_profile(context), _number(time))
+            output.SetFromVector([(time - _number(time)) * acceleration + speed])
 
     Impl = SpinProfileSource
     return SpinProfileSource

@@ -308,15 +308,6 @@ def test_excess_is_the_logarithm_beyond_the_limit_on_both_sides():
     assert tiny.tolist() == [0.0, 0.0, 0.0]  # more than 100 % is no limit below
 
 
-@pytest.mark.parametrize(
-    ("limits", "message"),
-    [({"Q": 0.2}, "'Q' is no load, sensor"), ({"X": 0.0}, "limit of 'X': 0 is not allowed")],
-)
-def test_wrong_limits_are_refused(limits, message):
-    with pytest.raises(InputError, match=message):
-        limited_pair().limited(limits)
-
-
 def test_values_beyond_their_limits_are_named():
     found = solution([0.0], [1.0], np.zeros((1, 1)), targets=limited_pair())
     found = replace(found, amplitude=np.array([[1.05, 0.7], [1.4, 9.0]]))

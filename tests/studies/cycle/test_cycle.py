@@ -119,9 +119,3 @@ def test_command_writes_page_and_files(wm_drake, tmp_path):
     assert result.code == 0, result.err
     names = {path.name for path in (tmp_path / "out").iterdir()}
     assert {"report.html", "course.csv", "parts.csv"} <= names
-
-
-def test_an_unknown_load_is_refused(wm_drake):
-    result = wm_drake("study", "cycle", "--load", "midle")
-    assert result.code == 2
-    assert "middle" in result.err

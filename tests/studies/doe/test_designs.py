@@ -1,6 +1,8 @@
 """Designs: efficiency by an independent library and by brute force, optimality, strength, files."""
 
+import io
 import itertools
+import sys
 import time
 
 import numpy as np
@@ -161,12 +163,60 @@ def test_written_design_is_read_back(tmp_path):
     np.testing.assert_array_equal(read_design(tmp_path / "other.csv", NAMES).levels, design.levels)
 
 
+ROWS = [(a, b) for a in (-1, 0, 1) for b in (-1, 0, 1)]
+PLAIN = "".join(f"{a},{b}\n" for a, b in ("ab", *ROWS))
+SIGNS, LEVEL_WORDS = ("-", "0", "+"), ("Low", "mid", "high")
+MINITAB = "StdOrder,RunOrder,PtType,Blocks, A ,B\n" + "".join(
+    f"{n},{10 - n},1,1,{a},{b}\n" for n, (a, b) in enumerate([*ROWS, (0, 0)], 1)
+)
+JMP = "Pattern\ta\tb\tY\n" + "".join(
+    f"{SIGNS[a + 1]}{SIGNS[b + 1]}\t{a}\t{b}\t\n" for a, b in ROWS
+).replace("\t-1", "\t\N{MINUS SIGN}1")
+OF_PROGRAMS = {
+    "Excel": PLAIN.replace(",", ";").replace("-1", "-1,0").encode("utf-8-sig"),
+    "Excel, sep": ("sep=;\n" + PLAIN.replace(",", ";")).replace("\n", "\r\n").encode(),
+    "Excel, Unicode": PLAIN.replace(",", "\t").encode("utf-16"),
+    "Minitab": MINITAB.encode(),
+    "JMP": JMP.encode(),
+    "words": "".join(
+        ["a,b\n", *(f"{LEVEL_WORDS[a + 1]},{LEVEL_WORDS[b + 1]}\n" for a, b in ROWS)]
+    ).encode(),
+}
+
+
+@pytest.mark.parametrize("program", [*OF_PROGRAMS, "workbook"])
+@pytest.mark.filterwarnings("ignore::wm_drake.errors.InputNotice")
+def test_tables_of_programs_are_read(tmp_path, program):
+    path = tmp_path / "design.csv"
+    if program == "workbook":
+        pytest.importorskip("openpyxl")
+        path = tmp_path / "design.xlsx"
+        pd.read_csv(io.BytesIO(OF_PROGRAMS["Minitab"])).to_excel(path, index=False)
+    else:
+        path.write_bytes(OF_PROGRAMS[program])
+    levels = read_design(path, ("a", "b"), "main").levels
+    assert list(map(tuple, levels.tolist())) == ROWS
+
+
+def test_a_workbook_has_a_way_out(tmp_path, monkeypatch):
+    (tmp_path / "design.xlsx").write_bytes(b"PK")
+    for missing, words in {
+        False: "is no workbook",
+        True: "pip install 'wm-drake\\[excel\\]'",
+    }.items():
+        if missing:
+            monkeypatch.setitem(sys.modules, "openpyxl", None)
+        with pytest.raises(InputError, match=f"{words}.*save the sheet as CSV"):
+            read_design(tmp_path / "design.xlsx", ("a", "b"), "main")
+
+
 FAULTY_FILES = {
     "other columns": ("a,c\n0,0\n", "needs the columns a,b"),
-    "level": ("a,b\n0,0\n1,2\n", "row 2: '2' is not a level"),
-    "word": ("a,b\n0,low\n", "row 1: 'low' is not a level"),
+    "level": ("a,b\n0,0\n1,2\n", "csv:3: b: '2' is not a level"),
+    "word": ("a,b\n0,lov\n", "csv:2: b: 'lov' is not a level"),
+    "a response": ("a,b,Dx\n0,0,3.1\n", "remove Dx"),
+    "a factor twice": ("a,b,B\n0,0,0\n", "needs the columns a,b"),
     "nothing": ("a,b\n", "do not determine the 5 coefficients"),
-    "repeated": ("a,b\n0,0\n1,1\n0,0\n", "row 1 occurs more than once"),
     "too few": ("a,b\n0,0\n1,1\n-1,-1\n", "these 3 trials do not determine the 5 coefficients"),
     "one level missing": ("a,b\n0,0\n1,0\n0,1\n1,1\n0,-1\n1,-1\n", "do not determine"),
     "no text": ("\x00\x01", "design.csv"),

@@ -191,15 +191,6 @@ def test_any_measure_can_be_a_response(machine, reference):
     assert len(found) == 1 + 1 + 2 * len(reference.sensors) + 1 + 1 + 3 + 4
 
 
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [("gpa", "no response 'gpa' .did you mean 'gap'"), ("regions", "a spin profile with regions")],
-)
-def test_unknown_responses_are_refused(reference, name, message):
-    with pytest.raises(InputError, match=message):
-        chosen_responses(reference, SHORT, [name])
-
-
 def test_runs_that_touch_are_marked(reference):
     chosen = chosen_responses(reference, SHORT, ["Dx"])
     # gap and tensions are measured also where they are no responses

@@ -1,7 +1,6 @@
 """Study of drawings: the surface finds what is planted, drawings change as said, refusals."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -138,24 +137,3 @@ def test_thicker_and_harder_walls_are_stiffer_and_the_best_drawing_is_verified(t
         )
     ]
     assert parts == pytest.approx([drawings.thickness[best].item()] * len(parts), abs=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ("nosuch", "no shipped gasket drawing"),
-        ("soft.yaml", "rubber.shore_a: needs shore_a"),
-        ("folded --set gasket=null", "the machine has no gasket"),
-        ("folded --limit smallest_gap_mm=3", "'smallest_gap_mm': allowed are radial_N_per_mm"),
-        ("folded --limit largest_stretch=x", "'largest_stretch=x': allowed is a number above 0"),
-        ("bellows --folds 3", "with folds repeated 3 times"),
-        ("folded --load nosuch", "neither a load of machine"),
-    ],
-)
-def test_wrong_input_is_refused(wm_drake, words, message):
-    text = "meridian:\n- {radius: 160 mm, y: 0 mm, thickness: 2 mm}\n- {radius: 160 mm, y: 30 mm, thickness: 2 mm}\n"
-    Path("soft.yaml").write_text(f"{text}rubber: {{c1: 0.3 MPa}}\n")
-    ended = wm_drake(f"study gasket-geometry {words} --out out")
-    assert (ended.code, ended.out) == (2, "")
-    assert message in ended.err
-    assert not Path("out").exists()

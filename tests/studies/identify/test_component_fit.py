@@ -321,7 +321,6 @@ def test_twelve_noisy_loops_are_fitted():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda m: damper_model("glue", m), "--law: no law 'glue' of a damper"),
         (lambda m: damper_model("mstv", m, Given({"stiffness": (1.0, 2.0)})), "--bounds: unknown number 'stiffness'"),
         (lambda m: damper_model("mstv", m, Given(fixed={"glue": 1.0})), "--fix: unknown number 'glue'"),
         (

@@ -11,7 +11,7 @@ import numpy as np
 
 from wm_drake.errors import input_error, shortened
 from wm_drake.parameters.recorded.signal import Signal, split_title
-from wm_drake.parameters.text_files import read_any_text
+from wm_drake.parameters.text_files import check_regular, read_any_text
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import comma_hint, is_unit, plain_number, plain_unit
 
@@ -32,7 +32,7 @@ DAY = 86400.0
 
 
 @dataclass(frozen=True)
-class _Row:
+class Row:
     """Cells of a row of a table, and the line of the file in which it ends."""
 
     line: int
@@ -48,7 +48,7 @@ def text_signals(path: Path) -> Iterator[Signal]:
     Raises:
         InputError: it is no table, or a row has other columns than the header.
     """
-    rows = _rows(path)
+    rows = table_rows(path)
     if not rows:
         raise input_error(
             "is empty; a recording has a line of names, such as time [s], displacement [mm], "
@@ -90,8 +90,14 @@ def _with_unit(signal: Signal, below: str) -> Signal:
     return replace(signal, unit=signal.unit or below)
 
 
-def _rows(path: Path) -> list[_Row]:
-    """Return the rows of a table; lines that are empty or begin with # are left out."""
+def table_rows(path: Path) -> list[Row]:
+    """Return the rows of a table; lines that are empty or begin with # are left out.
+
+    Raises:
+        InputError: it is no table, or a workbook that cannot be read.
+    """
+    if path.suffix.lower() in (".xlsx", ".xlsm"):
+        return list(_sheet_rows(path))
     kept = [
         (at, line)
         for at, line in enumerate(read_any_text(path).splitlines(), 1)
@@ -106,15 +112,37 @@ def _rows(path: Path) -> list[_Row]:
     if not delimiter:
         delimiter = max(",;\t", key=texts[0].count) if kept else ","
         if not any(sign in texts[0] for sign in ",;\t") and _has_blanks(texts):
-            return [_Row(at, line.split()) for at, line in kept]
+            return [Row(at, line.split()) for at, line in kept]
     reader = csv.reader(texts, delimiter=delimiter)
     try:
         return [
-            _Row(kept[reader.line_num - 1][0], [cell.strip() for cell in cells]) for cells in reader
+            Row(kept[reader.line_num - 1][0], [cell.strip() for cell in cells]) for cells in reader
         ]
     except csv.Error as error:  # such as a field of more than 128 kB
         where = f"{path}:{kept[min(reader.line_num, len(kept)) - 1][0]}"
         raise input_error(f"cannot be read as CSV ({error})", where=where) from None
+
+
+def _sheet_rows(path: Path) -> Iterator[Row]:
+    """Yield the rows of the first sheet of a workbook that are not empty."""
+    check_regular(path)
+    where, way_out = str(path), "save the sheet as CSV (UTF-8)"
+    try:
+        from openpyxl import load_workbook
+    except ImportError:
+        message = f"is a workbook: pip install 'wm-drake[excel]', or {way_out}"
+        raise input_error(message, where=where) from None
+    try:
+        sheet = load_workbook(path, read_only=True, data_only=True).worksheets[0]
+        for number, values in enumerate(sheet.iter_rows(values_only=True), 1):
+            cells = ["" if value is None else str(value).strip() for value in values]
+            if any(cells) and not cells[0].startswith("#"):
+                yield Row(number, cells)
+    except Exception as error:  # whatever its XML contains
+        reason = shortened(str(error), 100) or type(error).__name__
+        raise input_error(
+            f"is no workbook that can be read ({reason}); {way_out}", where=where
+        ) from None
 
 
 def _has_blanks(lines: Sequence[str]) -> bool:
@@ -122,7 +150,7 @@ def _has_blanks(lines: Sequence[str]) -> bool:
     return len(lines) > 1 and 1 < len(lines[0].split()) == len(lines[1].split())
 
 
-def _check_width(path: Path, row: _Row, head: Sequence[str]) -> None:
+def _check_width(path: Path, row: Row, head: Sequence[str]) -> None:
     """Check that a row has the columns of the header; empty ones at an end may lack."""
     named = len(head) if head[-1] else len(head) - 1
     filled = row.cells if len(row.cells) <= len(head) else row.cells[: len(head)]

@@ -6,6 +6,7 @@ with a prior: the gain of each sensor and how it is tilted, offset and rate of e
 signals over time the angle of the drum at the start.
 """
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -14,6 +15,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from wm_drake.batch.ledger import Ledger, LedgerEntry, key_of
 from wm_drake.errors import InputError
 from wm_drake.parameters import Load, SpinProfile
 from wm_drake.parameters.recorded_sensors import RecordedSensor
@@ -62,6 +64,9 @@ ColumnKey: TypeAlias = tuple[int, RunKey, int, float, float, float, float]
 """What determines the signal of a sensor: recording, run, number of the sensor, offset and rate of
 the clock, and both angles of the axis."""
 
+AT_ONCE = 16
+"""Number of points after which the values are kept. Each fills a SIMD lane of two cores at most."""
+
 KEPT_RUNS, KEPT_COLUMNS = 40, 1500
 """Numbers of runs and of amplitudes of a sensor beyond which none are kept for the next call."""
 
@@ -74,12 +79,15 @@ class RecordModel(BlockModel):
         sensors, points: Sensors by name, and their positions in T. [m]
         loads: Loads with their recordings.
         by: What is fitted.
+        ledger: Where the values at each point are kept as soon as they are computed, so that a
+            search that was killed goes through the same points again without runs; or None.
     """
 
     sensors: Mapping[str, RecordedSensor]
     loads: tuple[RecordedLoad, ...]
     points: Mapping[str, FloatArray]
     by: By
+    ledger: Ledger | None = None
 
     misfit = MISFIT
     most_misfit = 2.0
@@ -148,6 +156,43 @@ class RecordModel(BlockModel):
 
     def computed(self, points: FloatArray) -> list[list[FloatArray]]:
         """Return what is predicted of each block (m, k) at each point; NaN where a run failed."""
+        if self.ledger is None:
+            return self._at(points)
+        keys = [key_of(content=self._content, point=point) for point in points]
+        new = {key: p for key, p in zip(keys, points, strict=True) if key not in self.ledger}
+        for begin in range(0, len(new), AT_ONCE):
+            part = list(new)[begin : begin + AT_ONCE]
+            values = self._at(np.stack([new[key] for key in part]))
+            self.ledger.put_all(
+                {
+                    key: LedgerEntry({str(number): one for number, one in enumerate(each)})
+                    for key, each in zip(part, values, strict=True)
+                }
+            )
+        return [list(self.ledger.get(key).values.values()) for key in keys]
+
+    @cached_property
+    def _content(self) -> str:
+        """Return the hash of all that determines the values at a point."""
+        machine = self.experiment.machine.parameters
+        return key_of(
+            fitted=self.by,
+            sensors=dict(self.sensors),
+            points=dict(self.points),
+            records=[
+                (
+                    load.name,
+                    load.load_at(machine),
+                    profile_of(pair.run),
+                    hashlib.sha256(pair.measured.tobytes()).hexdigest(),
+                )
+                for load in self.loads
+                for pair in load.pairs
+            ],
+        )
+
+    def _at(self, points: FloatArray) -> list[list[FloatArray]]:
+        """Compute the values at points."""
         self._run(points)
         for load in self.loads:
             for pair in load.pairs:

@@ -5,6 +5,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from wm_drake.batch.ledger import Ledger
 from wm_drake.errors import input_error
 from wm_drake.model.machine import Machine
 from wm_drake.parameters.vary_file import VARY_FILES, load_vary
@@ -81,7 +82,8 @@ class CalibrateRecordsTask(Task):
             for test in self.tests
         ]
         experiment = records_here(self.machine, executor)
-        model = record_model(experiment, self.free, self.tests, loads, self.options.by)
+        by, ledger = self.options.by, executor.ledger
+        model = record_model(experiment, self.free, self.tests, loads, by, ledger)
         title = f"Machine {self.machine.parameters.name} calibrated to records"
         return fitted_answer(executor, model, self.options.seed, (title, "calibrated"))
 
@@ -136,8 +138,9 @@ def record_model(
     tests: Sequence[CompareTask],
     loads: Sequence[RecordedLoad],
     by: Any,
+    ledger: Ledger | None,
 ) -> RecordModel:
-    """Return the model of the sensors of all loads.
+    """Return the model of the sensors of all loads, whose values a ledger keeps.
 
     Raises:
         InputError: the records of the loads have other sensors.
@@ -150,7 +153,8 @@ def record_model(
                 f"{', '.join(test.sensors)}, those of load {tests[0].case.name} {', '.join(names)}",
                 where="RECORD",
             )
-    return RecordModel(experiment, free, tests[0].sensors, tuple(loads), tests[0].points, by)
+    sensors, points = tests[0].sensors, tests[0].points
+    return RecordModel(experiment, free, sensors, tuple(loads), points, by, ledger)
 
 
 def _by_load(options: CalibrateOptions) -> dict[str | None, tuple[Path, ...]]:

@@ -15,7 +15,7 @@ from wm_drake.parameters.units import plain_number
 from wm_drake.parameters.vary_file import VARY_FILES, load_vary
 from wm_drake.simulation.cases import case_of
 from wm_drake.simulation.records import Record
-from wm_drake.studies.answer import Answer, Part
+from wm_drake.studies.answer import Answer
 from wm_drake.studies.calibrate.options import CalibrateOptions
 from wm_drake.studies.calibrate.page import calibrate_answer
 from wm_drake.studies.calibrate.parameter_map import read_parameter_map
@@ -34,8 +34,6 @@ from wm_drake.studies.executor import Executor
 from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.inputs import pairs_of, with_measured
 from wm_drake.studies.modes.natural import natural_modes
-from wm_drake.studies.next.knowledge import Knowledge, of_calibration
-from wm_drake.studies.next.task import next_block
 from wm_drake.studies.study import Task
 
 OF_RECORDS = ("unknown", "by", "test", "load", "profile", "speed", "unit", "channels")
@@ -50,7 +48,9 @@ def calibrate_task(options: CalibrateOptions, machine: Machine) -> Task:
 
 
 class CalibrateTask(Task):
-    """A calibration to targets with checked options."""
+    """A calibration to targets with checked options; `calibration` is what it found."""
+
+    calibration: Calibration
 
     def __init__(self, options: CalibrateOptions, machine: Machine) -> None:
         """Read targets and vary file, and check the settings of the searches.
@@ -109,22 +109,8 @@ class CalibrateTask(Task):
         states = titles if parameters.gasket else {False: "modes"}
         modes = {title: natural_modes(best, gasket=gasket) for gasket, title in states.items()}
         runs = [records[number] for number in range(len(cases))]
-        answer = calibrate_answer(calibration, predictions, parameters, runs, modes)
-        part = self._next(executor, calibration)
-        return replace(answer, parts=(*answer.parts, part))
-
-    def _next(self, executor: Executor, calibration: Calibration) -> Part:
-        """Return what to measure next, given the best solution of a calibration."""
-        best, options = calibration.solutions[0], self.options
-        words = ["wm-drake study next", options.machine, f"--vary {options.vary}"]
-        words += [f"--calibrated {executor.out or 'FOLDER'}"]
-
-        def known() -> Knowledge:
-            covariance = best.fit.covariance
-            return of_calibration(calibration.parameter_map, best.point, covariance)
-
-        profile = self.machine.parameters.profile
-        return next_block(executor, known, " ".join(words), profile, self.targets.loads)
+        self.calibration = calibration
+        return calibrate_answer(calibration, predictions, parameters, runs, modes)
 
 
 def _targets(parameters: MachineParameters, deviations: Mapping[str, float]) -> Targets:

@@ -1,13 +1,17 @@
 """Designs of experiments: make one of a kind, or read it from a CSV file."""
 
+import re
+import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from wm_drake.errors import check_known, input_error
-from wm_drake.parameters.csv_files import read_csv, read_header
+from wm_drake.errors import InputNotice, Problem, check_known, input_error, shortened
+from wm_drake.parameters.recorded.text import Row, table_rows
+from wm_drake.parameters.units import plain_number
 from wm_drake.studies.doe.coding import LEVELS, MODELS, Levels, columns, efficiency, level_matrix
 from wm_drake.studies.doe.exchange import d_optimal_levels
 from wm_drake.studies.doe.orthogonal import orthogonal_levels
@@ -142,49 +146,50 @@ def _check_size(trials: int) -> None:
         )
 
 
-def read_design(path: Path, factors: tuple[str, ...], model: str = "main+2fi") -> Design:
-    """Read a design from a CSV file.
+OF_PROGRAMS = {
+    *(TRIAL, "run", "order", "std", "stdorder", "runorder", "pttype", "centerpt", "block"),
+    *("blocks", "pattern", "type"),
+}
+"""Columns that programs for designs add, in small letters and without signs; they are ignored."""
 
-    The file has one column per factor, in any order, with the levels -1, 0 and 1. A column `trial`
-    is optional. Columns with the name of a factor and more, such as `C_L_Ns_per_mm` for its values,
-    are for the reader and are ignored.
+WORDS = {
+    **dict.fromkeys(("low", "-"), -1.0),
+    **dict.fromkeys(("mid", "middle", "centre", "center", "medium"), 0.0),
+    **dict.fromkeys(("high", "+"), 1.0),
+}
+"""Levels in words."""
+
+
+def read_design(path: Path, factors: tuple[str, ...], model: str = "main+2fi") -> Design:
+    """Read a design from a table as spreadsheets and programs for designs write it.
+
+    The file has one column per factor, in any order, with the levels -1, 0 and 1, or low, mid and
+    high. Columns of `OF_PROGRAMS`, empty ones, and those with the name of a factor and more, such
+    as `C_L_Ns_per_mm` for its values, are ignored. A trial that is repeated runs once.
 
     Args:
         model: Model to estimate, key of `MODELS`.
 
     Raises:
-        InputError: the file has other columns, other levels or a repeated trial, or the trials do
-            not determine the model.
+        InputError: the file has other columns or other levels, or the trials do not determine the
+            model.
     """
-    named = list(read_header(path))
-    more = tuple(f"{factor}{end}" for factor in factors for end in ("_", " "))
-    read = {TRIAL, *(name for name in named if name.startswith(more))} - set(factors)
-    factor_columns = [name for name in named if name not in read]
-    if sorted(factor_columns) != sorted(factors):
-        raise input_error(
-            f"needs the columns {','.join(factors)} (and may have {TRIAL}), has {','.join(named)}",
-            where=str(path),
-        )
-    table = read_csv(path, named)[list(factors)]
-    numbers = table.apply(pd.to_numeric, errors="coerce").to_numpy(dtype=float)
-    bad = np.argwhere(~np.isin(numbers, LEVELS))
-    if len(bad):
-        row, column = bad[0]
-        value = table.iloc[row, column]
-        raise input_error(
-            f"row {row + 1}: '{value}' is not a level; allowed are -1, 0 and 1",
-            where=str(path),
-            key=factors[column],
-        )
-    levels = numbers.astype(np.int8)
-    _, first, counts = np.unique(levels, axis=0, return_index=True, return_counts=True)
-    if len(first) < len(levels):
-        row = int(first[np.argmax(counts)]) + 1
-        raise input_error(
-            f"row {row} occurs more than once; rows must differ, as a repeated run has the same "
-            "result",
-            where=str(path),
-        )
+    head, *rows = table_rows(path) or [Row(1, [])]
+    places = _factor_columns(path, head.cells, rows, factors)
+    levels = np.zeros((len(rows), len(factors)), dtype=np.int8)
+    for number, row in enumerate(rows):
+        for column, place in enumerate(places):
+            cell = row.cells[place] if place < len(row.cells) else ""
+            level = _level(cell)
+            if level not in LEVELS:
+                raise input_error(
+                    f"'{shortened(cell, 40)}' is not a level; allowed are -1, 0 and 1, or low, mid "
+                    "and high",
+                    where=f"{path}:{row.line}",
+                    key=factors[column],
+                )
+            levels[number, column] = level
+    levels = _without_repeats(path, levels)
     design = Design(path.name, factors, levels, model)
     if design.efficiency() == 0.0:
         needed = columns(len(factors), model)
@@ -194,3 +199,51 @@ def read_design(path: Path, factors: tuple[str, ...], model: str = "main+2fi") -
             where=str(path),
         )
     return design
+
+
+def _level(cell: str) -> float:
+    """Return the level of a cell, with a comma or a point, and any minus; NaN if it is none."""
+    text = cell.strip().lower().replace("\N{MINUS SIGN}", "-").replace(",", ".")
+    try:
+        return WORDS[text] if text in WORDS else plain_number(text)
+    except ValueError:
+        return np.nan
+
+
+def _factor_columns(
+    path: Path, head: Sequence[str], rows: Sequence[Row], factors: Sequence[str]
+) -> list[int]:
+    """Return the column of each factor.
+
+    Raises:
+        InputError: a factor has none or several, or a column is neither of a factor nor known.
+    """
+    by_name, others = dict[str, list[int]](), list[str]()
+    plain = {factor.casefold(): factor for factor in factors}
+    more = tuple(f"{factor}{end}" for factor in factors for end in ("_", " "))
+    for place, title in enumerate(head):
+        name, short = title.strip(), re.sub(r"[\W_]", "", title).lower()
+        factor = name if name in factors else plain.get(name.casefold(), "")
+        if factor:
+            by_name.setdefault(factor, []).append(place)
+        elif short in OF_PROGRAMS or name.startswith(more):
+            continue
+        elif any(row.cells[place : place + 1] not in ([], [""]) for row in rows):
+            others.append(name)
+    if others or sorted(by_name) != sorted(factors) or any(len(v) > 1 for v in by_name.values()):
+        message = f"needs the columns {','.join(factors)} (and may have {TRIAL})"
+        message += f", has {','.join(map(str.strip, head))}"
+        if others:
+            message += f"; remove {', '.join(others)}: no factor, and no column of a known program"
+        raise input_error(message, where=str(path))
+    return [by_name[factor][0] for factor in factors]
+
+
+def _without_repeats(path: Path, levels: Levels) -> Levels:
+    """Return trials without those that are repeated, such as centre points, with a notice."""
+    _, first = np.unique(levels, axis=0, return_index=True)
+    left_out = len(levels) - len(first)
+    if left_out:
+        message = f"{left_out} repeated trials run once: a repeated run has the same result"
+        warnings.warn(str(Problem(str(path), "", message)), InputNotice, stacklevel=3)
+    return levels[np.sort(first)]

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
+from wm_drake.elements.kind import element_kind
 from wm_drake.elements.spin_profile import drum_motion
 from wm_drake.elements.state_map import BEARING_WORDS
 from wm_drake.engines.compiled.step_check import fastest_motions
@@ -17,24 +18,15 @@ from wm_drake.model.build import AnyMachine, machine_of
 from wm_drake.model.machine import Machine, Setup
 from wm_drake.model.sdf_names import tubes_of
 from wm_drake.model.state_layout import CARRIER
-from wm_drake.parameters import (
-    DAMPER_LAWS,
-    InertiaMatrix,
-    Load,
-    MachineParameters,
-    SpinProfile,
-    Unbalance,
-)
+from wm_drake.parameters import DAMPER_LAWS, InertiaMatrix, Load, MachineParameters, SpinProfile
 from wm_drake.parameters import units as u
-from wm_drake.parameters.cabinet import Foot, FootType
-from wm_drake.parameters.drive import (
-    BearingFriction,
-    SpeedController,
-    TorqueLimit,
-    TorqueLimitTable,
-)
+from wm_drake.parameters.cabinet import Cabinet
+from wm_drake.parameters.drive import MotorDrive
+from wm_drake.parameters.element_kinds import ELEMENT_KINDS
 from wm_drake.parameters.elements import Frozen
 from wm_drake.parameters.file_keys import DocumentedSchema
+from wm_drake.parameters.machine import Imperfections
+from wm_drake.parameters.sections import SECTIONS
 from wm_drake.simulation.band import (
     FILTER_ORDER,
     HIGH_PASS_HZ,
@@ -52,12 +44,15 @@ from wm_drake.studies.machine_show.elements import (
     Spring,
     TelescopicDamper,
     Vector,
+    described_elements,
+    described_type,
 )
 from wm_drake.studies.modes.linearisation import MODES, Linearisation
 
-VERSION = "wm_drake machine description 3"
-"""Name and version of the format. In version 2 springs could not go slack; version 1 had no key
-`format`."""
+VERSION = "wm_drake machine description 4"
+"""Name and version of the format. In version 3 cabinet and motor had keys other than those of
+the machine file, and rubber a group of its own; in version 2 springs could not go slack; version 1
+had no key `format`."""
 
 CONVENTIONS = {
     "frames": "W housing, T tub, D drum; x right, y to the rear, z up. As drawn, all coincide.",
@@ -119,45 +114,12 @@ class DrumBearing(Open):
     fastest_motion_hz: float
 
 
-class Motor(Frozen, from_attributes=True):
-    """A motor with belt and speed controller: friction at the drum, the rest at its shaft."""
+class Motor(MotorDrive):
+    """A motor with belt and speed controller; the inertias of tub and drum contain its rotor."""
 
-    belt_ratio: u.Ratio = Field(description="Speed of the motor over speed of the drum.")
-    rotor_inertia_kgm2: u.Inertia = Field(
-        validation_alias="rotor_inertia",
-        description="About the motor's axis. The inertias of tub and drum contain its coupling.",
-    )
     reflected_inertia_kgm2: u.Inertia = Field(
-        validation_alias="reflected_inertia",
-        description="Acts on the joint of the drum alone, in addition to the inertia of the drum.",
+        description="Acts on the joint of the drum alone, in addition to the inertia of the drum."
     )
-    torque_limit: TorqueLimit | TorqueLimitTable
-    controller: SpeedController
-    bearing_friction: BearingFriction
-    torque_constant_NmA: u.TorqueConstant | None = Field(
-        validation_alias="torque_constant",
-        description="Torque at the motor's shaft per current; null if it is not known.",
-    )
-
-
-class Imperfections(Frozen, from_attributes=True):
-    """Imperfections other than the bearing.
-
-    Attributes:
-        residual_imbalance: It is added to every load, but not to the empty machine.
-        phase_error: It is added to the phase of the rear mass of spin-cycle cases that have a front
-            mass too, and to nothing else.
-    """
-
-    residual_imbalance: Unbalance
-    phase_error: u.Angle
-
-
-class Sensor(Frozen):
-    """A sensor of the displacement of a point of the tub from its rest position, along one axis."""
-
-    point_T: u.Position
-    axis_W: Literal["x", "y", "z"]
 
 
 class Accelerometer(Frozen):
@@ -166,19 +128,10 @@ class Accelerometer(Frozen):
     point_T: u.Position
 
 
-class Cabinet(Frozen, from_attributes=True):
-    """The rigid cabinet on four feet; it has no influence on the motion unless it moves."""
+class Sensor(Accelerometer):
+    """A sensor of the displacement of a point of the tub from its rest position, along one axis."""
 
-    mass: u.Mass = Field(description="Of all that does not hang on the mounts.")
-    centre_of_mass_W: u.Position = Field(validation_alias="centre_of_mass")
-    floor_z_W: u.Length = Field(validation_alias="floor", description="Height of the floor.")
-    friction: u.Ratio = Field(description="Coefficient of Coulomb friction of the feet.")
-    feet: dict[str, Foot]
-    moves: bool = Field(description="Whether it moves on its feet; else the housing is fixed.")
-    inertia_kgm2: InertiaMatrix | None = Field(
-        validation_alias="inertia", description="None for a fixed cabinet."
-    )
-    foot_type: FootType | None = Field(description="None for a fixed cabinet.")
+    axis_W: Literal["x", "y", "z"]
 
 
 class Residual(Frozen):
@@ -238,14 +191,20 @@ class Description(Frozen):
     equilibrium_residual: Residual
     natural_frequencies_hz: list[float]
     mode_damping_ratios: list[float]
-    elements: dict[str, OtherElement] = Field(
-        description="Elements of kinds of other packages, or on the drum."
-    )
+    elements: dict[str, OtherElement] = Field(description="Elements of the section `elements`.")
 
 
 def description_schema() -> dict[str, Any]:
     """Return the JSON schema of what `describe` returns and `machine show --json` prints."""
     schema = Description.model_json_schema(mode="serialization", schema_generator=DocumentedSchema)
+    kinds = {
+        name: described_type(element_kind(name), kind.parameters).model_json_schema(
+            mode="serialization", schema_generator=DocumentedSchema
+        )
+        for name, kind in ELEMENT_KINDS.items()
+    }
+    schema["$defs"]["OtherElement"]["anyOf"] = [{"$ref": f"#/$defs/{name}"} for name in kinds]
+    schema["$defs"] |= kinds
     return {"$schema": DocumentedSchema.schema_dialect, **schema}
 
 
@@ -271,7 +230,7 @@ def description_of(machine: Machine) -> Description:
     setup = machine.set_up()
     modes = Linearisation(machine.set_up(dampers=False)).spectrum().first(MODES)
     parameters, bodies = setup.parameters, _bodies(setup)
-    cabinet, motor = parameters.cabinet, setup.motor
+    motor, elements = setup.motor, {name: described_elements(setup, name) for name in SECTIONS}
     return Description(
         machine=parameters.name,
         laws=_laws(parameters),
@@ -280,12 +239,10 @@ def description_of(machine: Machine) -> Description:
         oscillating_mass_kg=oscillating_mass(setup),
         drum_joint=_drum_joint(setup),
         drum_bearing=_drum_bearing(setup),
-        motor=None if motor is None else Motor.model_validate(motor),
-        imperfections=Imperfections.model_validate(parameters.imperfections),
-        springs={name: Spring.of(setup, name) for name in setup.springs},
-        dampers={name: Damper.of(setup, name) for name in setup.dampers},
-        bushings={name: Bushing.of(setup, name) for name in setup.bushings},
-        telescopic_dampers={n: TelescopicDamper.of(setup, n) for n in setup.telescopes},
+        motor=None
+        if motor is None
+        else Motor(**dict(motor), reflected_inertia_kgm2=motor.reflected_inertia),
+        imperfections=parameters.imperfections,
         sensors={
             name: Sensor(point_T=setup.sensor_points[name].tolist(), axis_W=sensor.axis)
             for name, sensor in parameters.sensors.items()
@@ -295,7 +252,7 @@ def description_of(machine: Machine) -> Description:
             for name, point in setup.accelerometer_points.items()
         },
         detergent_point_T=setup.detergent_point.tolist(),
-        cabinet=None if cabinet is None else Cabinet.model_validate(cabinet),
+        cabinet=parameters.cabinet,
         loads=parameters.loads,
         profile=parameters.profile,
         numerics=_numerics(parameters),
@@ -306,7 +263,7 @@ def description_of(machine: Machine) -> Description:
         ),
         natural_frequencies_hz=modes.frequency_hz.tolist(),
         mode_damping_ratios=modes.damping_ratio.tolist(),
-        elements={name: OtherElement.of(setup, name) for name in setup.elements.others},
+        **elements,
     )
 
 

@@ -1,27 +1,43 @@
-"""Description of the elements on the tub in SI units, complete enough to rebuild them.
+"""Description of the elements in SI units, complete enough to rebuild them.
 
-Each type declares keys, units and meaning, from which its JSON schema follows, and `of` fills it.
-The suffix of a key is the frame of a point or direction: W housing, T tub.
+It follows from their declarations: the numbers are those of the machine file, with their units and
+meaning; in place of the names of frames and types there are the places and numbers that these name.
+The kind of an element says what else belongs to it, see `wm_drake.elements.kind.Described`; a kind
+of another package is described alike.
 """
 
-from typing import Any, Literal, Self, TypeAlias
+from copy import copy
+from typing import Annotated, Any, Self, TypeAlias
 
 import numpy as np
-from pydantic import ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from wm_drake.compiler.compilation import generic
 from wm_drake.compiler.vectors import rotation_from_rpy
+from wm_drake.elements.friction_damper import FRICTION_DAMPER_STRUT
+from wm_drake.elements.kind import Described, ElementKind
+from wm_drake.elements.rubber import SIX_COMPONENT_BUSHING_OF_RUBBER
+from wm_drake.elements.spring import SPRING_STRUT
+from wm_drake.elements.telescopic_damper import TELESCOPIC_DAMPER_TUBES
 from wm_drake.model.equilibrium import tensions_at
 from wm_drake.model.machine import Setup
 from wm_drake.model.sdf_names import tubes_of
 from wm_drake.parameters import BushingType
 from wm_drake.parameters import units as u
-from wm_drake.parameters.elements import EndBushing, Frozen, Stiffness
+from wm_drake.parameters.elements import EndBushing, Frozen, SpringType
+from wm_drake.parameters.file_keys import meanings_of
 from wm_drake.parameters.rubber import RubberBranches
+from wm_drake.parameters.sections import SECTIONS
 from wm_drake.parameters.types import FloatArray
 
 Vector: TypeAlias = tuple[float, float, float]
 Rotation: TypeAlias = tuple[Vector, Vector, Vector]
+
+SHAPES = {(): float, (3,): Vector, (3, 3): Rotation}
+"""Type of a described number by its shape."""
+
+NAMES = ("tub_frame", "housing_frame", "outer_frame", "inner_frame")
+"""Fields of an element that name frames."""
 
 
 class Open(Frozen):
@@ -46,118 +62,67 @@ class Pose(Frozen):
         return cls.model_validate(dict(zip(cls.model_fields, values.tolist(), strict=True)))
 
 
-class Strut(Frozen):
-    """Line from the housing end to the tub end.
+LINE = (
+    Described("length_at_rest", "Length at the rest pose.", unit="m"),
+    Described("direction_at_rest_W", "From the housing end to the tub end.", shape=(3,)),
+)
+"""What each strut has at the rest pose."""
 
-    Drawn means that T coincides with W. The rest pose may differ slightly from it.
+
+def described_type(kind: ElementKind, parameters: type[BaseModel] | None = None) -> Any:
+    """Return the type of the described elements of a kind; further keys are allowed.
+
+    Args:
+        parameters: Type of its numbers in a machine file, whose fields it has too.
     """
-
-    tub_point_T: u.Position
-    housing_point_W: u.Position
-    length_at_rest: u.Length
-    direction_at_rest_W: Vector
-
-
-def line_of(setup: Setup, element: Any) -> dict[str, Any]:
-    """Return ends, length and direction of a strut at the rest pose, the fields of `Strut`.
-
-    The direction points from the housing end to the tub end.
-    """
-    rotation = np.reshape(generic(rotation_from_rpy)(*setup.rest_pose[:3]), (3, 3))
-    line = setup.rest_pose[3:] + rotation @ element.p_ToA_T - element.p_WH
-    length = float(np.linalg.norm(line))
-    return {
-        "tub_point_T": element.p_ToA_T.tolist(),
-        "housing_point_W": element.p_WH.tolist(),
-        "length_at_rest": length,
-        "direction_at_rest_W": (line / length).tolist(),
-    }
+    fields: dict[str, Any] = {}
+    meanings = meanings_of(parameters) if parameters else {}
+    for name, field in (parameters.model_fields if parameters else {}).items():
+        if name not in NAMES:
+            about = copy(field)
+            about.description = meanings.get(name)
+            fields[name] = (field.annotation, about)
+    for one in (*kind.described, *(LINE if kind.picture == "strut" else ())):
+        form: Any = SHAPES[one.shape]
+        unit = u.Unit(one.unit, one.unit) if one.unit else None
+        form = Annotated[form, unit] if unit and form is float else form
+        words = f"{one.words} [{one.unit}]" if one.shape and one.unit else one.words
+        fields[one.name] = (form | None, Field(description=words))
+    return create_model(kind.title, __base__=Open, **fields)
 
 
-class Spring(Strut):
+_SPRING: Any = described_type(SPRING_STRUT, SpringType)
+_DAMPER: Any = described_type(FRICTION_DAMPER_STRUT)
+_BUSHING: Any = described_type(SIX_COMPONENT_BUSHING_OF_RUBBER, BushingType)
+_TUBES: Any = described_type(TELESCOPIC_DAMPER_TUBES)
+
+
+class Spring(_SPRING):
     """A spring: h = preload + F(length - length_at_preload), F = k x or a table.
 
     The tension is h from `taut_from` on, 0 where h <= 0, and between them w s^2 (2 - s) with w =
     taut_from and s = h / w. A tension-compression spring has the tension h everywhere.
     """
 
-    action: Literal["tension-only", "tension-compression"]
-    stiffness: Stiffness
-    length_at_preload: u.Length = Field(description="Length as drawn.")
-    preload: u.Force = Field(description="Tension as drawn.")
     tension_at_rest: u.Force
-    taut_from: u.Force | None = Field(description="None for tension-compression.")
-    free_length: u.Length | None = Field(
-        description="Length at which h is 0; None if there is none."
-    )
-
-    @classmethod
-    def of(cls, setup: Setup, name: str) -> Self:
-        """Return a spring of a machine."""
-        kind = setup.parameters.spring_types[setup.parameters.springs[name].type]
-        placed = setup.springs[name]
-        return cls(
-            **line_of(setup, placed),
-            action=kind.action,
-            stiffness=kind.stiffness,
-            length_at_preload=placed.rest_length,
-            preload=placed.preload,
-            tension_at_rest=tensions_at(setup.elements, setup.rest_pose)[name],
-            taut_from=None if placed.pushes else placed.taut_from,
-            free_length=placed.free_length,
-        )
 
 
-class Damper(Strut):
+class Damper(_DAMPER):
     """A friction damper on a massless strut; the other keys are the numbers of its law, in SI."""
 
-    model_config = ConfigDict(extra="allow")
     law: str = Field(description="Name of the law, key of `laws`.")
     end_bushing: EndBushing
-    neutral_direction: Vector = Field(
-        description="Direction as drawn. Both end bushings are neutral when the strut has this "
-        "direction in W (housing end) and in T (tub end)."
-    )
-
-    @classmethod
-    def of(cls, setup: Setup, name: str) -> Self:
-        """Return a friction damper of a machine."""
-        kind = setup.parameters.damper_types[setup.parameters.dampers[name].type]
-        placed = setup.dampers[name]
-        line = placed.p_ToA_T - placed.p_WH
-        neutral = (line / np.linalg.norm(line)).tolist()
-        return cls(**line_of(setup, placed), neutral_direction=neutral, **dict(kind))
 
 
-class Bushing(BushingType):
-    """A bushing between tub and housing; its law holds along the axes of the housing-side frame."""
+class Bushing(_BUSHING):
+    """A bushing between tub and housing; its law holds along the axes of the housing-side frame.
 
-    tub_point_T: u.Position
-    tub_rotation_T: Rotation
-    housing_point_W: u.Position
-    housing_rotation_W: Rotation
-    rubber: dict[str, float] | None = Field(
-        description="Friction, Maxwell branches and cross-stiffness by key of the machine file, as "
-        "far as they are not 0; in SI (N, m, N m, rad, s). Their stretches are 0 at the start of a "
-        "run. None without them."
-    )
-
-    @classmethod
-    def of(cls, setup: Setup, name: str) -> Self:
-        """Return a bushing of a machine, such as its gasket."""
-        placed, numbers = setup.bushings[name], dict(setup.parameters.all_bushings()[name])
-        rubber = {key: numbers[key] for key in RubberBranches.model_fields if numbers.get(key)}
-        return cls(
-            tub_point_T=placed.tub_side_point.tolist(),
-            tub_rotation_T=placed.tub_side_rotation.tolist(),
-            housing_point_W=placed.ground_side_point.tolist(),
-            housing_rotation_W=placed.ground_side_rotation.tolist(),
-            rubber=rubber or None,
-            **{key: numbers[key] for key in BushingType.model_fields},
-        )
+    The other keys are friction, Maxwell branches and cross-stiffness of rubber by key of the
+    machine file, as far as they are not 0. Their stretches are 0 at the start of a run.
+    """
 
 
-class TelescopicDamper(Open):
+class TelescopicDamper(_TUBES):
     """Two tubes as bodies, each on a bushing; the other keys are the numbers of the law along them.
 
     O is the link frame of the outer tube, which coincides with T as drawn.
@@ -166,76 +131,74 @@ class TelescopicDamper(Open):
     law: str = Field(description="Name of the law, key of `laws`.")
     outer_tube: str
     inner_tube: str
-    axis_outer_tube: Vector = Field(description="Direction of extension, in O.")
-    tub_point_T: u.Position = Field(description="Tub bushing, on the tub.")
-    outer_point_outer_tube: u.Position = Field(description="Tub bushing, on the outer tube.")
-    inner_point_outer_tube: u.Position = Field(
-        description="Housing bushing, on the inner tube, in O at extension 0."
-    )
-    housing_point_W: u.Position = Field(description="Housing bushing, on the housing.")
     tub_bushing: BushingType
     housing_bushing: BushingType
-    tub_bushing_on_tub_rotation_T: Rotation
-    tub_bushing_law_rotation_outer_tube: Rotation = Field(
-        description="Frame, in O, along whose axes the law of the tub bushing holds."
-    )
-    housing_bushing_on_inner_tube_rotation_outer_tube: Rotation
-    housing_bushing_law_rotation_W: Rotation = Field(
-        description="Frame, in W, along whose axes the law of the housing bushing holds."
-    )
     outer_tube_rest_pose: Pose
     extension_at_rest: u.Length
 
-    @classmethod
-    def of(cls, setup: Setup, name: str) -> Self:
-        """Return a telescopic damper of a machine."""
-        parameters, placed = setup.parameters, setup.telescopes[name]
-        damper = parameters.telescopic_dampers[name]
-        outer, inner = (body.name() for body in tubes_of(setup.machine.plant, damper.joint))
-        rest = setup.tube_rest[list(setup.telescopes).index(name)]
-        at_tub, at_housing = placed.tub_bushing, placed.housing_bushing
-        numbers = parameters.damper_types[damper.type].model_dump(exclude={"end_bushing"})
-        return cls(
-            outer_tube=outer,
-            inner_tube=inner,
-            axis_outer_tube=placed.axis.tolist(),
-            tub_point_T=at_tub.tub_side_point.tolist(),
-            outer_point_outer_tube=at_tub.ground_side_point.tolist(),
-            inner_point_outer_tube=at_housing.tub_side_point.tolist(),
-            housing_point_W=at_housing.ground_side_point.tolist(),
-            tub_bushing=parameters.bushing_types[damper.tub_bushing],
-            housing_bushing=parameters.bushing_types[damper.housing_bushing],
-            tub_bushing_on_tub_rotation_T=at_tub.tub_side_rotation.tolist(),
-            tub_bushing_law_rotation_outer_tube=at_tub.ground_side_rotation.tolist(),
-            housing_bushing_on_inner_tube_rotation_outer_tube=(
-                at_housing.tub_side_rotation.tolist()
-            ),
-            housing_bushing_law_rotation_W=at_housing.ground_side_rotation.tolist(),
-            outer_tube_rest_pose=Pose.of(rest[:6]),
-            extension_at_rest=float(rest[6]),
-            **numbers,
-        )
-
 
 class OtherElement(Open):
-    """An element of a kind of another package, or on the drum, such as a ring of balls.
-
-    The other keys are its parameters and its further points and frames, in SI.
-    """
+    """An element of the section `elements`; the other keys are those of its kind."""
 
     kind: str = Field(description="Name of the kind in machine files.")
     law: str = Field(description="What it is, in words.")
-    tub_point_T: u.Position = Field(description="Of an element on the drum a point of its axis.")
-    tub_rotation_T: Rotation = Field(
-        description="Of an element on the drum: y is the drum axis, z points to the top of the "
-        "drum."
-    )
 
-    @classmethod
-    def of(cls, setup: Setup, name: str) -> Self:
-        """Return an element of a machine with its parameters and its points."""
-        placed, element = setup.elements.others[name], setup.parameters.elements[name]
-        ends = placed.ends._asdict().items()
-        points = {f"{e}_{'T' if e.startswith('tub') else 'W'}": at.tolist() for e, at in ends}
-        numbers = element.model_dump(exclude={"tub_frame", "housing_frame"})
-        return cls(law=placed.kind.words, **points, **numbers)
+
+def described_elements(setup: Setup, section: str) -> dict[str, dict[str, Any]]:
+    """Return the elements of a section of the machine file, with their numbers in SI."""
+    of_section, elements = SECTIONS[section], setup.elements
+    placed: dict[str, Any] = {
+        "springs": elements.springs,
+        "dampers": elements.dampers,
+        "bushings": elements.bushings,
+        "telescopic_dampers": elements.telescopes,
+        "elements": elements.others,
+    }
+    described = {}
+    for name, element in of_section.elements(setup.parameters).items():
+        numbers: dict[str, Any] = {}
+        for field, part in of_section.parts(setup.parameters, element).items():
+            values = _numbers(part, without=(*NAMES, *of_section.types))
+            if section == "telescopic_dampers":
+                values.pop("end_bushing", None)  # it is for dampers without tubes
+            numbers |= values if field in ("", "type") else {field: values}
+        kind = placed[section][name].kind
+        numbers |= {one.name: one.of(placed[section][name]) for one in kind.described}
+        if kind.picture == "strut":
+            numbers |= _line(setup, numbers)
+        described[name] = numbers | _of_section(setup, section, name)
+    return described
+
+
+def _numbers(part: BaseModel, without: tuple[str, ...]) -> dict[str, Any]:
+    """Return the numbers of an element or of a type; of rubber those that are not 0."""
+    values = part.model_dump(exclude=set(without))
+    return {k: v for k, v in values.items() if v or k not in RubberBranches.model_fields}
+
+
+def _line(setup: Setup, numbers: dict[str, Any]) -> dict[str, Any]:
+    """Return length and direction of a strut at the rest pose."""
+    rotation = np.reshape(generic(rotation_from_rpy)(*setup.rest_pose[:3]), (3, 3))
+    end = setup.rest_pose[3:] + rotation @ numbers["tub_point_T"]
+    line = end - numbers["housing_point_W"]
+    length = float(np.linalg.norm(line))
+    return {"length_at_rest": length, "direction_at_rest_W": (line / length).tolist()}
+
+
+def _of_section(setup: Setup, section: str, name: str) -> dict[str, Any]:
+    """Return what only the elements of one section have."""
+    if section == "springs":
+        return {"tension_at_rest": tensions_at(setup.elements, setup.rest_pose)[name]}
+    if section == "elements":
+        return {"law": setup.elements.others[name].kind.words}
+    if section != "telescopic_dampers":
+        return {}
+    joint = setup.parameters.telescopic_dampers[name].joint
+    outer, inner = (body.name() for body in tubes_of(setup.machine.plant, joint))
+    rest = setup.tube_rest[list(setup.telescopes).index(name)]
+    return {
+        "outer_tube": outer,
+        "inner_tube": inner,
+        "outer_tube_rest_pose": Pose.of(rest[:6]),
+        "extension_at_rest": float(rest[6]),
+    }

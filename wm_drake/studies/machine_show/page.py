@@ -19,7 +19,7 @@ from wm_drake.report.page import as_json, fragment
 from wm_drake.report.quantity import MASS, SPEED, Quantity
 from wm_drake.studies.answer import Answer, Part
 from wm_drake.studies.machine_show.description import Description, description_of
-from wm_drake.studies.machine_show.elements import Damper, Spring, Strut, TelescopicDamper
+from wm_drake.studies.machine_show.elements import Damper, Spring, TelescopicDamper
 from wm_drake.studies.modes.quantities import FREQUENCY
 
 LENGTH = Quantity("length", Unit("m", "mm"), 1)
@@ -34,6 +34,7 @@ KINDS = {
     "spring": "springs",
     "damper": "dampers",
     "gasket": "gasket and bushings",
+    "element": "other elements",
     "sensor": "sensors",
     "centre": "centres of mass",
 }
@@ -120,7 +121,7 @@ def _mounts(shown: Description) -> tuple[LabelledTable, ...]:
     """Return stiffness or law, tension and length of springs and dampers; nothing without any."""
     springs, dampers = shown.springs, shown.dampers
     names = [*(f"spring {name}" for name in springs), *(f"damper {name}" for name in dampers)]
-    struts: list[Strut] = [*springs.values(), *dampers.values()]
+    struts: list[Spring | Damper] = [*springs.values(), *dampers.values()]
     laws = [*map(_stiffness, springs.values()), *(damper.law for damper in dampers.values())]
     tensions = [spring.tension_at_rest for spring in springs.values()] + [np.nan] * len(dampers)
     data = xr.Dataset(
@@ -186,7 +187,7 @@ def _things(scene: Scene, shown: Description) -> Iterator[Thing]:
 
 
 def _elements(shown: Description, tub: RigidTransform) -> Iterator[Thing]:
-    """Yield springs, dampers, bushings and telescopic dampers."""
+    """Yield the elements, those of a user's own kind too."""
     for name, spring in shown.springs.items():
         tension = TENSION.text(spring.tension_at_rest)
         words = f"spring {name}: {_stiffness(spring)}, tension at rest {tension}"
@@ -198,13 +199,19 @@ def _elements(shown: Description, tub: RigidTransform) -> Iterator[Thing]:
         lines = _mark(tub @ np.array(bushing.tub_point_T), 3.0 * MARK_ARM)
         words = name if name == "gasket" else f"bushing {name}"
         yield _thing("gasket", name, words, lines)
+    others: dict[str, Any] = dict(shown.elements)
+    for name, element in others.items():
+        is_strut = hasattr(element, "length_at_rest")
+        place = tub @ np.array(element.tub_point_T)
+        lines = [_between(element, tub)] if is_strut else _mark(place, 3.0 * MARK_ARM)
+        yield _thing("element", name, f"{name}: {element.law}", lines)
 
 
 def _thing(kind: str, name: str, words: str, lines: Sequence[Sequence[Sequence[float]]]) -> Thing:
     return {"kind": kind, "name": name, "words": words, "lines": lines}
 
 
-def _between(element: Strut | TelescopicDamper, tub: RigidTransform) -> list[list[float]]:
+def _between(element: Any, tub: RigidTransform) -> list[list[float]]:
     """Return the line of an element from the tub at rest to the housing."""
     end = tub @ np.array(element.tub_point_T)
     return [end.tolist(), list(element.housing_point_W)]

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import field_validator
 
 from wm_drake.studies.inputs import with_drive, with_measured
-from wm_drake.studies.study import ENGINE, LIVE, MEASURED, PROFILE, Options, Study, imported, option
+from wm_drake.studies.study import ENGINE, MEASURED, PROFILE, Options, Study, imported, option
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     from wm_drake.parameters import MachineParameters
@@ -45,7 +45,6 @@ class SpinOptions(Options):
         "Draw mount forces, accelerations and spectra of every load, not only of the load with the "
         "largest amplitude.",
     )
-    live: bool = LIVE
     no_records: bool = option(False, "Leave out the netCDF records, one for each load.")
     measured: tuple[Path, ...] = MEASURED
     drive: str | None = option(

@@ -51,17 +51,6 @@ class SpinTask(Task):
             for machine in machines
             for gasket in gaskets
         ]
-        self.live = self._live() if options.live else ""
-
-    def _live(self) -> str:
-        """Return the page that runs the machine."""
-        from wm_drake.live.exported import page_of_cases  # most runs have none
-
-        if len(self.planned) > 1:
-            raise input_error("needs a single machine and variant", where="--live")
-        planned, options = self.planned[0], self.options
-        parameters = planned.machine.parameters
-        return page_of_cases(parameters, planned.cases, options.machine[0], options.sets)
 
     def _check_variants(self, machines: Sequence[Machine]) -> None:
         """Raise an InputError if the machines or variants cannot be compared."""
@@ -134,7 +123,7 @@ class SpinTask(Task):
         if len(variants) == 1:
             planned, runs = self.planned[0], variants[names[0]]
             modes = natural_modes_of(planned.machine, planned.cases[0])
-            return replace(spin_answer(runs, modes, files), live=self.live)
+            return spin_answer(runs, modes, files)
         from wm_drake.studies.spin.comparison import comparison_answer  # most runs have one machine
 
         references = dict.fromkeys(names, names[0])

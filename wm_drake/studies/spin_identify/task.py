@@ -118,6 +118,7 @@ class SpinIdentifyTask(Task):
             list(self.tests.values()),
             loads,
             self.options.by,
+            executor.ledger,
         )
         title = f"Parameters of machine {parameters.name} identified from records of a spin cycle"
         return fitted_answer(executor, model, self.options.seed, (title, "identified"))

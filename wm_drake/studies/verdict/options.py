@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from wm_drake.studies.study import LIVE, PROFILE, SEED, Options, Study, imported, option
+from wm_drake.studies.study import PROFILE, SEED, Options, Study, imported, option
 
 
 class VerdictOptions(Options):
@@ -25,7 +25,6 @@ class VerdictOptions(Options):
         20.0, "Change of a part that is tried, more and less. [%]", "PERCENT", ge=1.0, le=80.0
     )
     profile: Path | None = PROFILE
-    live: bool = LIVE
     seed: int = SEED
 
 

@@ -1,6 +1,5 @@
 """Check the options of the verdict, and run it."""
 
-from dataclasses import replace
 from typing import Any
 
 from wm_drake.errors import input_error, problems_at
@@ -12,12 +11,10 @@ from wm_drake.parameters import with_values
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.measures.responses import GAP, has_gap, known_responses, measures_of
 from wm_drake.simulation.measures.stops import STOPS
-from wm_drake.studies.answer import Answer, Part
+from wm_drake.studies.answer import Answer
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.inputs import profile_of, selected_cases
-from wm_drake.studies.next.knowledge import Knowledge, of_file
-from wm_drake.studies.next.task import UNMEASURED, next_block
 from wm_drake.studies.study import Task
 from wm_drake.studies.tolerance.options import ToleranceOptions
 from wm_drake.studies.tolerance.study import CONTACTS, laundry_masses
@@ -51,6 +48,7 @@ class VerdictTask(Task):
         if not has_gap(machine.parameters):
             raise input_error(NO_SHAPES)
         self.options, self.clearance = options, _length(options.clearance)
+        self.given = machine
         weights = [name for name in sdf_names(machine.plant).links if COUNTERWEIGHT in name]
         keys = [f"bodies.{name}.mass" for name in weights]
         full = with_sdf_values(machine.drawn.plant, machine.parameters, keys)
@@ -62,14 +60,6 @@ class VerdictTask(Task):
         measures = {*measures_of(full, self.responses), CONTACTS}
         measures |= {STOPS.name} if STOPS.applies(full) else set()
         self.measures = tuple(name for name in MEASURES if name in measures)
-        self.live = self._live(machine) if options.live else ""
-
-    def _live(self, machine: Machine) -> str:
-        """Return the page that runs the loads of the machine."""
-        from wm_drake.live.exported import page_of_cases  # most verdicts have none
-
-        options = self.options
-        return page_of_cases(machine.parameters, self.cases, options.machine, options.sets)
 
     @property
     def _command(self) -> str:
@@ -114,29 +104,13 @@ class VerdictTask(Task):
             self._command,
             {} if changed is None else changed.changes,
         )
-        answer = verdict_answer(
+        return verdict_answer(
             question,
             states_of(base, changed),
             tried,
             laundry_of(samples, self.clearance),
             laundry_masses(samples[0]),
         )
-        return replace(answer, parts=(*answer.parts, self._next(executor)), live=self.live)
-
-    def _next(self, executor: Executor) -> Part:
-        """Return what to measure next, if the machine is known from drawings and catalogues."""
-
-        def known() -> Knowledge:
-            return of_file(self.machine, UNMEASURED)
-
-        return next_block(executor, known, _study_next(self.options), self.cases[0].profile)
-
-
-def _study_next(options: VerdictOptions) -> str:
-    """Return the command that says what to measure next of the machine of a verdict."""
-    sets = [f'--set "{text}"' for text in options.sets]
-    profile = [f"--profile {options.profile}"] if options.profile else []
-    return " ".join(["wm-drake study next", options.machine, *sets, *profile])
 
 
 def _length(text: str) -> float:
