@@ -153,13 +153,8 @@ def run_cases(
     step = checked_step(parameters, options.step)
     scheme = checked_integrator(parameters, options.integrator)
     notice_jumping_friction(parameters)
-    runner = Runner(
-        parameters,
-        options.measures,
-        options.histories,
-        machine.cache.scenes,
-        compared=options.compared,
-    )
+    runner = Runner(parameters, options.measures, options.histories, machine.cache.scenes)
+    runner.compared = options.compared
     at_once = workers * (RECORDS_OF_BATCH if options.histories else 1.0)
     batches = Preparation(machine, step, scheme, at_once).batches(_with_pauses(cases))
     with ThreadPoolExecutor(workers) as threads:

@@ -143,9 +143,12 @@ class Runner:
 
     Attributes:
         most_steps: Largest number of steps of a run that is repeated.
+        compared: Keys of the measures that are compared where runs are repeated, if the runner has
+            no measures of its own.
     """
 
     most_steps = float("inf")
+    compared = COMPARED
 
     def __init__(
         self,
@@ -155,7 +158,6 @@ class Runner:
         scenes: list[Scene] | None = None,
         *,
         motions: Container[int] = (),
-        compared: tuple[str, ...] = COMPARED,
     ) -> None:
         """Prepare for a machine.
 
@@ -166,11 +168,8 @@ class Runner:
             scenes: Scenes of the machine that no thread uses; the runner takes them from the list.
             motions: Numbers of the cases whose results have a motion; the measures must need
                 sensors and shapes.
-            compared: Keys of measures that are compared where runs are repeated, if there are no
-                `measures`.
         """
         self.parameters = parameters
-        self.compared = [MEASURES[name] for name in compared if not measures]
         self.measures = [MEASURES[name] for name in measures]
         self.histories, self.motions = histories, motions
         self.stopped = threading.Event()
@@ -240,7 +239,8 @@ class Runner:
             item.before or of_run.steps > allowed(item) or of_run.samples > LARGEST_LOSS
             for item, of_run in zip(work_items, estimates, strict=False)
         )
-        chosen = [*self.measures, *(self.compared if is_compared else ())]
+        is_bare = is_compared and not self.measures
+        chosen = [MEASURES[name] for name in self.compared] if is_bare else self.measures
         needs = {need for measure in chosen for need in measure.needs}
         arrays = self._measured(key, work_items, packed, samples, needs)
         paths: list[Path | None] = [None] * len(work_items)
