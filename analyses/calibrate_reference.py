@@ -19,6 +19,7 @@ from pathlib import Path
 
 import pandas as pd
 from analysis_tools.gasket_study import LOADS, agreement, screening_of
+from analysis_tools.ledgers import kept_in
 from analysis_tools.sdf_text import sdf_with
 from analysis_tools.study_targets import study_targets
 
@@ -42,7 +43,7 @@ from wm_drake.studies.calibrate.study import (
     identity_of,
 )
 from wm_drake.studies.calibrate.targets import Targets, targets_of
-from wm_drake.studies.experiment import Experiment, kept_in
+from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.gasket.screening import published_for
 
 REFERENCE = "reference"

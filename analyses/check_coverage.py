@@ -16,6 +16,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from analysis_tools.ledgers import kept_in
 
 from wm_drake.batch.ledger import open_ledger
 from wm_drake.model.build import build_machine
@@ -28,7 +29,7 @@ from wm_drake.studies.calibrate.options import CalibrateOptions
 from wm_drake.studies.calibrate.parameter_map import ParameterMap, parameter_map_of
 from wm_drake.studies.calibrate.study import Calibration, SearchPlan, calibrate, identity_of
 from wm_drake.studies.calibrate.targets import Targets
-from wm_drake.studies.experiment import Experiment, kept_in
+from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.tolerance.shares import share_of
 
 LOADS = tuple((name, True) for name in ("middle", "counter", "back", "front"))

@@ -16,6 +16,7 @@ from typing import Any
 
 from analysis_tools import validation_page as page
 from analysis_tools.goals import sizes_text
+from analysis_tools.ledgers import kept_in
 from calibrate_reference import PLAN, REFERENCE, adams_targets
 
 from wm_drake.batch.ledger import open_ledger
@@ -27,7 +28,7 @@ from wm_drake.parameters.vary_file import VaryFile
 from wm_drake.report.progress import progress_bar
 from wm_drake.studies.calibrate.solutions import Solution
 from wm_drake.studies.calibrate.study import calibrate, identity_of
-from wm_drake.studies.experiment import Experiment, kept_in
+from wm_drake.studies.experiment import Experiment
 
 FREE = Path(__file__).with_name(f"{REFERENCE}_free.yaml")
 KEY = "damper_types.friction"

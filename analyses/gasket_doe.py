@@ -31,7 +31,7 @@ def main() -> None:
     options = parsed()
 
     # bodies (SDF) and forces (machine file) -> MultibodyPlant and LeafSystems in one diagram
-    machine = wm.build_machine(wm.load_machine(options.machine))
+    machine = wm.build_machine(options.machine)
     text = f"{machine.parameters.name}: {machine.parameters.model}\n"
     for system in machine.diagram.GetSystems():
         text += f"  {system.get_name():20} {type(system).__name__}\n"

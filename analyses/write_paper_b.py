@@ -25,6 +25,7 @@ from analysis_tools.claims import (
     numbers,
 )
 from analysis_tools.gasket_study import LOADS, agreement, screening_of
+from analysis_tools.ledgers import kept_in
 
 from wm_drake import Case, build_machine, load_machine, modes, simulate_many
 from wm_drake.batch.ledger import open_ledger
@@ -40,7 +41,7 @@ from wm_drake.parameters.vary_file import VaryFile
 from wm_drake.report.quantity import quantity_of, shown
 from wm_drake.studies.calibrate.study import SearchPlan, calibrate, identity_of
 from wm_drake.studies.calibrate.targets import targets_of
-from wm_drake.studies.experiment import Experiment, kept_in
+from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.gasket.screening import at, labels_of, published_for, sign_differs
 
 REFERENCE = "reference"

@@ -59,7 +59,6 @@ def blocks_of(path):
 BLOCKS = [block for path in PAGES for block in blocks_of(path)]
 
 FILES = {  # what a block with a file is called in the commands of its page
-    "README.md": ["mine.yaml"],
     "docs/how-to/accelerometers.md": ["test.yaml"],
     "docs/how-to/balancers.md": ["my_liquid.yaml"],
     "docs/how-to/bench-to-machine.md": ["mine.yaml"],

@@ -114,13 +114,14 @@ def short_machine(monkeypatch):
 
 @pytest.mark.usefixtures("short_machine")
 @pytest.mark.parametrize("path", [path for path in PAGES if blocks(path, "python")], ids=name_of)
-def test_the_python_snippets_run(path):
+def test_the_python_snippets_run(path, tmp_path, monkeypatch):
     import matplotlib
 
     matplotlib.use("Agg")
     names = {}
+    monkeypatch.chdir(tmp_path)
     for code in blocks(path, "python"):
-        exec(code, names)
+        exec(code.replace("trials=1000", "trials=140"), names)
     if path == page("drake-users"):
         assert names["displacement"].shape == (6, 51)
         assert names["linear"].C().shape[0] == 6
@@ -131,8 +132,10 @@ def test_the_python_snippets_run(path):
         assert names["response"].amplitude.sel(sensor="Zf").size >= names["speeds"].size
         return
     if path == README:
-        assert "wm_drake" in names["result"].to_dataframe()["source"].tolist()
-        assert names["result"].plot().get_axes()
+        assert np.abs(names["displacement"]).max() < 1e-3  # 21 rpm
+        shares = names["shares"].set_index(["load", "response", "term"])
+        assert shares.contribution_percent[("counter", "Fz", "K_Lz")] > 80.0
+        assert (tmp_path / "gasket" / "report.html").is_file()
         return
     assert names["record"].sizes["time"] == round(SHORT.duration / 5e-3) + 1
     if path == page("batch"):
@@ -158,13 +161,13 @@ def test_ci_runs_the_commands_of_the_readme():
         assert first.split()[-1] == LIBRARIES["libglib-2.0.so.0"]
 
 
-def test_the_snippet_of_the_readme_is_short():
-    (code,) = blocks(README, "python")
-    assert len([line for line in code.splitlines() if line.strip()]) <= 5
+def test_the_snippets_of_the_readme_are_short():
+    drake, design = blocks(README, "python")
+    assert len([line for line in drake.splitlines() if line.strip()]) <= 8
+    assert len(design.splitlines()) <= 10
 
 
 MACHINES = [  # page, index of the block, a number in it by key path
-    (README, 0, "bodies.upper_counterweight.mass", 9.5),
     (page("own-machine"), 0, "bodies.upper_counterweight.mass", 9.5),
     (page("own-machine"), 1, "spring_types.suspension.stiffness", None),
     (page("own-machine"), 2, "imperfections.residual_imbalance.mass", 0.02),

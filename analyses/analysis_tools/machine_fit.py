@@ -12,6 +12,7 @@ from calibrate_reference import PLAN, REFERENCE, adams_targets
 from choose_damper_law import FREE
 
 from analysis_tools.goals import changes_of, printed_changes
+from analysis_tools.ledgers import kept_in
 from analysis_tools.steady_net import SteadyNet
 from wm_drake.batch.ledger import open_ledger
 from wm_drake.model.build import build_machine
@@ -22,7 +23,7 @@ from wm_drake.parameters.vary_file import VaryFile, load_vary
 from wm_drake.studies.calibrate.computed import Evaluation
 from wm_drake.studies.calibrate.parameter_map import ParameterMap, parameter_map_of
 from wm_drake.studies.calibrate.study import calibration_problem, identity_of
-from wm_drake.studies.experiment import Experiment, kept_in
+from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.fitting.problem import FitProblem, Measurement, ModelValues
 from wm_drake.studies.fitting.search import Search, descended
 

@@ -20,8 +20,8 @@ def test_the_start_of_the_free_file_is_the_shipped_machine(machine):
     }
     # the file rounds each quantity to a thousandth of its prior deviation
     rounding = 1e-3 * np.abs(parameter_map.deviation)
-    allowed = dict.fromkeys((value.key for value in parameter_map.values), 1e-9)
-    for value in parameter_map.values:
+    allowed = dict.fromkeys((value.key for value in parameter_map.varying.sums), 1e-9)
+    for value in parameter_map.varying.sums:
         allowed[value.key] += np.max(rounding @ np.abs(value.factors))
     for key, tolerance in allowed.items():
         assert started[key] == pytest.approx(shipped[key], abs=tolerance), key

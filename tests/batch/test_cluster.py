@@ -4,17 +4,18 @@ import math
 import os
 import signal
 from concurrent.futures import CancelledError
+from functools import partial
 from pathlib import Path
 
 import pytest
 
-from wm_drake.batch import cluster, simulate_many
+from wm_drake.batch import cluster, simulate_many, simulate_remembered
 from wm_drake.batch.cluster import (
     check_workers,
     cluster_client,
     map_on_cluster,
+    run_on_cluster,
     run_work_item,
-    simulate_on_cluster,
 )
 from wm_drake.batch.ledger import Ledger, open_ledger
 from wm_drake.batch.runs import BatchOptions
@@ -50,13 +51,13 @@ def test_worker_with_other_sources_is_refused():
         check_workers(Client())
 
 
-def test_work_item_returns_results_by_key(reference, machine):
+def test_work_item_returns_results_by_number(reference, machine):
     cases = list(cases_of(reference, 3))
     options = BatchOptions(("extremes",), 2.5e-3)
-    results = run_work_item(reference, tuple(zip("abc", cases, strict=True)), options)
+    results = run_work_item(reference, tuple(zip((7, 8, 9), cases, strict=True)), options)
     table = simulate_many(machine, cases, measures=("extremes",))
-    assert list(results) == ["a", "b", "c"]
-    assert results["b"].values["gasket_force"].tolist() == table.gasket_force.values[1].tolist()
+    assert list(results) == [7, 8, 9]
+    assert results[8].values["gasket_force"].tolist() == table.gasket_force.values[1].tolist()
 
 
 def test_cluster_uses_step_and_integrator_of_the_machine(reference, tmp_path):
@@ -71,7 +72,8 @@ def test_cluster_uses_step_and_integrator_of_the_machine(reference, tmp_path):
         Client(processes=False, dashboard_address=None, n_workers=1) as client,
         open_ledger(tmp_path / "ledger.sqlite", {}, resume=False) as ledger,
     ):
-        there = simulate_on_cluster(built, [case], ledger, client, measures=("extremes",))
+        run = partial(run_on_cluster, client=client)
+        there = simulate_remembered(built, [case], ledger, measures=("extremes",), run=run)
     assert there.equals(here)
     of_default = simulate_many(built, [case], measures=("extremes",), step=2.5e-3)
     assert not of_default.equals(here)

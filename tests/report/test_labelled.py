@@ -7,8 +7,9 @@ import pytest
 import xarray as xr
 
 from wm_drake.parameters.units import PureNumber, Share, Unit
+from wm_drake.report.chart import panel
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import SPEED, Quantity, quantity_of, shown, text_of
+from wm_drake.report.quantity import SPEED, TIME, Quantity, quantity_of, shown, text_of
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.studies.answer import Answer, Part
 from wm_drake.studies.facts import Facts
@@ -120,3 +121,18 @@ def test_a_long_table_is_in_files_only_and_a_warning_on_page_and_terminal():
     assert list(answer.tables()) == ["gaps"]
     assert answer.warned == ("Careful.",)
     assert "Careful." in answer.page(Facts())
+
+
+def test_a_chart_takes_words_units_and_labels_from_the_data():
+    amplitude = Quantity("amplitude", Unit("m", "mm")).variable(
+        ("time", "sensor"), [[1e-3, 2e-3], [3e-3, 4e-3]]
+    )
+    coordinates = {"time": TIME.variable("time", [0.0, 1.0]), "sensor": ["Xr", "Yr"]}
+    drawn = panel(
+        xr.Dataset({"amplitude": amplitude}, coordinates), "time", ["amplitude"], by="sensor"
+    )
+    assert [(line.key, list(line.y)) for line in drawn.marks] == [
+        ("sensor Xr", [1.0, 3.0]),
+        ("sensor Yr", [2.0, 4.0]),
+    ]
+    assert (drawn.x.label, drawn.y.label) == ("time, s", "amplitude, mm")

@@ -1,7 +1,7 @@
 """Runs of many cases on a dask.distributed cluster.
 
-The cases are sent as plain parameters, grouped into work items. The results come back as numbers
-and are stored in the ledger. If a worker dies, the cluster sends its work item to another worker.
+The cases are sent as plain parameters, grouped into work items. The results come back as numbers.
+If a worker dies, the cluster sends its work item to another worker.
 This module needs the extra `cluster`.
 """
 
@@ -12,16 +12,13 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from typing import Any
 
-import xarray as xr
-
-from wm_drake.batch.ledger import Ledger, LedgerEntry
-from wm_drake.batch.many import simulate_many
-from wm_drake.batch.remembered import keyed, sources_version
-from wm_drake.batch.run_table import RunTable
-from wm_drake.batch.runs import BatchOptions
-from wm_drake.engines import DEFAULT_ENGINE
+from wm_drake.batch.ledger import LedgerEntry
+from wm_drake.batch.many import run_cases
+from wm_drake.batch.remembered import sources_version
+from wm_drake.batch.runs import BatchOptions, RunResult
 from wm_drake.errors import WmDrakeError, input_error, shortened
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
@@ -141,91 +138,54 @@ def _cluster_errors() -> Iterator[None]:
         ) from None
 
 
-def simulate_on_cluster(
+def run_on_cluster(
     machine: Machine,
     cases: Iterable[Case],
-    ledger: Ledger,
-    client: Any,
+    options: BatchOptions,
+    collect: Callable[[list[RunResult]], None],
     *,
-    measures: Iterable[str] = ("extremes",),
-    step: float | None = None,
-    engine: str = DEFAULT_ENGINE,
-    progress: Callable[[int], None] = lambda done: None,
-) -> xr.Dataset:
-    """Run the cases whose results are not in a ledger on a cluster, and return the table of all.
-
-    The table equals that of `simulate_many`. Results are stored in the ledger as they come back.
+    client: Any,
+) -> None:
+    """Run cases on a cluster and pass finished runs on, as `run_cases` does on this computer.
 
     Args:
         machine: A built machine.
         cases: Cases to run. They are taken one by one as needed.
-        ledger: An open ledger.
+        options: How they are run; without records.
+        collect: Called with the runs of a work item when they have come back.
         client: Client of the cluster, from `cluster_client`.
-        measures: Names of measures, keys of `wm_drake.simulation.measures.MEASURES`.
-        step: Step size; None for that of the machine. [s]
-        engine: Name of the engine.
-        progress: Called with the number of cases that have a result.
 
     Raises:
         WmDrakeError: a work item failed more often than the retry limit allows, or the connection
-            to the cluster broke. Results that came back before are in the ledger.
+            to the cluster broke. `collect` has got the results that came back before.
     """
     from distributed import as_completed
 
     notice_jumping_friction(machine.parameters)
-    step = checked_step(machine.parameters, step)
-    options = BatchOptions(tuple(dict.fromkeys(measures)), step, engine=engine)
-    table = RunTable(machine.parameters, options.measures)
-    running: dict[str, list[tuple[int, str]]] = {}  # numbers and names of the cases by their keys
-    done = 0
-
-    def missing() -> Iterator[tuple[str, Case]]:
-        nonlocal done
-        for number, (case, key) in enumerate(keyed(machine.parameters, cases, options)):
-            if key in ledger:
-                put(ledger.get(key), number, case.name)
-                done += 1
-            else:
-                running.setdefault(key, []).append((number, case.name))
-                yield key, case
-
-    def put(result: LedgerEntry, number: int, name: str) -> None:
-        table.put(number, name, result.values, result.note)
-
-    queue = missing()
-    work_items: Iterator[tuple[tuple[str, Case], ...]] = iter(
-        lambda: tuple(itertools.islice(queue, CASES_PER_WORK_ITEM)), ()
+    numbered, running = enumerate(cases), dict[int, Case]()
+    worker_options = replace(
+        options, step=checked_step(machine.parameters, options.step), workers=1
     )
 
-    def send(work_item: tuple[tuple[str, Case], ...]) -> Any:
-        return client.submit(
-            run_work_item,
-            machine.parameters,
-            work_item,
-            options,
-            pure=False,
-            retries=RETRY_LIMIT,
-        )
+    def sent(count: int) -> list[Any]:
+        futures = []
+        for work_item in itertools.islice(work_items, count):
+            running.update(work_item)
+            sending = functools.partial(client.submit, pure=False, retries=RETRY_LIMIT)
+            futures.append(sending(run_work_item, machine.parameters, work_item, worker_options))
+        return futures
 
+    work_items: Iterator[tuple[tuple[int, Case], ...]] = iter(
+        lambda: tuple(itertools.islice(numbered, CASES_PER_WORK_ITEM)), ()
+    )
     in_flight = WORK_ITEMS_PER_THREAD * max(1, sum(client.nthreads().values()))
     with _cluster_errors():
-        ended = as_completed(
-            [send(work_item) for work_item in itertools.islice(work_items, in_flight)],
-            loop=client.loop,
-        )
+        ended = as_completed(sent(in_flight), loop=client.loop)
         for future in _as_they_end(ended, client):
-            results = future.result()
-            ledger.put_all(results)
-            for key, result in results.items():
-                for number, name in running.pop(key, ()):
-                    put(result, number, name)
-            done += len(results)
-            progress(done)
-            for work_item in itertools.islice(work_items, 1):
-                ended.add(send(work_item))
-    data = table.dataset()
-    progress(data.sizes["run"])
-    return data
+            results = future.result().items()
+            collect([RunResult(n, running.pop(n), r.values, r.note, None) for n, r in results])
+            for following in sent(1):
+                ended.add(following)
 
 
 def map_on_cluster(
@@ -239,7 +199,7 @@ def map_on_cluster(
         client: Client of the cluster, from `cluster_client`.
 
     Raises:
-        WmDrakeError: as for `simulate_on_cluster`, or raised by the function.
+        WmDrakeError: as for `run_on_cluster`, or raised by the function.
     """
     from distributed import as_completed
 
@@ -288,32 +248,23 @@ def _as_they_end(running: Any, client: Any) -> Iterator[Any]:
 
 
 def run_work_item(
-    parameters: MachineParameters,
-    work_item: tuple[tuple[str, Case], ...],
-    options: BatchOptions,
-) -> dict[str, LedgerEntry]:
-    """Run the cases of a work item in the process of a worker and return their results by key.
+    parameters: MachineParameters, work_item: tuple[tuple[int, Case], ...], options: BatchOptions
+) -> dict[int, LedgerEntry]:
+    """Run the cases of a work item in the process of a worker and return their results by number.
 
     Args:
         parameters: The machine.
-        work_item: Pairs of the key of a run and its case.
+        work_item: Pairs of the number of a case and the case.
         options: How they are run.
     """
-    cases = [case for _, case in work_item]
-    results: dict[str, LedgerEntry] = {}
-    simulate_many(
-        _built_machine(
-            _HashableParameters(parameters.model_dump_json(exclude={"sources"}), parameters)
-        ),
-        cases,
-        measures=options.measures,
-        step=options.step,
-        workers=1,
-        engine=options.engine,
-        finished=lambda run: results.update(
-            {work_item[run.number][0]: LedgerEntry(run.stored_values, run.diverged)}
-        ),
-    )
+    numbers, cases = zip(*work_item, strict=True)
+    results = dict[int, LedgerEntry]()
+
+    def collect(runs: list[RunResult]) -> None:
+        results.update({numbers[r.number]: LedgerEntry(r.stored_values, r.diverged) for r in runs})
+
+    text = parameters.model_dump_json(exclude={"sources"})
+    run_cases(_built_machine(_HashableParameters(text, parameters)), cases, options, collect)
     return results
 
 

@@ -125,7 +125,8 @@ def drake_pool(
         with ProcessPoolExecutor(workers, spawn, _begin, at_begin) as processes:
             # Ctrl-C waits until they have begun: imports would end with tracebacks
             before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-            processes.submit(os.getpid)  # starts all
+            for _ in range(workers):  # each starts one
+                processes.submit(os.getpid)
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
             started = set(multiprocessing.active_children()) - others
             yield processes, ((_run, *job) for job in jobs), stopped.set

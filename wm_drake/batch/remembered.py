@@ -5,6 +5,7 @@ import hashlib
 import itertools
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 import xarray as xr
 
@@ -89,11 +90,9 @@ def simulate_remembered(
     cases: Iterable[Case],
     ledger: Ledger,
     *,
-    measures: Iterable[str] = ("extremes",),
-    step: float | None = None,
-    workers: int | None = None,
-    engine: str = DEFAULT_ENGINE,
+    run: Callable[..., list[str] | None] = run_cases,
     progress: Callable[[int], None] = lambda done: None,
+    **chosen: Any,
 ) -> xr.Dataset:
     """Run the cases whose results are not in a ledger and return the table of all cases.
 
@@ -104,17 +103,17 @@ def simulate_remembered(
         machine: A built machine.
         cases: Cases to run. They are taken one by one as needed.
         ledger: An open ledger.
-        measures: Names of measures, keys of `wm_drake.simulation.measures.MEASURES`.
-        step: Step size; None for that of the machine. [s]
-        workers, engine: As for `simulate_many`.
+        run: Function that runs cases, with the first arguments of `run_cases`.
         progress: Called with the number of cases that have a result.
+        chosen: Fields of `BatchOptions`; the measures are by default "extremes".
 
     Raises:
         InputError: a case or an argument is wrong.
         SimulationInterrupted: Ctrl-C was pressed.
         LedgerError: the ledger cannot be written to, or it is damaged.
     """
-    options = BatchOptions(tuple(dict.fromkeys(measures)), step, workers=workers, engine=engine)
+    measures = tuple(dict.fromkeys(chosen.pop("measures", ("extremes",))))
+    options = BatchOptions(measures, **chosen)
     table = RunTable(machine.parameters, options.measures)
     running: dict[int, tuple[int, str]] = {}  # number and key of each case that is run
     order, done = itertools.count(), 0
@@ -133,7 +132,7 @@ def simulate_remembered(
 
     def store(runs: list[RunResult]) -> None:
         nonlocal done
-        places = [running.pop(run.number) for run in runs]
+        places = [running.pop(ended.number) for ended in runs]
         # runs that end together are stored together
         ledger.put_all(
             {
@@ -141,13 +140,13 @@ def simulate_remembered(
                 for (_, key), r in zip(places, runs, strict=True)
             }
         )
-        for (number, _), run in zip(places, runs, strict=True):
-            table.put(number, run.case.name, run.stored_values, run.diverged)
+        for (number, _), ended in zip(places, runs, strict=True):
+            table.put(number, ended.case.name, ended.stored_values, ended.diverged)
             done += 1
             progress(done)
 
     try:
-        pairs = run_cases(machine, missing(), options, store)
+        pairs = run(machine, missing(), options, store)
     except KeyboardInterrupt:
         raise SimulationInterrupted(table.dataset()) from None
     return table.dataset(pairs)

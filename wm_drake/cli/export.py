@@ -8,6 +8,7 @@ import typer
 from wm_drake.cli.common import MachineOption, OverwriteOption, SetOption
 from wm_drake.cli.options import with_options
 from wm_drake.export.options import FmuOptions
+from wm_drake.parameters.written_files import check_new
 from wm_drake.report.terminal import say
 from wm_drake.studies.inputs import load_parameters, located_in, machine_warnings
 
@@ -65,11 +66,13 @@ def page(
     """Write a machine as one HTML file that runs it in a browser, without installation."""
     from wm_drake.live.exported import export_page
 
+    if out.exists():
+        check_new([out], replace=overwrite)
     parameters = load_parameters(machine, sets)
     for text in machine_warnings(parameters):
         say(f"warning: {text}", err=True)
     with located_in(machine):
-        written = export_page(parameters, out, load or (), machine, sets or (), replace=overwrite)
+        written = export_page(parameters, out, load or (), machine, sets or ())
     say(
         f"{out}: {written.movable} numbers to move, {written.fixed} fixed; "
         f"{written.size / 1e3:.0f} kB"

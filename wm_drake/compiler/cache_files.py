@@ -35,12 +35,12 @@ class CheckedCacheFile(IndexDataCacheFile):
     read_only: str = ""
 
     def _load_index(self) -> dict[Any, str]:
-        found: dict[Any, str] = {}
+        merged: dict[Any, str] = {}
         for path in reversed(self._places(self._index_path)):
             version, stamp, overloads = _read(path) or (None, None, {})
             if version == self._version and stamp == self._source_stamp:
-                found |= overloads
-        return found
+                merged |= overloads
+        return merged
 
     def _save_index(self, overloads: dict[Any, str]) -> None:
         content = (self._version, self._source_stamp, overloads)
@@ -54,8 +54,8 @@ class CheckedCacheFile(IndexDataCacheFile):
 
     def _places(self, path: str) -> list[Path]:
         """Return the path of a file, and that in the folder which is only read."""
-        own = Path(path)
-        return [own, Path(self.read_only, own.name)] if self.read_only else [own]
+        written = Path(path)
+        return [written, Path(self.read_only, written.name)] if self.read_only else [written]
 
     def _save_data(self, name: str, data: Any) -> None:
         self._write(self._data_path(name), self._dump(data))

@@ -56,19 +56,19 @@ def _cache_folders() -> tuple[str, str]:
             digest.update(text.encode())
     name, chosen = digest.hexdigest()[:16], os.environ.get("NUMBA_CACHE_DIR")
     try:
-        own = Path.home() / ".cache" / "wm_drake" / name
+        of_user = Path.home() / ".cache" / "wm_drake" / name
     except RuntimeError:
-        own = None
-    folder = Path(chosen) / name if chosen else own
+        of_user = None
+    folder = Path(chosen) / name if chosen else of_user
     reason = "the user has no home folder" if folder is None else _fault_of(folder)
     if not reason:
         return str(folder), ""
     if folder is not None and folder.is_dir():
-        if own is None or _fault_of(own):
+        if of_user is None or _fault_of(of_user):
             temporary = tempfile.mkdtemp(prefix="wm_drake-")
             atexit.register(shutil.rmtree, temporary, ignore_errors=True)
             return temporary, str(folder)
-        return str(own), str(folder)
+        return str(of_user), str(folder)
     say_once(f"compiled code is not kept ({reason}); set NUMBA_CACHE_DIR to a folder for it")
     return "", ""
 

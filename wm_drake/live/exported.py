@@ -57,20 +57,17 @@ def export_page(
     loads: Sequence[str] = (),
     given: str = "",
     sets: Sequence[str] = (),
-    *,
-    replace: bool = True,
 ) -> ExportedPage:
     """Write a machine as one HTML file that runs it.
 
     Args:
-        out: File to write.
+        out: File to write; it is replaced if it exists.
         loads: Names of the loads that run; all if empty.
         given, sets: As for `page_text`.
-        replace: Whether a file that exists is replaced.
 
     Raises:
         InputError: a load is unknown, the compiled engine does not represent the machine, or the
-            file exists or cannot be written. Nothing is written then.
+            file cannot be written. Nothing is written then.
     """
     for name in loads:
         message = f"no load '{name}' in machine '{parameters.name}'"
@@ -79,10 +76,10 @@ def export_page(
         chosen = {name: parameters.loads[name] for name in loads}
         parameters = parameters.model_copy(update={"loads": chosen})
     path = Path(out)
-    _check_place(path, replace)
+    _check_place(path)
     notice_jumping_friction(parameters)
     text, data = page_text(parameters, given, sets)
-    write_files({path: text}, replace=replace)
+    write_files({path: text}, replace=True)
     numbers = data["machine"]["numbers"]
     fixed = sum(1 for number in numbers if number["needs"])
     return ExportedPage(path, len(text.encode()), len(numbers) - fixed, fixed)
@@ -188,10 +185,10 @@ def _in_html(text: str) -> str:
     return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
 
 
-def _check_place(path: Path, replace: bool) -> None:
+def _check_place(path: Path) -> None:
     """Check before the work that a file can be written there."""
     if path.suffix not in (".html", ".htm"):
         raise input_error(f"'{path.name}' must end with .html", where="out")
     if not path.parent.is_dir():
         raise input_error(f"there is no folder '{path.parent}'", where="out")
-    check_new([path], replace=replace)
+    check_new([path], replace=True)

@@ -1,28 +1,29 @@
 """Numbers that vary, for one machine: their values, and the machine at their values."""
 
 import itertools
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import partial
+from typing import Any, TypeVar
 
 import numpy as np
 
-from wm_drake.errors import InputError, Problem, input_error, nearest_names
-from wm_drake.parameters.keys import quantities, with_values
+from wm_drake.errors import InputError, Problem, input_error
+from wm_drake.parameters.keys import with_values
 from wm_drake.parameters.machine import MachineParameters
-from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.sums import Sum, Summand, measured, sums_of
 from wm_drake.parameters.units import (
     Share,
     Unit,
     dimension,
-    from_base,
-    split,
-    to_base,
     with_base,
 )
 from wm_drake.parameters.variation import Change, Number, change_of, common_form, number_at
 from wm_drake.parameters.vary import LAUNDRY, Entry
 from wm_drake.parameters.vary_file import Known
+
+Given = TypeVar("Given")
+Result = TypeVar("Result")
 
 LEVELS = ("low", "middle", "high")
 """Values at the levels -1, 0 and 1."""
@@ -33,8 +34,6 @@ TABLES = ("linear", "scaled")
 "linear": a number takes the place of the table, the nominal stiffness for 100 %, as in [B].
 "scaled": the forces of the table are scaled, so that the curve keeps its shape.
 """
-
-COMPONENTS = {"x": 0, "y": 1, "z": 2}
 
 
 @dataclass(frozen=True)
@@ -166,37 +165,6 @@ class Varied:
 
 
 @dataclass(frozen=True)
-class Sum:
-    """A number or column of the machine that is a sum of factors times values.
-
-    Attributes:
-        key: Key path of the value; of the whole vector if it is one component of it.
-        component: Index of the component of a vector; None for the whole value.
-        factors: (numbers that vary, 1 or points) factors of each of them: one for a number, several
-            for the column of a table.
-        constant: (1 or points) what the known numbers add.
-        reasons: Texts of the known numbers that enter.
-        is_list: Whether the value is the column of a table.
-    """
-
-    key: str
-    component: int | None
-    factors: FloatArray
-    constant: FloatArray
-    reasons: tuple[str, ...]
-    is_list: bool
-
-    def changes(self, values: FloatArray) -> dict[str, Any]:
-        """Return the sum at values of all numbers that vary, by key path. [SI]"""
-        sums = self.constant + values @ self.factors
-        if np.count_nonzero(self.factors) > sums.size:
-            # 15 digits, so that the sum is short in a file
-            sums = np.array([float(f"{number:.15g}") for number in sums])
-        key = self.key if self.component is None else f"{self.key}.{self.component}"
-        return {key: tuple(map(float, sums)) if self.is_list else float(sums[0])}
-
-
-@dataclass(frozen=True)
 class Varying:
     """The numbers of a machine that vary, and the machine at their values.
 
@@ -216,9 +184,9 @@ class Varying:
         return tuple(varied.name for varied in self.every)
 
     @property
-    def keys(self) -> list[str]:
-        """Key paths of all numbers that change."""
-        return list(dict.fromkeys(key for varied in self.every for key in varied.keys))
+    def by_name(self) -> dict[str, Varied]:
+        """Return the numbers that vary, by name."""
+        return {varied.name: varied for varied in self.every}
 
     def machine_at(self, values: Iterable[float]) -> MachineParameters:
         """Return the machine with a value of each number that varies.
@@ -258,17 +226,14 @@ class Varying:
         Raises:
             InputError: an entry has no low or high, or the machine does not allow a level.
         """
-        problems = list[Problem]()
-        for varied in self.every:
-            try:
-                for value in varied.needed("low", "high", study=study):
-                    slopes = [n for n in varied.numbers if n.is_table and n.takes_numbers]
-                    with_values(self.machine, {n.key: n.si(varied.change, value) for n in slopes})
-                    with_values(self.machine, varied.changes(value))
-            except InputError as error:
-                problems += _of_entry(varied.name, error)
-        if problems:
-            raise InputError(problems)
+
+        def check(varied: Varied) -> None:
+            for value in varied.needed("low", "high", study=study):
+                slopes = [n for n in varied.numbers if n.is_table and n.takes_numbers]
+                with_values(self.machine, {n.key: n.si(varied.change, value) for n in slopes})
+                with_values(self.machine, varied.changes(value))
+
+        each(check, self.by_name)
         return self
 
 
@@ -289,24 +254,38 @@ def varying(
     Raises:
         InputError: with one problem for each entry that is wrong; its key is the name of the entry.
     """
-    every, problems = list[Varied](), _owned_twice(entries)
-    for name, entry in entries.items():
+    read = {name: partial(_varied, machine, name, entry, tables) for name, entry in entries.items()}
+    every = each(lambda varied: varied(), read, _owned_twice(entries))
+    every.sort(key=lambda varied: varied.is_laundry)
+    parts = {varied.name: Summand(varied.entry.sets, varied.unit.shown) for varied in every}
+    return Varying(machine, tuple(every), sums_of(machine, parts, known or {}))
+
+
+def each(
+    function: Callable[[Given], Result], parts: Mapping[str, Given], others: Iterable[Problem] = ()
+) -> list[Result]:
+    """Return what a function gives for each part.
+
+    Args:
+        function: Function of a part.
+        parts: Parts by name, such as numbers that vary by the names of their entries.
+        others: Problems that were found before.
+
+    Raises:
+        InputError: with the problems of all parts. Their keys are the names; the key of a number is
+            in the message.
+    """
+    results, problems = list[Result](), [*others]
+    for name, part in parts.items():
         try:
-            every.append(_varied(machine, name, entry, tables))
+            results.append(function(part))
         except InputError as error:
-            problems += _of_entry(name, error)
+            for p in error.problems:
+                message = p.message if p.key in ("", name) else f"{p.key}: {p.message}"
+                problems.append(Problem("", name, message))
     if problems:
         raise InputError(problems)
-    every.sort(key=lambda varied: varied.is_laundry)
-    return Varying(machine, tuple(every), _sums(machine, every, known or {}))
-
-
-def _of_entry(name: str, error: InputError) -> list[Problem]:
-    """Return problems of an entry, with the key of a number in the message."""
-    return [
-        Problem("", name, p.message if p.key in ("", name) else f"{p.key}: {p.message}")
-        for p in error.problems
-    ]
+    return results
 
 
 def _owned_twice(entries: Mapping[str, Entry]) -> list[Problem]:
@@ -378,18 +357,6 @@ def _sizes(entry: Entry) -> tuple[Unit, dict[str, float]]:
     return with_base(written), {name: value for name, (value, _) in sizes.items()}
 
 
-def measured(text: str) -> tuple[float, str]:
-    """Return one number in SI, and the unit in which it is written.
-
-    Raises:
-        ValueError: the text is not one number with a unit.
-    """
-    magnitudes, unit, is_list = split(text)
-    if is_list:
-        raise ValueError(f"'{text}' is a list; it must be one number with a unit")
-    return to_base(magnitudes[0], unit), unit
-
-
 def _in_order(at: dict[str, float]) -> dict[str, float]:
     """Return values with the middle, after checking that they rise."""
     if "low" in at and "high" in at:
@@ -404,76 +371,3 @@ def _in_order(at: dict[str, float]) -> dict[str, float]:
     if "start" in at and not at.get("low", -np.inf) <= at["start"] <= at.get("high", np.inf):
         raise input_error("the start is outside the bounds")
     return at
-
-
-def _sums(
-    machine: MachineParameters, every: Sequence[Varied], known: Mapping[str, Known]
-) -> tuple[Sum, ...]:
-    """Return the numbers of a machine that entries and known numbers set as sums.
-
-    Raises:
-        InputError: the machine does not have a number, or a factor does not fit it.
-    """
-    owners = {varied.name: varied.entry.sets for varied in every}
-    owners |= {name: fixed.sets for name, fixed in known.items()}
-    if not any(owners.values()):
-        return ()
-    sizes = {key: (value, unit) for key, value, unit in quantities(machine)}
-    problems, sums = list[Problem](), list[Sum]()
-    for key in dict.fromkeys(key for sets in owners.values() for key in sets):
-        first = next(name for name, sets in owners.items() if key in sets)
-        try:
-            sums.append(_sum(key, sizes, every, known))
-        except ValueError as error:
-            problems.append(Problem("", first, f"'{key}' {error}"))
-    if problems:
-        raise InputError(problems)
-    return tuple(sums)
-
-
-def _sum(
-    key: str,
-    sizes: Mapping[str, tuple[Any, Unit]],
-    every: Sequence[Varied],
-    known: Mapping[str, Known],
-) -> Sum:
-    name, _, last = key.rpartition(".")
-    component = None
-    if key not in sizes and last in COMPONENTS and name in sizes:
-        component = COMPONENTS[last]
-    elif key in sizes:
-        name = key
-    else:
-        raise ValueError(f"is not a number of the machine{nearest_names(key, sizes)}")
-    value, unit = sizes[name]
-    is_list = isinstance(value, tuple) and component is None
-    size = len(value) if is_list else 1
-    factors = np.zeros((len(every), size))
-    for index, varied in enumerate(every):
-        if key in varied.entry.sets:
-            factors[index] = _factor(varied.entry.sets[key], varied.unit.shown, unit, size, is_list)
-    constant, reasons = np.zeros(size), []
-    for fixed_name, fixed in known.items():
-        if key in fixed.sets:
-            amount, written = measured(fixed.value)
-            constant = constant + amount * _factor(fixed.sets[key], written, unit, size, is_list)
-            shown = f"{from_base(amount, written):.10g} {written}".rstrip()
-            reasons.append(f"{fixed_name} {shown} ({fixed.source})")
-    return Sum(name, component, factors, constant, tuple(reasons), is_list)
-
-
-def _factor(text: str, of_value: str, unit: Unit, size: int, is_list: bool) -> FloatArray:
-    """Return the factors of a value in a number of the machine, one for each point of a table.
-
-    Args:
-        of_value: Unit of the value.
-        unit: Unit of the number.
-    """
-    magnitudes, written, has_several = split(text)
-    if has_several != is_list or len(magnitudes) != size:
-        needed = f"a list of {size} factors" if is_list else "one factor"
-        raise ValueError(f"needs {needed}, not {len(magnitudes)}")
-    if dimension(of_value) * dimension(written) != dimension(unit.si):
-        given = " times ".join(filter(None, [of_value, written])) or "a pure number"
-        raise ValueError(f"needs a unit such as {unit.shown}, but {given} is not of this kind")
-    return np.array([to_base(number, written) for number in magnitudes])

@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, TypeAlias
 
-import numpy as np
 import xarray as xr
 
 from wm_drake.report import figure as fig
@@ -102,10 +101,3 @@ def panel(
 def between(below: Iterable[fig.Mark], panel: fig.Panel, *above: fig.Mark) -> fig.Panel:
     """Return a panel with more marks below and above its own."""
     return replace(panel, marks=(*below, *panel.marks, *above))
-
-
-def band(data: xr.Dataset, over: str, low: str, high: str, **style: Any) -> fig.Area:
-    """Return the area between two variables, at the places that have both."""
-    ends = [shown(data[name]) for name in (over, low, high)]
-    known = np.isfinite(ends[1]) & np.isfinite(ends[2])
-    return fig.band(*(values[known] for values in ends), **style)

@@ -75,7 +75,18 @@ class Accuracy(NamedTuple):
 def attributes_of(accuracy: Accuracy) -> dict[str, Any]:
     """Return the attributes of a record that say how accurate its run is."""
     is_converged = "yes" if accuracy.is_converged else "no"
-    return {"step_s": accuracy.step, "error": accuracy.error, "converged": is_converged}
+    how = {"step_s": accuracy.step, "error": accuracy.error, "halvings": accuracy.halvings}
+    return how | {"converged": is_converged}
+
+
+def accuracy_in(attributes: Mapping[str, Any]) -> Accuracy | None:
+    """Return the accuracy in the attributes of a record; None of the Drake engine."""
+    if "converged" not in attributes:
+        return None
+    is_converged = float(attributes["converged"] == "yes")
+    numbers = (float(attributes[name]) for name in ("error", "step_s", "halvings"))
+    error, step, halvings = numbers
+    return Accuracy(error, is_converged, step, halvings)
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.reading import READING, read_in
 from wm_drake.report.figure import Figure
 from wm_drake.report.labelled import LabelledTable
+from wm_drake.report.provenance import command_line
 from wm_drake.studies.facts import PAGE, Facts
 
 if TYPE_CHECKING:
@@ -154,12 +155,12 @@ class Answer:
 
         about = [] if self.machine is None else [("Machine", self.machine.name)]
         seconds = f"{facts.wall_s:.0f} s"
-        time = ("Runs", f"{facts.runs} in {seconds}") if facts.runs else ("Time", seconds)
+        time = [("Runs", f"{facts.runs} in {seconds}") if facts.runs else ("Time", seconds)]
         return SectionedPage(
             self.title,
             self.answer,
             [_section(part) for part in self.parts],
-            [*about, time, *self.details, *facts.rows()],
+            [*about, *(time if facts.wall_s else []), *self.details, *facts.rows()],
             self.machine,
             [*facts.warnings, *self.warned],
             method=self.method,
@@ -234,12 +235,12 @@ class Answer:
         """Write the pages and all files to a folder, which is made if it is not there.
 
         Args:
-            facts: How the result was computed; None if nothing more than the details is known.
+            facts: How the result was computed; None if no more is known than the command.
         """
         place = Path(folder)
         place.mkdir(parents=True, exist_ok=True)
         self.write(place)
-        for name, text in self.pages(facts or Facts()).items():
+        for name, text in self.pages(facts or Facts(command_line())).items():
             (place / name).write_text(text, encoding="utf-8")
 
 

@@ -107,26 +107,18 @@ class Executor:
 
         Records are too large for a ledger.
         """
-        from wm_drake.batch import RunResult, simulate_many
+        from wm_drake.simulation.convergence import accuracy_in
+        from wm_drake.studies.experiment import record_here
 
         cases = list(cases)
 
-        def collect(run: RunResult) -> None:
-            assert run.record is not None
-            self.steps.add(run.case.name, run.accuracy)
-            keep(run.number, run.record)
+        def collect(number: int, record: "Record") -> None:
+            self.steps.add(cases[number].name, accuracy_in(record.attrs))
+            keep(number, record)
 
+        how: dict[str, Any] = {"workers": self.workers, "engine": self.engine}
         with progress_bar(len(cases), what) as report:
-            simulate_many(
-                machine,
-                cases,
-                measures=("extremes",),
-                histories=True,
-                workers=self.workers,
-                engine=self.engine,
-                progress=report,
-                finished=collect,
-            )
+            record_here(machine, cases, collect, what, progress=report, **how)
 
     @contextmanager
     def progress(self, total: int, what: str = "runs") -> Iterator[Callable[..., None]]:
@@ -174,15 +166,14 @@ class Executor:
         report: Callable[[int], None],
     ) -> "xr.Dataset":
         from wm_drake.batch import simulate_remembered
-        from wm_drake.batch.cluster import simulate_on_cluster
+        from wm_drake.batch.cluster import run_on_cluster
         from wm_drake.simulation.convergence import Accuracy
 
         assert self.ledger is not None, "a study that runs cases is declared with has_runs=True"
-        run: Callable[..., xr.Dataset] = partial(simulate_remembered, workers=self.workers)
+        how: dict[str, Any] = {"workers": self.workers, "engine": self.engine, "progress": report}
         if self.client is not None:
-            run = partial(simulate_on_cluster, client=self.client)
-        how: dict[str, Any] = {"measures": measures, "engine": self.engine, "progress": report}
-        table = run(machine, cases, self.ledger, **how)
+            how["run"] = partial(run_on_cluster, client=self.client)
+        table = simulate_remembered(machine, cases, self.ledger, measures=measures, **how)
         self.runs += table.sizes["run"]
         accuracies = zip(*(table[name].values for name in Accuracy._fields), strict=True)
         for name, accuracy in zip(table.case.values.tolist(), accuracies, strict=True):

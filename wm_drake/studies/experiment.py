@@ -23,8 +23,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import xarray as xr
 
-from wm_drake.batch import RunResult, simulate_many, simulate_remembered
-from wm_drake.batch.ledger import Ledger
+from wm_drake.batch import RunResult, simulate_many
 from wm_drake.engines.compiled.step_check import check_step
 from wm_drake.errors import InputError
 from wm_drake.model.machine import Machine
@@ -75,40 +74,25 @@ def run_here(
     return simulate_many(machine, cases, measures=measures, **options)
 
 
-def kept_in(ledger: Ledger, workers: int | None = None) -> Simulate:
-    """Return a function that runs cases on this computer if a ledger does not have them."""
-
-    def simulate(
-        machine: Machine, measures: tuple[str, ...], cases: Iterable[Case], what: str
-    ) -> xr.Dataset:
-        del what
-        return simulate_remembered(machine, cases, ledger, measures=measures, workers=workers)
-
-    return simulate
-
-
 def record_here(
     machine: Machine,
     cases: Iterable[Case],
     keep: Callable[[int, Record], None],
     what: str,
-    workers: int | None = None,
+    **options: Any,
 ) -> None:
-    """Run cases on the cores of this computer and pass number and record of each on."""
+    """Run cases on the cores of this computer and pass number and record of each on.
+
+    Args:
+        options: Other options of `simulate_many`.
+    """
     del what
 
     def collect(run: RunResult) -> None:
         assert run.record is not None
         keep(run.number, run.record)
 
-    simulate_many(
-        machine,
-        cases,
-        measures=("extremes",),
-        histories=True,
-        workers=workers,
-        finished=collect,
-    )
+    simulate_many(machine, cases, measures=[], histories=True, finished=collect, **options)
 
 
 @dataclass(frozen=True)

@@ -298,9 +298,7 @@ def _written(result: "Answer", facts: Facts, out: Path | None, run: CommandRun) 
     if out is None:
         return ()
     with result_folder(out, run, RUNS_KEPT if run.identity else "") as folder:
-        result.write(folder)
-        for name, text in result.pages(facts).items():
-            (folder / name).write_text(text, encoding="utf-8")
+        result.save(folder, facts)
         names = sorted(path.name for path in folder.iterdir())
     return (PAGE, *(name for name in names if name != PAGE))
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from analysis_tools.ledgers import kept_in
 from linear_fits import fit_at
 
 from wm_drake.batch.ledger import open_ledger
@@ -22,7 +23,7 @@ from wm_drake.studies.calibrate.results import amplitudes_of, predictions_of, qu
 from wm_drake.studies.calibrate.solutions import Solution, distinct, solved_machine
 from wm_drake.studies.calibrate.study import SearchPlan, calibrate, identity_of
 from wm_drake.studies.calibrate.targets import Targets, targets_of
-from wm_drake.studies.experiment import Experiment, kept_in
+from wm_drake.studies.experiment import Experiment
 
 FREE = """
 vary:

@@ -154,7 +154,8 @@ def test_nine_factors_have_no_array():
 
 def test_written_design_is_read_back(tmp_path):
     design = make_design("d-optimal", NAMES, trials=150, seed=3)
-    design.frame().to_csv(tmp_path / "design.csv", index=False)
+    table = pd.DataFrame(design.levels, columns=list(design.factors))
+    table.to_csv(tmp_path / "design.csv", index_label="trial")
     read = read_design(tmp_path / "design.csv", NAMES)
     np.testing.assert_array_equal(read.levels, design.levels)
     table = pd.read_csv(tmp_path / "design.csv")

@@ -32,7 +32,7 @@ DAY = 86400.0
 
 
 @dataclass(frozen=True)
-class Row:
+class TextRow:
     """Cells of a row of a table, and the line of the file in which it ends."""
 
     line: int
@@ -90,7 +90,7 @@ def _with_unit(signal: Signal, below: str) -> Signal:
     return replace(signal, unit=signal.unit or below)
 
 
-def table_rows(path: Path) -> list[Row]:
+def table_rows(path: Path) -> list[TextRow]:
     """Return the rows of a table; lines that are empty or begin with # are left out.
 
     Raises:
@@ -112,18 +112,19 @@ def table_rows(path: Path) -> list[Row]:
     if not delimiter:
         delimiter = max(",;\t", key=texts[0].count) if kept else ","
         if not any(sign in texts[0] for sign in ",;\t") and _has_blanks(texts):
-            return [Row(at, line.split()) for at, line in kept]
+            return [TextRow(at, line.split()) for at, line in kept]
     reader = csv.reader(texts, delimiter=delimiter)
     try:
         return [
-            Row(kept[reader.line_num - 1][0], [cell.strip() for cell in cells]) for cells in reader
+            TextRow(kept[reader.line_num - 1][0], [cell.strip() for cell in cells])
+            for cells in reader
         ]
     except csv.Error as error:  # such as a field of more than 128 kB
         where = f"{path}:{kept[min(reader.line_num, len(kept)) - 1][0]}"
         raise input_error(f"cannot be read as CSV ({error})", where=where) from None
 
 
-def _sheet_rows(path: Path) -> Iterator[Row]:
+def _sheet_rows(path: Path) -> Iterator[TextRow]:
     """Yield the rows of the first sheet of a workbook that are not empty."""
     check_regular(path)
     where, way_out = str(path), "save the sheet as CSV (UTF-8)"
@@ -137,7 +138,7 @@ def _sheet_rows(path: Path) -> Iterator[Row]:
         for number, values in enumerate(sheet.iter_rows(values_only=True), 1):
             cells = ["" if value is None else str(value).strip() for value in values]
             if any(cells) and not cells[0].startswith("#"):
-                yield Row(number, cells)
+                yield TextRow(number, cells)
     except Exception as error:  # whatever its XML contains
         reason = shortened(str(error), 100) or type(error).__name__
         raise input_error(
@@ -150,7 +151,7 @@ def _has_blanks(lines: Sequence[str]) -> bool:
     return len(lines) > 1 and 1 < len(lines[0].split()) == len(lines[1].split())
 
 
-def _check_width(path: Path, row: Row, head: Sequence[str]) -> None:
+def _check_width(path: Path, row: TextRow, head: Sequence[str]) -> None:
     """Check that a row has the columns of the header; empty ones at an end may lack."""
     named = len(head) if head[-1] else len(head) - 1
     filled = row.cells if len(row.cells) <= len(head) else row.cells[: len(head)]

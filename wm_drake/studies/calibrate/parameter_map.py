@@ -1,19 +1,22 @@
 """The numbers of a machine that vary, as unknowns of a fit, and what else is known of them."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from wm_drake.errors import InputError, Problem, input_error, nearest_names
+from wm_drake.errors import input_error, nearest_names
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters
+from wm_drake.parameters.sums import measured
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import dimension, split, to_base
+from wm_drake.parameters.units import dimension, from_base, split, to_base
 from wm_drake.parameters.variation import range_of
 from wm_drake.parameters.vary_file import Relation, VaryFile
-from wm_drake.parameters.varying import Varied, Varying, measured
+from wm_drake.parameters.varying import Varied, Varying, each
+from wm_drake.studies.fitting.fit import Fit
 from wm_drake.studies.fitting.problem import Unknown
 from wm_drake.studies.vary import in_vary_file, varying_of
 
@@ -128,7 +131,7 @@ class ParameterMap:
             (point, n) in standard deviations: preloads, relations, then elongations. An elongation
             above the smallest one gives 0.
         """
-        parts = [self.relation_residuals(points)]
+        parts = [self.known(points)]
         if self.elongation is not None:
             least, deviation = self.elongation
             parts.append(np.maximum(least - elongation, 0.0) / deviation)
@@ -137,7 +140,7 @@ class ParameterMap:
             parts.insert(0, (preload - expected) / deviation)
         return np.hstack(parts)
 
-    def relation_residuals(self, points: FloatArray) -> FloatArray:
+    def known(self, points: FloatArray) -> FloatArray:
         """Return the residuals of the relations (point, n), in standard deviations."""
         parts = [relation.residuals(points)[:, None] for relation in self.relations]
         return np.hstack([np.empty((len(points), 0)), *parts])
@@ -150,6 +153,71 @@ class ParameterMap:
         """
         return self.varying.machine_at(point)
 
+    def solved(self, fit: Fit, source: str) -> MachineParameters:
+        """Return the machine with the numbers of a fit; `source` says where they come from."""
+        machine = self.machine_of(fit, "_calibrated")
+        about = f"{machine.about} Calibrated: {source}.".strip()
+        return machine.model_copy(update={"about": about})
+
+    def machine_of(self, fit: Fit, ending: str = "") -> MachineParameters:
+        """Return the machine with the numbers of a fit.
+
+        The source of each fitted number is "fit: " followed by the text of `_texts_of`, and
+        "assumption: " followed by the known numbers that enter.
+
+        Args:
+            fit: Fit whose first unknowns are the numbers.
+            ending: End of the name of the machine.
+        """
+        texts, parts = self._texts_of(fit), dict[str, dict[str, list[str]]]()
+        for key, entering, known in self.varying.origins():
+            of_key = parts.setdefault(key, {"fit: ": [], "assumption: ": []})
+            of_key["fit: "] += [texts[index] for index in entering]
+            of_key["assumption: "] += known
+        fitted = {
+            key: "; ".join(
+                kind + "; ".join(dict.fromkeys(listed)) for kind, listed in kinds.items() if listed
+            )
+            for key, kinds in parts.items()
+        }
+        parameters = self.parameters_at(self._rounded(fit))
+        others = {
+            key: text
+            for key, text in parameters.sources.items()
+            if not any(key.startswith(f"{k}.") for k in fitted)
+        }
+        name = f"{parameters.name}{ending}"
+        return parameters.model_copy(update={"name": name, "sources": {**others, **fitted}})
+
+    def _texts_of(self, fit: Fit) -> list[str]:
+        """Return for each number ``damper_friction 27.5 ± 2.1 N (expected 35 ± 9 N)``."""
+        texts, values = [], self.in_units(self._rounded(fit))
+        expected, deviation = self.in_units(self.expected), self.in_units(self.deviation)
+        posterior = fit.remaining[: len(deviation)] * deviation
+        for index, unknown in enumerate(self.unknowns):
+            after, before = (
+                f"{n[index]:.10g} ± {_short(s[index])} {unknown.unit.shown}".rstrip()
+                for n, s in ((values, posterior), (expected, deviation))
+            )
+            texts.append(f"{unknown.name} {after} (expected {before})")
+        return texts
+
+    def _rounded(self, fit: Fit) -> FloatArray:
+        """Return the point of a fit, rounded to about 0.1 % of the prior's standard deviation.
+
+        The rounding is decimal in the unit in which each number is written.
+        """
+        point, deviations = [], self.deviation.tolist()
+        for unknown, *sizes in zip(self.unknowns, fit.values.tolist(), deviations, strict=False):
+            value, deviation = (from_base(size, unknown.unit.shown) for size in sizes)
+            digits = 3 - math.floor(math.log10(deviation))
+            point.append(to_base(round(value, digits), unknown.unit.shown))
+        return np.clip(point, self.lower, self.upper)
+
+
+def _short(number: float) -> str:
+    return f"{number:.0f}" if abs(number) >= 100.0 else f"{number:.2g}"
+
 
 def parameter_map_of(machine: Machine, file: VaryFile) -> ParameterMap:
     """Return the parameter map of a machine.
@@ -159,14 +227,7 @@ def parameter_map_of(machine: Machine, file: VaryFile) -> ParameterMap:
             number of values, or a number has no bounds or no prior.
     """
     varying = varying_of(machine, file.entries(), file.known)
-    unknowns, problems = list[Unknown](), list[Problem]()
-    for varied in varying.every:
-        try:
-            unknowns.append(_unknown(varied))
-        except InputError as error:
-            problems += error.problems
-    if problems:
-        raise InputError(problems)
+    unknowns = each(_unknown, varying.by_name)
     preload, elongation = file.spring_preload, file.spring_elongation
     return ParameterMap(
         varying,

@@ -5,7 +5,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from wm_drake.batch.ledger import Ledger
 from wm_drake.errors import input_error
 from wm_drake.model.machine import Machine
 from wm_drake.parameters.vary_file import VARY_FILES, load_vary
@@ -17,7 +16,6 @@ from wm_drake.studies.calibrate.options import CalibrateOptions
 from wm_drake.studies.calibrate.parameter_map import read_parameter_map
 from wm_drake.studies.calibrate.recorded import RecordedLoad, without_edges
 from wm_drake.studies.calibrate.records import RecordModel
-from wm_drake.studies.calibrate.solutions import FreeQuantities
 from wm_drake.studies.compare.pairs import QUANTITIES
 from wm_drake.studies.compare.task import CompareTask
 from wm_drake.studies.executor import Executor
@@ -81,9 +79,7 @@ class CalibrateRecordsTask(Task):
             recorded_load(test, executor, partial(load_of, test.case, self.machine.parameters))
             for test in self.tests
         ]
-        experiment = records_here(self.machine, executor)
-        by, ledger = self.options.by, executor.ledger
-        model = record_model(experiment, self.free, self.tests, loads, by, ledger)
+        model = record_model(executor, self.free, self.tests, loads, self.options.by)
         title = f"Machine {self.machine.parameters.name} calibrated to records"
         return fitted_answer(executor, model, self.options.seed, (title, "calibrated"))
 
@@ -117,11 +113,6 @@ def fitted_answer(
     return fit_answer(model, fit, data, texts, parts)
 
 
-def records_here(machine: Machine, executor: Executor) -> Experiment:
-    """Return runs of a machine whose records are used at once."""
-    return Experiment(machine, (), record=partial(record_here, workers=executor.workers))
-
-
 def recorded_load(test: CompareTask, executor: Executor, load_at: Any) -> RecordedLoad:
     """Return the recordings of a test on the times of runs, without their ends.
 
@@ -133,14 +124,13 @@ def recorded_load(test: CompareTask, executor: Executor, load_at: Any) -> Record
 
 
 def record_model(
-    experiment: Experiment,
+    executor: Executor,
     free: FreeNumbers,
     tests: Sequence[CompareTask],
     loads: Sequence[RecordedLoad],
     by: Any,
-    ledger: Ledger | None,
 ) -> RecordModel:
-    """Return the model of the sensors of all loads, whose values a ledger keeps.
+    """Return the model of the sensors of all loads, whose values the ledger keeps.
 
     Raises:
         InputError: the records of the loads have other sensors.
@@ -153,8 +143,10 @@ def record_model(
                 f"{', '.join(test.sensors)}, those of load {tests[0].case.name} {', '.join(names)}",
                 where="RECORD",
             )
+    record = partial(record_here, workers=executor.workers)  # records are used at once
+    experiment = Experiment(tests[0].machine, (), record=record)
     sensors, points = tests[0].sensors, tests[0].points
-    return RecordModel(experiment, free, sensors, tuple(loads), points, by, ledger)
+    return RecordModel(experiment, free, sensors, tuple(loads), points, by, executor.ledger)
 
 
 def _by_load(options: CalibrateOptions) -> dict[str | None, tuple[Path, ...]]:
@@ -183,4 +175,4 @@ def _free_numbers(options: CalibrateOptions, machine: Machine) -> FreeNumbers:
             "spring_preload and spring_elongation are about targets; leave them out for records",
             where=str(path),
         )
-    return FreeQuantities(read_parameter_map(machine, path, file))
+    return read_parameter_map(machine, path, file)

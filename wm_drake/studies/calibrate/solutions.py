@@ -1,50 +1,22 @@
 """Solutions of a calibration: errors, uncertainties, distinct solutions, and their machines."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Share, from_base, to_base
+from wm_drake.parameters.units import Share
 from wm_drake.report.quantity import Quantity
 from wm_drake.studies.calibrate.parameter_map import ParameterMap
 from wm_drake.studies.calibrate.targets import Targets
 from wm_drake.studies.fitting.fit import DETERMINED, UNDETERMINED, Fit
-from wm_drake.studies.fitting.problem import Unknown
 
 GOOD = 1.25
 """Largest ratio of the mean error of a good solution to that of the best solution."""
 
 DISTINCT = 0.5
 """Least distance between distinct solutions: RMS over the quantities, in prior deviations."""
-
-
-@dataclass(frozen=True)
-class FreeQuantities:
-    """Quantities of a vary file as the unknowns of a fit to recordings."""
-
-    parameter_map: ParameterMap
-
-    @property
-    def unknowns(self) -> tuple[Unknown, ...]:
-        """Return the unknowns."""
-        return self.parameter_map.unknowns
-
-    def parameters_at(self, point: FloatArray) -> MachineParameters:
-        """Return the machine at a point. [SI]"""
-        return self.parameter_map.parameters_at(point)
-
-    def known(self, points: FloatArray) -> FloatArray:
-        """Return the residuals of relations at points (k, p), in standard deviations. (k, m)"""
-        return self.parameter_map.relation_residuals(points)
-
-    def solved(self, fit: Fit, source: str) -> MachineParameters:
-        """Return the machine with the quantities of a fit, as `machine_of`."""
-        machine = machine_of(self.parameter_map, fit, "_calibrated")
-        about = f"{machine.about} Calibrated: {source}.".strip()
-        return machine.model_copy(update={"about": about})
 
 
 DIFFERENCE = Quantity("difference", Share(), 1)
@@ -163,76 +135,4 @@ def solved_machine(solution: Solution, number: int = 0) -> MachineParameters:
         number: Number of the solution, for the name of the machine; 0 keeps the name.
     """
     ending = f"_calibrated_{number}" if number else ""
-    return machine_of(solution.parameter_map, solution.fit, ending)
-
-
-def machine_of(parameter_map: ParameterMap, fit: Fit, ending: str = "") -> MachineParameters:
-    """Return the machine with the quantities of a fit.
-
-    The source of each fitted number is "fit: " followed by the text of `fit_texts`, and
-    "assumption: " followed by the known quantities that enter.
-
-    Args:
-        fit: Fit whose first unknowns are the quantities.
-        ending: End of the name of the machine.
-    """
-    all_texts = fit_texts(parameter_map, fit)
-    fits: dict[str, list[str]] = {}
-    reasons: dict[str, list[str]] = {}
-    for key, entering, known in parameter_map.varying.origins():
-        texts = [all_texts[index] for index in entering]
-        for listed, new in ((fits, texts), (reasons, known)):
-            kept = listed.setdefault(key, [])
-            kept.extend(text for text in new if text not in kept)
-    parameters = parameter_map.parameters_at(_rounded(parameter_map, fit))
-    fitted = {
-        key: "; ".join(
-            kind + "; ".join(listed[key])
-            for kind, listed in (("fit: ", fits), ("assumption: ", reasons))
-            if listed[key]
-        )
-        for key in fits
-    }
-    others = {
-        key: text
-        for key, text in parameters.sources.items()
-        if not any(key.startswith(f"{k}.") for k in fitted)
-    }
-    name = f"{parameters.name}{ending}"
-    return parameters.model_copy(update={"name": name, "sources": {**others, **fitted}})
-
-
-def fit_texts(parameter_map: ParameterMap, fit: Fit) -> list[str]:
-    """Return for each quantity ``damper_friction 27.5 ± 2.1 N (expected 35 ± 9 N)``."""
-    texts = []
-    values = parameter_map.in_units(_rounded(parameter_map, fit))
-    expected, deviation = map(
-        parameter_map.in_units, (parameter_map.expected, parameter_map.deviation)
-    )
-    posterior = fit.remaining[: len(deviation)] * deviation
-    for index, unknown in enumerate(parameter_map.unknowns):
-        after, before = (
-            f"{n[index]:.10g} ± {_short(s[index])} {unknown.unit.shown}".rstrip()
-            for n, s in ((values, posterior), (expected, deviation))
-        )
-        texts.append(f"{unknown.name} {after} (expected {before})")
-    return texts
-
-
-def _rounded(parameter_map: ParameterMap, fit: Fit) -> FloatArray:
-    """Return the point of a fit, rounded to about 0.1 % of the prior's standard deviation.
-
-    The rounding is decimal in the unit in which each quantity is written.
-    """
-    point = []
-    for index, unknown in enumerate(parameter_map.unknowns):
-        unit = unknown.unit.shown
-        value, deviation = (
-            from_base(float(a[index]), unit) for a in (fit.values, parameter_map.deviation)
-        )
-        point.append(to_base(round(value, 3 - math.floor(math.log10(deviation))), unit))
-    return np.clip(point, parameter_map.lower, parameter_map.upper)
-
-
-def _short(number: float) -> str:
-    return f"{number:.0f}" if abs(number) >= 100.0 else f"{number:.2g}"
+    return solution.parameter_map.machine_of(solution.fit, ending)

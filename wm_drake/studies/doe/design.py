@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 
 from wm_drake.errors import InputNotice, Problem, check_known, input_error, shortened
-from wm_drake.parameters.recorded.text import Row, table_rows
+from wm_drake.parameters.recorded.text import TextRow, table_rows
 from wm_drake.parameters.units import plain_number
 from wm_drake.studies.doe.coding import LEVELS, MODELS, Levels, columns, efficiency, level_matrix
 from wm_drake.studies.doe.exchange import d_optimal_levels
@@ -69,12 +68,6 @@ class Design:
     def efficiency(self, model: str | None = None) -> float:
         """Return the D-efficiency for a model; for the design's own model if None. [%]"""
         return efficiency(self.levels, model or self.model)
-
-    def frame(self) -> pd.DataFrame:
-        """Return the design as a table: number of the trial, then one column per factor."""
-        table = pd.DataFrame(self.levels, columns=list(self.factors))
-        table.insert(0, TRIAL, np.arange(1, self.trials + 1))
-        return table
 
 
 def make_design(
@@ -174,7 +167,7 @@ def read_design(path: Path, factors: tuple[str, ...], model: str = "main+2fi") -
         InputError: the file has other columns or other levels, or the trials do not determine the
             model.
     """
-    head, *rows = table_rows(path) or [Row(1, [])]
+    head, *rows = table_rows(path) or [TextRow(1, [])]
     places = _factor_columns(path, head.cells, rows, factors)
     levels = np.zeros((len(rows), len(factors)), dtype=np.int8)
     for number, row in enumerate(rows):
@@ -211,7 +204,7 @@ def _level(cell: str) -> float:
 
 
 def _factor_columns(
-    path: Path, head: Sequence[str], rows: Sequence[Row], factors: Sequence[str]
+    path: Path, head: Sequence[str], rows: Sequence[TextRow], factors: Sequence[str]
 ) -> list[int]:
     """Return the column of each factor.
 

@@ -201,7 +201,7 @@ def _factors(machine: Machine, options: GasketOptions) -> Varying:
 def _setting(factors: Varying, text: str) -> Setting:
     """Return the setting of the factors that an option `--check` means."""
     places = dict.fromkeys(factors.names, 0.0)
-    by_name = {factor.name: factor for factor in factors.every}
+    by_name = factors.by_name
     for name, value in pairs_of(text.split(","), "--check"):
         check_known(name, by_name, f"unknown factor '{name}'", where="--check")
         with problems_at("--check"):

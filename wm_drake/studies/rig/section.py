@@ -4,6 +4,8 @@ Along the damper, lengths are to scale: the free stroke, and the way from there 
 slides on the inner tube. Across it, and for the length of the sponge, the papers print no number.
 """
 
+from typing import TypeAlias
+
 import numpy as np
 
 from wm_drake.elements.damper_law import law_numbers, law_of
@@ -77,16 +79,16 @@ def section_figure(free: float, slides: float, words: str, way: Quantity) -> fig
     stop = half + gap
     long = 1.5 * stop
     tubes = [
-        *_mirrored(-long, long, 1.0, 1.15, METAL_COLOUR, "outer tube with stops"),
-        *_mirrored(-stop - wall, -stop, 0.55, 1.0, METAL_COLOUR),
-        *_mirrored(stop, stop + wall, 0.55, 1.0, METAL_COLOUR),
-        _box(-long - wall, -long, -1.15, 1.15, METAL_COLOUR),
+        *_mirrored((-long, long, 1.0, 1.15), METAL_COLOUR, "outer tube with stops"),
+        *_mirrored((-stop - wall, -stop, 0.55, 1.0), METAL_COLOUR),
+        *_mirrored((stop, stop + wall, 0.55, 1.0), METAL_COLOUR),
+        _box((-long - wall, -long, -1.15, 1.15), METAL_COLOUR),
     ]
     inner = [
-        *_mirrored(-0.8 * long, 1.5 * long, 0.25, 0.35, fig.QUIET, "inner tube"),
-        _box(1.5 * long, 1.5 * long + wall, -0.35, 0.35, fig.QUIET),
+        *_mirrored((-0.8 * long, 1.5 * long, 0.25, 0.35), fig.QUIET, "inner tube"),
+        _box((1.5 * long, 1.5 * long + wall, -0.35, 0.35), fig.QUIET),
     ]
-    sponge = _mirrored(-half, half, 0.37, 0.92, SPONGE_COLOUR, "sponge")
+    sponge = _mirrored((-half, half, 0.37, 0.92), SPONGE_COLOUR, "sponge")
     marks = (
         *tubes,
         *inner,
@@ -102,16 +104,17 @@ def section_figure(free: float, slides: float, words: str, way: Quantity) -> fig
     return fig.Figure(panels=(panel,), height=260.0)
 
 
-def _box(left: float, right: float, low: float, top: float, color: str, key: str = "") -> fig.Area:
+Corners: TypeAlias = tuple[float, float, float, float]
+"""Left, right, lower and upper end of a box."""
+
+
+def _box(corners: Corners, color: str, key: str = "") -> fig.Area:
+    left, right, low, top = corners
     x, y = [left, right, right, left, left], [low, low, top, top, low]
     return fig.Area(x, y, color=color, edge=fig.MARK, width=0.8, key=key)
 
 
-def _mirrored(
-    left: float, right: float, low: float, top: float, color: str, key: str = ""
-) -> list[fig.Mark]:
+def _mirrored(corners: Corners, color: str, key: str = "") -> list[fig.Mark]:
     """Return a box above the axis of the damper and the same one below it."""
-    return [
-        _box(left, right, low, top, color, key),
-        _box(left, right, -top, -low, color),
-    ]
+    left, right, low, top = corners
+    return [_box(corners, color, key), _box((left, right, -top, -low), color)]

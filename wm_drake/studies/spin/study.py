@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -187,10 +187,9 @@ def run_spin(
     cases: Sequence[Case],
     engine: str = DEFAULT_ENGINE,
     *,
-    step: float | None = None,
     progress: Callable[[int, float], None] = lambda index, fraction: None,
-    workers: int | None = None,
     comparison: ComparedCases = ComparedCases.AS_MEASURED,
+    **chosen: Any,
 ) -> SpinRuns:
     """Run cases and return their records and measures.
 
@@ -200,12 +199,10 @@ def run_spin(
         machine: The machine, built or not.
         cases: Cases to run.
         engine: Name of the engine, key of `wm_drake.simulation.runs.ENGINES`.
-        step: Step size; None for that of the machine. [s]
         progress: Called with the index of a case and the fraction of it that is done; for cases in
             processes, when a case has ended.
-        workers: Number of threads, or of processes for the Drake engine; None for the number of
-            cores.
         comparison: Which cases are compared with the measured amplitudes of the machine.
+        chosen: Other fields of `BatchOptions`: step, workers.
 
     Raises:
         InputError: a case or an argument is wrong.
@@ -229,7 +226,7 @@ def run_spin(
 
     shown = (m for m in MEASURES.values() if m.is_in_spin and m.applies(built.parameters))
     compared = tuple(one.name for one in shown)
-    options = BatchOptions((), step, None, True, workers, engine, compared)
+    options = BatchOptions((), histories=True, engine=engine, compared=compared, **chosen)
     run_cases(built, cases, options, collect, progress)
     share = (time.time() - begin) / max(1, len(cases))
     results = (

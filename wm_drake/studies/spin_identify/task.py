@@ -11,7 +11,6 @@ from wm_drake.studies.calibrate.records_task import (
     fitted_answer,
     record_model,
     recorded_load,
-    records_here,
 )
 from wm_drake.studies.compare.options import CompareOptions
 from wm_drake.studies.compare.task import CompareTask
@@ -113,12 +112,11 @@ class SpinIdentifyTask(Task):
             recorded_load(test, executor, cases[name].load) for name, test in self.tests.items()
         ]
         model = record_model(
-            records_here(self.machine, executor),
+            executor,
             SoughtNumbers(parameters, self.sought, "identified"),
             list(self.tests.values()),
             loads,
             self.options.by,
-            executor.ledger,
         )
         title = f"Parameters of machine {parameters.name} identified from records of a spin cycle"
         return fitted_answer(executor, model, self.options.seed, (title, "identified"))

@@ -14,7 +14,7 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.variation import Change
 from wm_drake.parameters.vary import LAUNDRY
 from wm_drake.parameters.vary_file import Correlations, VaryFile
-from wm_drake.parameters.varying import Varied, Varying
+from wm_drake.parameters.varying import Varied, Varying, each
 from wm_drake.report.formatting import shape_name
 from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.cases import Case
@@ -190,14 +190,7 @@ def joint_of(varying: Varying, correlations: Correlations | None) -> Joint:
     Raises:
         InputError: a number has no distribution, or the correlations name another one.
     """
-    marginals, problems = list[Marginal](), list[Problem]()
-    for varied in varying.every:
-        try:
-            marginals.append(_marginal(varied))
-        except InputError as error:
-            problems += error.problems
-    if problems:
-        raise InputError(problems)
+    marginals = each(_marginal, varying.by_name)
     return Joint(tuple(marginals), _correlation_factor(correlations, varying.names))
 
 
