@@ -148,7 +148,7 @@ class Runner:
     """
 
     most_steps = float("inf")
-    compared = COMPARED
+    compared: tuple[str, ...] = COMPARED
 
     def __init__(
         self,

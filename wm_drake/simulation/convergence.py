@@ -84,8 +84,7 @@ def accuracy_in(attributes: Mapping[str, Any]) -> Accuracy | None:
     if "converged" not in attributes:
         return None
     is_converged = float(attributes["converged"] == "yes")
-    numbers = (float(attributes[name]) for name in ("error", "step_s", "halvings"))
-    error, step, halvings = numbers
+    error, step, halvings = (float(attributes[key]) for key in ("error", "step_s", "halvings"))
     return Accuracy(error, is_converged, step, halvings)
 
 
