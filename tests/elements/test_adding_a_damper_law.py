@@ -117,7 +117,7 @@ quick = with_value(parameters, "profile", {"time": (0.0, 2.0), "speed": (0.0, 9.
 load = next(iter(quick.loads))
 peaks = [
     float(np.max(np.abs(wm_drake.measure(record).detergent_displacement)))
-    for engine in ("compiled", "drake")
+    for engine in ("compiled", "drake-accurate")
     for record in [wm_drake.simulate(build_machine(quick), load, engine=engine, step=1e-3)]
 ]
 many = wm_drake.simulate_many(build_machine(quick), [wm_drake.case_of(quick, load)] * 3, step=1e-3)

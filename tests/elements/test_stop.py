@@ -161,7 +161,7 @@ def test_both_engines_move_alike():
     case = Case("middle", machine.parameters.loads["middle"], PROFILE)
     ours, drake = (
         simulate(machine, case, step=2.5e-4),
-        simulate(machine, case, "drake", step=2.5e-4),
+        simulate(machine, case, "drake-accurate", step=2.5e-4),
     )
     assert ours.stop_force.max() > 30.0
     check_alike(ours, drake, ("displacement", "stop_force", "stop_compression"), 1e-4)

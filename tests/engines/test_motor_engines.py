@@ -59,7 +59,7 @@ def test_they_agree_with_other_numbers_and_with_a_table(driven):
 def test_a_run_moves_as_in_drake(changes):
     machine = build_machine(with_values(load_machine("motor"), changes))
     case = Case("two", LOAD, RUN_UP)
-    drake, usual = simulate(machine, case, "drake"), simulate(machine, case)
+    drake, usual = simulate(machine, case, "drake-accurate"), simulate(machine, case)
     fine = simulate(machine, case, step=2.5e-3 / 16)
     assert usual.attrs["integrator"] == ("runge_kutta" if "sample" in str(changes) else "multistep")
     variables = "displacement", "drum_speed", "drum_angle", "motor_torque"
@@ -150,7 +150,7 @@ def test_a_run_on_a_cabinet_that_moves_is_as_in_drake():
     """Run motor and cabinet together, at a friction at which the feet slide."""
     machine = build_machine(with_moving_cabinet(load_machine("motor"), friction=0.12))
     case = Case("two", LOAD, SpinProfile(time=(0.0, 0.101, 0.7), speed=(8.0, 12.0, 24.0)))
-    drake, usual = simulate(machine, case, "drake"), simulate(machine, case)
+    drake, usual = simulate(machine, case, "drake-accurate"), simulate(machine, case)
     fine = simulate(machine, case, step=2.5e-3 / 16)
     assert usual.attrs["integrator"] == "multistep"
     assert float(np.abs(drake.foot_slip).max()) > 1e-4

@@ -30,7 +30,7 @@ def test_a_run_with_taut_springs_is_that_of_springs_that_push(machine, pushing):
 
 
 def test_slack_springs_move_as_in_drake(machine, pushing):
-    drake = simulate(machine, unbalanced(3.0), "drake")
+    drake = simulate(machine, unbalanced(3.0), "drake-accurate")
     compiled = simulate(machine, unbalanced(3.0), step=2.5e-3 / 8)
     other = simulate(machine, unbalanced(3.0, parameters=pushing))
     for record in (drake, compiled):

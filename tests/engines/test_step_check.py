@@ -108,7 +108,7 @@ def test_drakes_engine_controls_its_error_instead(machine, reference):
     case = Case(
         "middle", reference.loads["middle"], constant_speed(20.0, 0.05), parameters=parameters
     )
-    assert simulate(machine, case, "drake").attrs["diverged"] == ""
+    assert simulate(machine, case, "drake-accurate").attrs["diverged"] == ""
 
 
 def test_unbalance_does_not_change_the_step():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import wm_drake as wm
-from wm_drake.engines.drake import run_drake
+from wm_drake.engines.drake import run_drake_accurately
 from wm_drake.export.options import FmuOptions
 from wm_drake.parameters import SpinProfile
 
@@ -47,7 +47,7 @@ def test_external_controller_equals_the_drake_diagram(parameters, fmu):
     history = np.array(spin_up(fmu, reference, gains, SAMPLE_TIME))
 
     setup = wm.build_machine(parameters).set_up("middle")
-    trajectory = run_drake(setup, PROFILE, 5e-4, lambda _: None)
+    trajectory = run_drake_accurately(setup, PROFILE, 5e-4, lambda _: None)
     after = np.rint(trajectory.time[1:] / SAMPLE_TIME).astype(int) - 1
     speed = trajectory.state[1:, 13]
     assert np.abs(history[after, 0] - speed).max() < 1e-3 * np.abs(speed).max()

@@ -12,7 +12,7 @@ import pytest
 
 import wm_drake as wm
 from wm_drake.engines.compiled import run as compiled
-from wm_drake.engines.drake import run_drake
+from wm_drake.engines.drake import run_drake_accurately
 from wm_drake.parameters import SpinProfile, load_machine
 
 MASS, STIFFNESS, FRICTION, START, SPEED = 1.6, 4000.0, 4.0, -0.1, 1.0
@@ -75,7 +75,7 @@ def position_mm(folder, engine, friction, viscous, monkeypatch, duration=1.0):
     if engine == "drake":
         machine.plant.SetPositions(setup.plant_context, [0, 0, 0, 0, 0, START, 0])
         machine.plant.SetVelocities(setup.plant_context, [0, 0, 0, 0, 0, SPEED, 0])
-        motion = run_drake(setup, profile, 1e-4, lambda _fraction: None)
+        motion = run_drake_accurately(setup, profile, 1e-4, lambda _fraction: None)
     else:
         start = compiled.initial_state(setup, profile)
         start[[5, 12]] = START, SPEED

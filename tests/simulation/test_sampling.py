@@ -34,7 +34,7 @@ def test_a_turn_at_the_highest_speed_has_thirty_samples(rpm, milliseconds):
 
 def test_engines_and_batch_take_the_same_samples(machine):
     case = wm.Case("front", machine.parameters.loads["front"], run_up(1200.0, 0.05, 0.05))
-    records = [wm.simulate(machine, case, engine) for engine in ("compiled", "drake")]
+    records = [wm.simulate(machine, case, engine) for engine in ("compiled", "drake-accurate")]
     finished = []
     wm.simulate_many(machine, [case], histories=True, finished=finished.append)
     for record in (*records, finished[0].record):

@@ -11,7 +11,7 @@ from wm_drake.engines import DEFAULT_ENGINE
 from wm_drake.engines.compiled.packing import pack
 from wm_drake.engines.compiled.run import run_compiled
 from wm_drake.engines.compiled.stepping import choose_stepping
-from wm_drake.engines.drake import run_drake
+from wm_drake.engines.drake import run_drake, run_drake_accurately
 from wm_drake.engines.trajectory import Trajectory
 from wm_drake.errors import check_known, input_error
 from wm_drake.model.build import AnyMachine, machine_of
@@ -27,7 +27,11 @@ from wm_drake.simulation.steps import checked_integrator, checked_step
 Engine: TypeAlias = Callable[..., Trajectory]
 """Arguments: machine at rest, profile, step [s], progress called with the fraction done."""
 
-ENGINES: dict[str, Engine] = {"compiled": run_compiled, "drake": run_drake}
+ENGINES: dict[str, Engine] = {
+    "compiled": run_compiled,
+    "drake": run_drake,
+    "drake-accurate": run_drake_accurately,
+}
 
 
 class DivergenceWarning(UserWarning):

@@ -51,6 +51,7 @@ class ElementSystem(Packed, System):
         kind, self.initial, self.state_size = self.kind, initial, len(initial)
         self._scalar, self._evaluate = scalar, evaluator(kind.on_plant, scalar)
         self._force_size = kind.trees * GENERALIZED_FORCE_SIZE
+        self._output_size = kind.output_size
         size = kind.trees * PLANT_STATE_SIZE
         self._plant_state = self.DeclareVectorInputPort("plant_state", size)
         needs = {self._plant_state.ticket(), self.declare_numbers(scalar, packed)}
@@ -136,7 +137,7 @@ class ElementSystem(Packed, System):
         if self.state_size:
             state = context.get_continuous_state_vector().CopyToVector()
             rates = empty(self.state_size, self._scalar)
-        written = empty(self.kind.output_size, self._scalar)
+        written = empty(self._output_size, self._scalar)
         plant_state, numbers = self._plant_state.Eval(context), self.packed_numbers(context)
         self._evaluate(plant_state, state, numbers, force, written, rates)
         return written, rates

@@ -186,7 +186,7 @@ def test_correlated_quantities_have_no_sobol_indices(study):
     )
     indices = trials.indices(trials.samples())
     assert not indices
-    assert "correlated" in indices.attrs["refused"]
+    assert "correlated" in trials.why_missing(indices)
 
 
 @pytest.mark.parametrize(

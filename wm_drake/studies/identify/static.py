@@ -31,6 +31,9 @@ DEVELOPED = 0.1
 NOMINAL = 0.2
 """Part of the curve whose linear fit gives the nominal stiffness, as in [B] section 4."""
 
+ROUNDING = 1e-12
+"""Part of the largest force below which the force at that slope is rounding."""
+
 
 TESTS = Quantity("tests", decimals=0)
 
@@ -107,6 +110,8 @@ def static_curve(axis: str, loops: Sequence[MeasuredLoop]) -> xr.Dataset:
     fallen = np.max(np.abs(_never_falling(places, elastic) - elastic))
     rates = np.concatenate([np.abs(rate) for _, _, rate in signals])
     slope = np.sum(places[first] * elastic[first]) / np.sum(np.square(places[first]))
+    if abs(slope) * max(high, -low) < ROUNDING * np.max(np.abs(elastic)):
+        slope = 0.0  # of a curve with free stroke
     quantities = loop_quantities(is_about(axis))
     load = replace(quantities["load"], decimals=None)
     numbers: dict[str, tuple[Quantity, Any]] = {

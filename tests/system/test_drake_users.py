@@ -305,18 +305,6 @@ def test_meshcat_moves_a_cabinet_that_moves(meshcat):
     assert meshcat.HasPath("/floor")
 
 
-def test_two_machines_in_one_diagram(reference):
-    builder = DiagramBuilder()
-    washers = [add_washing_machine(builder, reference, name=name) for name in ("one", "two")]
-    diagram = builder.Build()
-    context = diagram.CreateDefaultContext()
-    washers[0].set_up("middle", context=context)
-    washers[1].set_up("counter", context=context)
-    Simulator(diagram, context).AdvanceTo(0.3)
-    poses = [w.plant.GetPositions(w.plant.GetMyContextFromRoot(context))[:6] for w in washers]
-    assert np.max(np.abs(poses[0] - poses[1])) > 1e-7
-
-
 def test_a_cloned_context_keeps_its_profile(machine):
     setup = machine.set_up("middle", profile=CORNERED)
     clone = setup.context.Clone()
