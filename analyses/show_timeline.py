@@ -38,11 +38,10 @@ IMPORTS, OTHER = "imports", "other"
 PARTS = {
     "machine": ("wm_drake.studies.run:_machine_of",),
     "runs": ("wm_drake.studies.executor:Executor.simulate", "wm_drake.batch.runs:Runner.run"),
-    "half step": ("wm_drake.studies.executor:Executor.step_error",),
     "page": ("wm_drake.studies.answer:Answer.pages",),
     "files": ("wm_drake.studies.run:_written",),
 }
-"""Functions whose time is that of a part; "half step" runs a sample again with half the step."""
+"""Functions whose time is that of a part."""
 
 
 class Clock:

@@ -53,7 +53,6 @@ _HOMES = {
     "save_record": "simulation.records",
     "simulate": "simulation.runs",
     "simulate_many": "batch",
-    "step_error": "batch",
     "steady_response": "studies.response.response",
     "with_value": "parameters",
     "with_values": "parameters",
@@ -62,7 +61,7 @@ _HOMES = {
 _FOR_EXTENSIONS = {
     *("Element", "ElementKind", "Output", "State", "FmuOptions", "PageBlock", "Scene"),
     *("register_block", "register_element", "register_measure", "register_study", "progress_bar"),
-    *("advance_to", "filtered_displacement", "natural_modes", "run_spin", "step_error"),
+    *("advance_to", "filtered_displacement", "natural_modes", "run_spin"),
 }
 """Public names that `dir` leaves out: for those who extend the package or look inside a run. They
 stay in `__all__` and in the reference."""

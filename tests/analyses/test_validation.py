@@ -72,7 +72,7 @@ def test_effects_are_judged_by_their_sign():
         },
         {
             "load": ("row", ["middle"] * 10),
-            "measure": ("row", ["amplitude"] * 5 + ["steady amplitude"] * 5),
+            "measure": ("row", ["amplitude"] * 5 + ["steady amplitude at 400 rpm"] * 5),
             "of": ("row", list("abcde") * 2),
         },
     )

@@ -70,7 +70,7 @@ def test_with_and_without_gasket(wm_drake, monkeypatch):
     change = 100.0 * (amplitude["value_with gasket"] / amplitude["value_without gasket"] - 1.0)
     assert amplitude["change_with gasket_percent"].tolist() == pytest.approx(change.tolist())
     assert abs(change.iloc[0]) > 0.1
-    assert "steady amplitude" in table.index
+    assert any(name.startswith("steady amplitude at ") for name, _ in table.index)
     # another profile than the measured one
     assert "measured_change_with gasket_percent" not in table.columns
 

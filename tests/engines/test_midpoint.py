@@ -8,11 +8,13 @@ from telescopic_machine import RUN_UP, changed, telescopic
 from wm_drake.compiler.lane_memory import aligned, fill_lanes
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.engines.compiled.linear import jacobians
+from wm_drake.engines.compiled.local_error import SUMS_SIZE
 from wm_drake.engines.compiled.midpoint import integrate_midpoint_lanes, midpoint_work
 from wm_drake.engines.compiled.midpoint_check import (
     midpoint_follows,
     relaxation_matrices,
     step_matrices,
+    tube_jacobians,
 )
 from wm_drake.engines.compiled.packing import initial_state, pack
 from wm_drake.engines.compiled.step_check import free_states
@@ -57,7 +59,10 @@ def after_a_step(packed, layout, relaxation, states, kept):
         np.tile([0.0, 1.0, 0.0, 0.0], (5, 1)),
         np.full(2, -1, dtype=np.int64),
     )
-    integrate_midpoint_lanes(steps, 1, 2, lanes, layout.elements, matrices, x, work, aligned(8))
+    sums = aligned(SUMS_SIZE * WIDTH)
+    integrate_midpoint_lanes(
+        steps, 1, 2, lanes, layout.elements, matrices, x, work, sums, aligned(8)
+    )
     return x.reshape(-1, WIDTH).T.copy(), work.past.reshape(-1, WIDTH).T.copy()
 
 
@@ -65,7 +70,7 @@ def test_a_small_motion_takes_the_step_of_the_linearised_machine(setup):
     """Compare the compiled step with the matrix of the check, along random motions."""
     size = 1e-8
     packed, layout, rest, jacobian = at_rest(setup, size)
-    relaxation = relaxation_matrices(setup, layout, jacobian, STEP)
+    relaxation = relaxation_matrices(tube_jacobians(setup, layout, jacobian), STEP)
     matrix = step_matrices(setup, layout, jacobian, STEP)[0]
     free, _ = free_states(setup, layout.states)
     free, n = np.array(free), len(free)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import wm_drake as wm
-from wm_drake.parameters import SpinProfile, spin
+from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.spin import SAMPLES_OF_TURN
 from wm_drake.simulation.displacements import filtered_displacement
 from wm_drake.simulation.records import sample_period
@@ -55,12 +55,3 @@ def test_peaks_of_a_hold_are_those_of_fine_samples(machine, rpm):
             for record in (usual, finer)
         )
         assert found == pytest.approx(expected, abs=MOST_BESIDE * expected.max())
-
-
-def test_check_of_the_step_sees_samples_that_miss_the_peaks(machine, monkeypatch):
-    case = wm.Case("front", machine.parameters.loads["front"], run_up(1200.0, 2.0, 3.0))
-    assert wm.step_error(machine, [case]).difference < MOST_BESIDE
-    monkeypatch.setattr(spin, "SAMPLES_OF_TURN", 1)  # ten samples a turn of the drum, at 5 ms
-    error = wm.step_error(machine, [case])
-    assert error.difference > 2.0 * MOST_BESIDE
-    assert "half the 5 ms between samples" in error.text

@@ -105,7 +105,7 @@ def test_a_plain_simulator_moves_as_the_compiled_engine(name):
     speeds = tuple(float(parameters.profile.speed_at(time)) for time in (0.0, 3.0))
     profile = SpinProfile(time=(0.0, 3.0), speed=speeds)
     case = Case("first", next(iter(parameters.loads.values())), profile)
-    record = simulate(machine, case, step=2.5e-3 / 16)
+    record = simulate(machine, case, step=parameters.step / 8)
     found = machine.diagram.GetOutputPort("displacement").Eval(simulator.get_context())
     size = float(np.abs(record.displacement).max())
     np.testing.assert_allclose(

@@ -10,15 +10,12 @@ May import: `simulation` and the rooms before it.
 from wm_drake.batch.many import SimulationInterrupted, simulate_many
 from wm_drake.batch.remembered import run_keys, simulate_remembered, sources_version
 from wm_drake.batch.runs import RunResult
-from wm_drake.batch.verification import StepError, step_error
 
 __all__ = [
     "RunResult",
     "SimulationInterrupted",
-    "StepError",
     "run_keys",
     "simulate_many",
     "simulate_remembered",
     "sources_version",
-    "step_error",
 ]

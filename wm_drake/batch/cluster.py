@@ -261,7 +261,7 @@ def run_work_item(
     results = dict[int, LedgerEntry]()
 
     def collect(runs: list[RunResult]) -> None:
-        results.update({numbers[r.number]: LedgerEntry(r.values, r.diverged) for r in runs})
+        results.update({numbers[r.number]: LedgerEntry(r.stored_values, r.diverged) for r in runs})
 
     text = parameters.model_dump_json(exclude={"sources"})
     run_cases(_built_machine(_HashableParameters(text, parameters)), cases, options, collect)

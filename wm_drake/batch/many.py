@@ -10,7 +10,8 @@ import xarray as xr
 from wm_drake.batch.drake_runs import drake_pool
 from wm_drake.batch.run_table import RunTable
 from wm_drake.batch.runs import Advance, BatchJobs, BatchOptions, Runner, RunResult
-from wm_drake.batch.work_items import Preparation, WorkItem
+from wm_drake.batch.work_items import BatchKey, Preparation, WorkItem
+from wm_drake.compiler.lanes import WIDTH
 from wm_drake.engines import DEFAULT_ENGINE
 from wm_drake.engines.memory import RECORDS_OF_BATCH
 from wm_drake.errors import check_known
@@ -64,8 +65,8 @@ def simulate_many(
         measures: Names of measures or of their variables, in
             `wm_drake.simulation.measures.MEASURES`, such as "extremes" (D, F and M of [B]),
             "amplitudes" or "amplitude" (and critical speeds), "gap", "mounts".
-        step: Step size; the output period of 5 ms must be an integer multiple of it. If None, the
-            step size of the machine is used. [s]
+        step: Largest step; the output period of 5 ms must be an integer multiple of it. If None,
+            that of the machine. Runs that are not accurate with it have shorter ones. [s]
         integrator: Integrator, as in `simulate`; None for that of the machine.
         histories: Whether each `RunResult` contains the record of the run, as from `simulate`.
         workers: Number of threads, or of processes for the Drake engine; None for the number of
@@ -77,7 +78,9 @@ def simulate_many(
     Returns:
         Table over `run`, the number of the case. The coordinate `case` holds its name. The
         variables are the measures (SI, attrs["units"]) and `diverged`: time and reason if a run
-        diverged, else "". The measures of a run that diverged cover the time until then.
+        diverged, else "". The measures of a run that diverged cover the time until then. The
+        coordinates `error`, `is_converged`, `step` [s] and `halvings` are those of
+        `wm_drake.simulation.convergence.Accuracy`.
 
     Raises:
         InputError: a case or an argument is wrong. `finished` was called for the runs that had
@@ -101,7 +104,7 @@ def simulate_many(
     def collect(runs: list[RunResult]) -> None:
         nonlocal done
         for run in runs:  # fill the table first: the callbacks may raise
-            table.put(run.number, run.case.name, run.values, run.diverged)
+            table.put(run.number, run.case.name, run.stored_values, run.diverged)
         done += len(runs)
         for run in runs:
             finished(run)
@@ -151,14 +154,30 @@ def run_cases(
     scheme = checked_integrator(parameters, options.integrator)
     notice_jumping_friction(parameters)
     runner = Runner(parameters, options.measures, options.histories, machine.cache.scenes)
+    runner.compared = options.compared
     at_once = workers * (RECORDS_OF_BATCH if options.histories else 1.0)
     batches = Preparation(machine, step, scheme, at_once).batches(_with_pauses(cases))
     with ThreadPoolExecutor(workers) as threads:
-        jobs = ((runner.run, *batch, _of_batch(advance, batch[1])) for batch in batches)
-        _run_all(threads, jobs, ahead, runner.stopped.set, collect)
+        jobs = _jobs(runner, batches, advance)
+        while True:
+            _run_all(threads, jobs, ahead, runner.stopped.set, collect)
+            left = list(runner.postponed(1))
+            if not left:
+                break
+            jobs = _jobs(runner, left, advance)
     pairs = runner.scenes[0].pair_names() if runner.scenes else None
     machine.cache.scenes.extend(runner.scenes)
     return pairs
+
+
+def _jobs(
+    runner: Runner, batches: Iterable[tuple[BatchKey, list[WorkItem]]], advance: Advance
+) -> BatchJobs:
+    """Yield the jobs of batches, and of full batches of runs that must be repeated meanwhile."""
+    for key, items in batches:
+        yield runner.run_or_postpone, key, items, _of_batch(advance, items)
+        for finer, again in runner.postponed(WIDTH):
+            yield runner.run_or_postpone, finer, again, _of_batch(advance, again)
 
 
 def _of_batch(advance: Advance, items: list[WorkItem]) -> Callable[[float], None]:

@@ -136,12 +136,12 @@ def simulate_remembered(
         # runs that end together are stored together
         ledger.put_all(
             {
-                key: LedgerEntry(r.values, r.diverged)
+                key: LedgerEntry(r.stored_values, r.diverged)
                 for (_, key), r in zip(places, runs, strict=True)
             }
         )
         for (number, _), ended in zip(places, runs, strict=True):
-            table.put(number, ended.case.name, ended.values, ended.diverged)
+            table.put(number, ended.case.name, ended.stored_values, ended.diverged)
             done += 1
             progress(done)
 

@@ -10,6 +10,7 @@ from wm_drake.errors import input_error
 from wm_drake.model.scene import Scene
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
+from wm_drake.simulation.convergence import ACCURACY, Accuracy
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.measures.labels import LABELS
 
@@ -37,6 +38,7 @@ class RunTable:
         self.variables = [v for name in measures for v in MEASURES[name].variables]
         self._columns: dict[str, FloatArray] = {}
         self._names: np.ndarray = np.empty(0, dtype=object)
+        self._accuracy: FloatArray = np.empty((0, len(Accuracy._fields)))
         self._diverged: dict[int, str] = {}
         self._region_counts: set[int] = set()
 
@@ -48,13 +50,15 @@ class RunTable:
         Args:
             number: Number of the case.
             name: Its name.
-            values: Values of the variables of the measures by name. [SI]
+            values: Values of the variables of the measures by name, with `ACCURACY`. [SI]
             diverged: When and why the run stopped early; "" if it did not.
         """
         self._names = _with_place(self._names, number)
         self._names[number] = name
         if diverged:
             self._diverged[number] = diverged
+        self._accuracy = _with_place(self._accuracy, number)
+        self._accuracy[number] = values.get(ACCURACY, np.nan)
         for variable in self.variables:
             value = np.asarray(values[variable.name])
             if "region" in variable.dims:
@@ -74,9 +78,11 @@ class RunTable:
             InputError: the runs have different numbers of regions.
         """
         numbers = np.flatnonzero(self._names != None)  # noqa: E711
+        accuracy = zip(Accuracy._fields, self._accuracy[numbers].T, strict=True)
         used = {dim for variable in self.variables for dim in variable.dims}
         parameters, names = self.parameters, self._names[numbers].astype(str)
         labels: dict[str, Any] = {"run": numbers, "case": ("run", names)}
+        labels |= {name: ("run", column) for name, column in accuracy}
         for dim in (*_ALWAYS, "foot", *sorted(used - {"region", "pair"})):
             labels[dim] = list(LABELS[dim](parameters, parameters.profile))
         if not parameters.cabinet:

@@ -8,16 +8,18 @@ from typing import Any, TypeAlias, cast
 
 import numpy as np
 
-from wm_drake.batch.work_items import BatchKey, WorkItem
+from wm_drake.batch.work_items import BatchKey, WorkItem, side_by_side
 from wm_drake.compiler.lane_memory import aligned, fill_lanes
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.elements.mount import WRENCH_SIZE
 from wm_drake.elements.sensor import POINT_SIZE
 from wm_drake.elements.state_map import RATES_SIZE, WATER
 from wm_drake.engines import DEFAULT_ENGINE
+from wm_drake.engines.compiled.local_error import SUMS_SIZE, estimates_of
 from wm_drake.engines.compiled.mechanics import DRUM_ANGLE, DRUM_RATE, STATE_SIZE
 from wm_drake.engines.compiled.run import RunLanes, integrate_runs
 from wm_drake.engines.compiled.samples import trajectory_of
+from wm_drake.engines.memory import available_memory, needed_memory
 from wm_drake.engines.schedule import Schedule, schedule_of
 from wm_drake.engines.trajectory import (
     LARGEST_ANGLE,
@@ -33,10 +35,21 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.band import pass_band
 from wm_drake.simulation.cabinet import floor_forces
 from wm_drake.simulation.cases import Case
+from wm_drake.simulation.convergence import (
+    ACCURACY,
+    COMPARED,
+    LARGEST_LOSS,
+    Accuracy,
+    Attempt,
+    Refinement,
+    attributes_of,
+    judged,
+)
 from wm_drake.simulation.displacements import amplitudes, filtered_lanes
 from wm_drake.simulation.feet import FeetLoaded, cabinet_of
 from wm_drake.simulation.histories import measure_samples_lanes
-from wm_drake.simulation.measures import MEASURES, Run
+from wm_drake.simulation.measures import MEASURES, Measure, Run
+from wm_drake.simulation.measures.run import Need
 from wm_drake.simulation.mount_histories import measure_mounts_lanes
 from wm_drake.simulation.mounts import mount_names, sums_size
 from wm_drake.simulation.records import Record, as_record
@@ -86,6 +99,7 @@ class RunResult:
         record: Its history; None if histories were not requested.
         gap: Where the smallest gap is; None if it was not measured.
         motion: Its motion; None if it was not requested, or has fewer than two samples.
+        accuracy: How accurate it is; the runner knows it of each.
     """
 
     number: int
@@ -95,11 +109,18 @@ class RunResult:
     record: Record | None
     gap: Gap | None = None
     motion: ShownMotion | None = None
+    accuracy: Accuracy | None = None
+
+    @property
+    def stored_values(self) -> dict[str, FloatArray]:
+        """Return the values, and the accuracy among them, for tables and ledgers."""
+        known = {} if self.accuracy is None else {ACCURACY: np.array(self.accuracy)}
+        return self.values | known
 
 
 @dataclass(frozen=True)
 class BatchOptions:
-    """How cases are run; see `simulate_many`."""
+    """How cases are run; see `simulate_many`, and `Runner` for `compared`."""
 
     measures: tuple[str, ...]
     step: float | None = None
@@ -107,6 +128,7 @@ class BatchOptions:
     histories: bool = False
     workers: int | None = None
     engine: str = DEFAULT_ENGINE
+    compared: tuple[str, ...] = COMPARED
 
 
 Advance: TypeAlias = Callable[[int, float], None]
@@ -117,7 +139,16 @@ BatchJobs: TypeAlias = Iterator[tuple[Any, ...]]
 
 
 class Runner:
-    """Runs work items in any thread. Each thread reuses memory of its own from batch to batch."""
+    """Runs work items in any thread. Each thread reuses memory of its own from batch to batch.
+
+    Attributes:
+        most_steps: Largest number of steps of a run that is repeated.
+        compared: Keys of the measures that are compared where runs are repeated, if the runner has
+            no measures of its own.
+    """
+
+    most_steps = float("inf")
+    compared: tuple[str, ...] = COMPARED
 
     def __init__(
         self,
@@ -141,10 +172,10 @@ class Runner:
         self.parameters = parameters
         self.measures = [MEASURES[name] for name in measures]
         self.histories, self.motions = histories, motions
-        self.needs = {need for measure in self.measures for need in measure.needs}
         self.stopped = threading.Event()
         self._memory = threading.local()
         self._spare = [] if scenes is None else scenes
+        self._again = list[WorkItem]()
         self.scenes: list[Scene] = []
 
     def run(
@@ -153,26 +184,67 @@ class Runner:
         work_items: list[WorkItem],
         progress: Callable[[float], None] = lambda fraction: None,
     ) -> list[RunResult]:
-        """Run up to `WIDTH` work items side by side and measure them.
+        """Run up to `WIDTH` work items side by side until each is accurate, and measure them.
 
         Args:
             key: What they have in common.
             work_items: The work items.
-            progress: Called with the fraction of the integration that is done.
+            progress: Called with the fraction of the first integration that is done.
 
         Returns:
             A result for each work item; none if `stopped` was set meanwhile.
         """
+        results, again = self.attempt(key, work_items, progress)
+        while again:
+            batches, again = list(side_by_side(again)), []
+            for finer, items in batches:
+                ended, left = self.attempt(finer, items)
+                results += ended
+                again += left
+        return results
+
+    def run_or_postpone(
+        self, key: BatchKey, work_items: list[WorkItem], progress: Callable[[float], None]
+    ) -> list[RunResult]:
+        """Run work items once; those that are not accurate wait for `postponed`."""
+        results, again = self.attempt(key, work_items, progress)
+        self._again.extend(again)
+        return results
+
+    def postponed(self, fewest: int) -> Iterator[tuple[BatchKey, list[WorkItem]]]:
+        """Yield batches of work items that wait, of at least some items; call it in one thread."""
+        items, self._again = self._again, []
+        for key, batch in side_by_side(items):
+            if len(batch) < fewest:
+                self._again.extend(batch)
+            else:
+                yield key, batch
+
+    def attempt(
+        self,
+        key: BatchKey,
+        work_items: list[WorkItem],
+        progress: Callable[[float], None] = lambda fraction: None,
+    ) -> tuple[list[RunResult], list[WorkItem]]:
+        """Run work items side by side; return results, and the items that must be repeated."""
         schedule = schedule_of(
             key.profile, key.stepping.step, key.period, key.layout.control_period
         )
         packed = self._lanes("packed", [item.packed for item in work_items])
         samples = self._samples(key, schedule, work_items, packed, progress)
         if samples is None:
-            return []
-        arrays = self._measured(key, work_items, packed, samples)
+            return [], []
+        estimates, allowed = estimates_of(self._array("sums", SUMS_SIZE)), self._allowed
+        is_compared = any(
+            item.before or of_run.steps > allowed(item) or of_run.samples > LARGEST_LOSS
+            for item, of_run in zip(work_items, estimates, strict=False)
+        )
+        is_bare = is_compared and not self.measures
+        chosen = [MEASURES[name] for name in self.compared] if is_bare else self.measures
+        needs = {need for measure in chosen for need in measure.needs}
+        arrays = self._measured(key, work_items, packed, samples, needs)
         paths: list[Path | None] = [None] * len(work_items)
-        if "shapes" in self.needs:
+        if "shapes" in needs:
             good = arrays[2][-1, : len(work_items)].astype(int).tolist()
             rest_poses = [item.begin[:6] for item in work_items]
             paths = self.scene().paths(schedule.time, arrays[0], good, rest_poses)
@@ -180,8 +252,32 @@ class Runner:
             LaneRun(item, schedule, self.scene, Lane(*(array[..., lane] for array in arrays)), path)
             for lane, (item, path) in enumerate(zip(work_items, paths, strict=True))
         ]
-        blocks = [measure.evaluate(runs) for measure in self.measures]
-        return [self._result(run, lane, blocks) for lane, run in enumerate(runs)]
+        blocks = [measure.evaluate(runs) for measure in chosen]
+        results, again = list[RunResult](), list[WorkItem]()
+        for lane, run in enumerate(runs):
+            values = _values_of(lane, chosen, blocks)
+            this = Attempt(
+                estimates[lane], key.stepping.step, run.item.halvings, run.diverged, values,
+                float(np.abs(run.largest[0]).max()),
+            )  # fmt: skip
+            accuracy, finer = judged(this, run.item.before, allowed(run.item))
+            if finer is not None and self._may_repeat(run.item, finer):
+                again.append(run.item.repeated(this, finer))
+            else:
+                results.append(self._result(run, values, accuracy, "shapes" in needs))
+        return results, again
+
+    def _may_repeat(self, item: WorkItem, finer: Refinement) -> bool:
+        """Return whether there are time and memory for a run that is repeated."""
+        step, period = item.numbers.stepping.halved(finer.step).step, item.numbers.period
+        profile = item.case.profile
+        if profile.duration / step > self.most_steps:
+            return False
+        return needed_memory(profile, step, period / 2**finer.period) <= available_memory()
+
+    def _allowed(self, item: WorkItem) -> float:
+        """Return the largest error that the machine of a work item allows."""
+        return (item.case.parameters or self.parameters).accuracy
 
     def _samples(
         self,
@@ -204,12 +300,13 @@ class Runner:
         rows = len(schedule.time)
         size = len(work_items[0].begin) + key.layout.states.begins.rates
         state = self._lanes("begin", [item.begin for item in work_items])
-        samples = self._array("samples", rows * size)
+        samples, sums = self._array("samples", rows * size), self._array("sums", SUMS_SIZE)
+        sums[:] = 0.0
         relaxation = None
         if key.stepping.integrator == "midpoint":
             matrices = [item.numbers.stepping.relaxation for item in work_items]
             relaxation = self._lanes("relaxation", matrices)
-        lanes = RunLanes(packed, state, samples, relaxation)
+        lanes = RunLanes(packed, state, samples, sums, relaxation)
         one_derivative = key.stepping.one_derivative(schedule)
         for done in integrate_runs(schedule, one_derivative, key.layout, lanes):
             if self.stopped.is_set():
@@ -218,15 +315,20 @@ class Runner:
         return samples.reshape(rows, size, WIDTH)
 
     def _measured(
-        self, key: BatchKey, work_items: list[WorkItem], packed: FloatArray, samples: FloatArray
+        self,
+        key: BatchKey,
+        work_items: list[WorkItem],
+        packed: FloatArray,
+        samples: FloatArray,
+        needs: set[Need],
     ) -> tuple[np.ndarray, ...]:
-        """Return the arrays of `Lane` of runs side by side, lanes last."""
+        """Return the arrays of `Lane` of runs side by side, lanes last, as far as needed."""
         # without amplitudes only the detergent point is followed, which comes last
-        first = 0 if "sensors" in self.needs else -3 * POINT_SIZE
+        first = 0 if "sensors" in needs else -3 * POINT_SIZE
         points = [item.numbers.points[first:] for item in work_items]
         rows, size, count = *samples.shape[:2], len(points[0]) // POINT_SIZE
         moved, extremes = self._array("moved", count * rows), self._array("extremes", count + 7)
-        springs = key.layout.mounts.springs if "springs" in self.needs else _NONE
+        springs = key.layout.mounts.springs if "springs" in needs else _NONE
         lengths = self._array("spring lengths", len(springs))
         measure_samples_lanes(
             samples.ravel(),
@@ -244,12 +346,13 @@ class Runner:
             lengths,
         )
         by_point = moved.reshape(count, rows, WIDTH)
-        filtered = self._filtered(by_point, extremes[-WIDTH:], key)
+        sensors = by_point[:-3] if "sensors" in needs else by_point[:0]
+        filtered = self._filtered(sensors, extremes[-WIDTH:], key)
         return (
             samples,
             by_point.transpose(1, 0, 2),
             extremes.reshape(-1, WIDTH),
-            *self._forces_of_mounts(key, samples.ravel(), rows, size, packed),
+            *self._forces_of_mounts(key, samples, packed, needs),
             lengths.reshape(-1, WIDTH),
             filtered.transpose(1, 0, 2),
             *_peaks(filtered),
@@ -259,21 +362,20 @@ class Runner:
         """Return the filtered displacements at the sensors of runs side by side, if needed.
 
         Args:
-            moved: Displacements at the measured points. (points, rows, lanes) [m]
+            moved: Displacements at the sensors, none if not needed. (sensors, rows, lanes) [m]
             good: Number of samples of each run before it diverged. (lanes,)
             key: What the runs have in common.
 
         Returns:
             (sensors, rows, lanes); empty if no measure needs them or no run is complete. [m]
         """
-        sensors, rows = len(moved) - 3, moved.shape[1]
-        if "sensors" not in self.needs or not np.any(good == rows):
+        if not len(moved) or not np.any(good == moved.shape[1]):
             return np.empty((0, 0, WIDTH))
         band = pass_band(key.profile, key.period)
-        return filtered_lanes(moved[:sensors], key.period, band, self._array)
+        return filtered_lanes(moved, key.period, band, self._array)
 
     def _forces_of_mounts(
-        self, key: BatchKey, samples: FloatArray, rows: int, size: int, p: FloatArray
+        self, key: BatchKey, samples: FloatArray, p: FloatArray, needs: set[Need]
     ) -> tuple[FloatArray, FloatArray]:
         """Return the sums and the wrenches on the cabinet of `measure_mounts_lanes`.
 
@@ -282,28 +384,31 @@ class Runner:
         """
         sums: FloatArray = np.empty(0)
         cabinet: FloatArray = np.empty(0)
-        if {"mounts", "feet"} & self.needs:
+        rows, size = samples.shape[:2]
+        if {"mounts", "feet"} & needs:
             mounts, bounds = key.layout.mounts, (LARGEST_ANGLE, LARGEST_DISPLACEMENT)
             count = len(mount_names(self.parameters))
             sums = self._array("sums", sums_size(count))
-            if "feet" in self.needs:
+            if "feet" in needs:
                 cabinet = self._array("cabinet", rows * WRENCH_SIZE)
-            measure_mounts_lanes(samples, rows, size, bounds, p, mounts, count, cabinet, sums)
+            measure_mounts_lanes(
+                samples.ravel(), rows, size, bounds, p, mounts, count, cabinet, sums
+            )
         return sums.reshape(-1, WIDTH), cabinet.reshape(-1, WRENCH_SIZE, WIDTH)
 
-    def _result(self, run: "LaneRun", lane: int, blocks: list[Sequence[FloatArray]]) -> RunResult:
-        """Return the result of the run in a lane, from the values of all measures in all lanes."""
-        values = {
-            name: np.asarray(value[lane])
-            for measure, block in zip(self.measures, blocks, strict=True)
-            for name, value in zip(measure.names, block, strict=True)
-        }
+    def _result(
+        self, run: "LaneRun", values: dict[str, FloatArray], accuracy: Accuracy, has_shapes: bool
+    ) -> RunResult:
+        """Return the result of a run that need not be repeated, from the values of its measures."""
         item, keeps = run.item, self.histories
         keeps = keeps if isinstance(keeps, bool) else item.number in keeps
         record = self._record(item, run.schedule, run.lane.samples.copy()) if keeps else None
-        gap = run.gap if "shapes" in self.needs else None
+        if record is not None:
+            record.attrs |= attributes_of(accuracy)
+        gap = run.gap if has_shapes else None
         motion = run.motion() if item.number in self.motions else None
-        return RunResult(item.number, item.case, values, run.diverged, record, gap, motion)
+        asked = {name: values[name] for measure in self.measures for name in measure.names}
+        return RunResult(item.number, item.case, asked, run.diverged, record, gap, motion, accuracy)
 
     def _record(self, item: WorkItem, schedule: Schedule, samples: FloatArray) -> Record:
         trajectory = trajectory_of(samples, schedule, item.packed, item.layout)
@@ -334,6 +439,17 @@ class Runner:
         if name not in kept or len(kept[name]) != size * WIDTH:
             kept[name] = aligned(size * WIDTH)
         return kept[name]
+
+
+def _values_of(
+    lane: int, measures: Sequence[Measure], blocks: Sequence[Sequence[FloatArray]]
+) -> dict[str, FloatArray]:
+    """Return the values of measures of the run in a lane by the names of their variables."""
+    return {
+        name: np.asarray(value[lane])
+        for measure, block in zip(measures, blocks, strict=True)
+        for name, value in zip(measure.names, block, strict=True)
+    }
 
 
 def _peaks(filtered: FloatArray) -> tuple[FloatArray, np.ndarray]:

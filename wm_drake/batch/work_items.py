@@ -1,7 +1,7 @@
 """Cases -> work items: packed numbers, in batches that can run side by side."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydrake.systems.framework import Context
@@ -18,6 +18,7 @@ from wm_drake.parameters import Load, MachineParameters, SpinProfile
 from wm_drake.parameters.machine import Integrator
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
+from wm_drake.simulation.convergence import Attempt, Refinement
 
 KEPT_BODIES, KEPT_NUMBERS = 256, 64
 """How many sets of bodies with a load, and of other numbers, are cached.
@@ -58,6 +59,8 @@ class WorkItem:
         numbers: Shared by all cases with these parameters.
         packed, layout: All packed numbers and their layout, as from `pack_run`.
         begin: State at the start of the run.
+        before: The run that this one repeats with a shorter step; None for the first one.
+        halvings: How often its step is halved.
     """
 
     number: int
@@ -66,6 +69,21 @@ class WorkItem:
     packed: FloatArray
     layout: Layout
     begin: FloatArray
+    before: Attempt | None = None
+    halvings: int = 0
+
+    @property
+    def key(self) -> "BatchKey":
+        """Return what runs that are run side by side with it have in common."""
+        numbers = self.numbers
+        return BatchKey(self.case.profile, self.layout, numbers.stepping, numbers.period)
+
+    def repeated(self, before: Attempt, finer: Refinement) -> "WorkItem":
+        """Return the same run with a shorter step, and with more samples if it needs them."""
+        stepping = self.numbers.stepping.halved(finer.step)
+        period = self.numbers.period / 2**finer.period
+        numbers = replace(self.numbers, stepping=stepping, period=period)
+        return replace(self, numbers=numbers, before=before, halvings=self.halvings + finer.step)
 
 
 @dataclass(frozen=True)
@@ -76,6 +94,21 @@ class BatchKey:
     layout: Layout
     stepping: Stepping
     period: float
+
+
+def side_by_side(items: Iterable[WorkItem]) -> Iterator[tuple[BatchKey, list[WorkItem]]]:
+    """Yield batches of up to `WIDTH` work items that can run side by side, each when it is full.
+
+    Items are in the given order as far as possible.
+    """
+    waiting: dict[BatchKey, list[WorkItem]] = {}
+    for item in items:
+        key = item.key
+        work_items = waiting.setdefault(key, [])
+        work_items.append(item)
+        if len(work_items) == WIDTH:
+            yield key, waiting.pop(key)
+    yield from waiting.items()
 
 
 class _Identity:
@@ -123,23 +156,12 @@ class Preparation:
         self._known_numbers: dict[tuple[_Identity, bool, SpinProfile], PackedParameters] = {}
 
     def batches(self, cases: Iterable[Case]) -> Iterator[tuple[BatchKey, list[WorkItem]]]:
-        """Yield batches of up to `WIDTH` work items that can run side by side.
-
-        Items are in the order of the cases as far as possible.
+        """Return the batches of the work items of cases; see `side_by_side`.
 
         Raises:
             InputError: a case is wrong; the message names it.
         """
-        waiting: dict[BatchKey, list[WorkItem]] = {}
-        for number, case in enumerate(cases):
-            item = self._work_item(number, case)
-            numbers = item.numbers
-            key = BatchKey(case.profile, item.layout, numbers.stepping, numbers.period)
-            work_items = waiting.setdefault(key, [])
-            work_items.append(item)
-            if len(work_items) == WIDTH:
-                yield key, waiting.pop(key)
-        yield from waiting.items()
+        return side_by_side(self._work_item(number, case) for number, case in enumerate(cases))
 
     def _work_item(self, number: int, case: Case) -> WorkItem:
         try:

@@ -37,6 +37,19 @@ class Divergence:
 
 
 @dataclass(frozen=True)
+class Estimates:
+    """Estimated errors of a run.
+
+    Attributes:
+        steps: Error of the motion by the steps, relative to its largest velocity.
+        samples: Part of the largest acceleration that lies between the samples.
+    """
+
+    steps: float
+    samples: float
+
+
+@dataclass(frozen=True)
 class Trajectory:
     """Motion of a machine.
 
@@ -63,6 +76,7 @@ class Trajectory:
             fixed one.
         element_states: (n, k) States of elements of other packages; None without any.
         water: (n, wet) Share of water that is left in each wet mass of the load; None if it stays.
+        estimates: Errors by steps and samples; None if the engine controls its error.
     """
 
     time: FloatArray
@@ -77,6 +91,7 @@ class Trajectory:
     cabinet: FloatArray | None = None
     element_states: FloatArray | None = None
     water: FloatArray | None = None
+    estimates: Estimates | None = None
 
     def part(self, rows: slice) -> "Trajectory":
         """Return some of the samples."""

@@ -15,6 +15,7 @@ import numpy as np
 from wm_drake.elements.cabinet import FEET_COUNT
 from wm_drake.elements.mount import WRENCH_SIZE
 from wm_drake.elements.sensor import POINT_SIZE
+from wm_drake.engines.compiled.local_error import SUMS_SIZE
 from wm_drake.engines.compiled.midpoint import TUBES
 from wm_drake.engines.compiled.multistep import PAST_INPUTS, PAST_RATES
 from wm_drake.engines.compiled.packing import initial_state
@@ -261,6 +262,7 @@ def _places(contents: Contents, count: Any) -> Any:
         "sum": max(begins.size, TUBES),
         "past_rates": PAST_RATES * begins.size,
         "past_inputs": PAST_INPUTS * max(begins.inputs, 1),
+        "errors": SUMS_SIZE,
         "length": 1,
         "jacobian": (2 * TUBES) ** 2,
         "relaxation": TUBES**2 * dampers,

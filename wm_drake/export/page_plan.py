@@ -17,15 +17,16 @@ PUSHES = 4
 Places = namedtuple(
     "Places",
     "time unbalances of_load speed packed total state rest trial wrenches slopes step rate inputs "
-    "stage sum past_rates past_inputs length jacobian relaxation extremes sums answer parameters "
-    "bodies size",
+    "stage sum past_rates past_inputs errors length jacobian relaxation extremes sums answer "
+    "parameters bodies size",
 )
 """Indices in the array of an instance.
 
 unbalances: those of the load, the residual imbalance of the drum last; of_load: what else the load
 adds to the harmonics of the drum; speed: of the drum at the start [rad/s]; packed: packed numbers,
 then the free length of each spring, the measured points and the numbers of the feet; rest: pose of
-the tub at rest; length: largest step of the run [s]; relaxation: matrices of the midpoint rule;
+the tub at rest; errors: `local_error.Sums` of the
+run; length: largest step of the run [s]; relaxation: matrices of the midpoint rule;
 extremes, sums: what `measure_samples_lanes` and `measure_mounts_lanes` write; answer: the gap
 (`GAP_SIZE`), then the peak force of each mount; parameters: numbers of the machine file by straight
 lines; bodies: `BODY_SIZE` each; the others are arrays to work in. What depends on the numbers that

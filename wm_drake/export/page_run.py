@@ -25,6 +25,7 @@ from wm_drake.engines.compiled.bearing import carrier_motion
 from wm_drake.engines.compiled.cabinet import FEET_BEGIN, SLIPS_BEGIN
 from wm_drake.engines.compiled.integration import Work, integrate_lanes, runge_kutta_step
 from wm_drake.engines.compiled.linear import jacobian_lanes
+from wm_drake.engines.compiled.local_error import SUMS_SIZE
 from wm_drake.engines.compiled.mechanics import state_derivative
 from wm_drake.engines.compiled.midpoint import (
     MOVING,
@@ -68,6 +69,15 @@ def _runge_kutta() -> Any:
 def part(v, begin, count):
     """Return some of the numbers behind a pointer as an array."""
     return carray(pointer_at(v, begin), (count,))
+
+
+@njit(**OPTIONS)
+def cleared(v, begin, count):
+    """Return some of the numbers behind a pointer as an array, all zero."""
+    numbers = part(v, begin, count)
+    for k in range(count):
+        numbers[k] = 0.0
+    return numbers
 
 
 def integrator(plan: Any) -> Any:
@@ -114,7 +124,7 @@ def _advance(plan: Any) -> Any:
             part(v, at.past_inputs, PAST_INPUTS * inputs),
         )
         p, x = part(v, at.packed, count), part(v, at.state, size)
-        run(steps, 0, n, p, elements, x, work, history)
+        run(steps, 0, n, p, elements, x, work, cleared(v, at.errors, SUMS_SIZE), history)
 
     return advance
 
@@ -139,7 +149,8 @@ def _midpoint(plan: Any) -> Any:
         )
         p, x = part(v, at.packed, count), part(v, at.state, size)
         relaxation = part(v, at.relaxation, TUBES * TUBES * dampers)
-        run(steps[:4], 0, n, p, elements, relaxation, x, work, history)
+        sums = cleared(v, at.errors, SUMS_SIZE)
+        run(steps[:4], 0, n, p, elements, relaxation, x, work, sums, history)
 
     return advance
 

@@ -38,6 +38,9 @@ LONGEST_RUN = 300.0
 MOST_STEPS = 1_100_000
 """Largest number of steps of a run of a page: some seconds, with bodies between tub and housing."""
 
+SLIDER_STEPS = 300_000
+"""Largest number of steps of a run that is repeated with shorter ones: about a second."""
+
 MOST_BUILT = 4
 """Largest number of machines that are built for one file."""
 

@@ -26,7 +26,7 @@ from wm_drake.export.page_second import SecondProcess
 from wm_drake.export.page_steps import FARTHEST, other_steps
 from wm_drake.export.tunable import LEAST
 from wm_drake.export.wasm import wasm_module
-from wm_drake.live.machine import MOST_STEPS, OpenMachine, drum_of
+from wm_drake.live.machine import MOST_STEPS, SLIDER_STEPS, OpenMachine, drum_of
 from wm_drake.live.measures import foot_title, heads_of, mount_title, shown_measures
 from wm_drake.live.sliders import Slider
 from wm_drake.live.state import PageState
@@ -39,6 +39,7 @@ from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import shape_name
 from wm_drake.report.provenance import program
 from wm_drake.simulation.band import PADDING_PERIODS
+from wm_drake.simulation.convergence import MOST_HALVINGS
 from wm_drake.simulation.displacements import (
     LEAST_PADDING,
     LONGEST_ORBIT,
@@ -195,6 +196,9 @@ def _model(
         "padding": round(PADDING_PERIODS / contents.band[0] / contents.period),
         "leastPadding": LEAST_PADDING,
         "mostSteps": MOST_STEPS,
+        "accuracy": contents.setup.parameters.accuracy,
+        "mostHalvings": MOST_HALVINGS,
+        "sliderSteps": SLIDER_STEPS,
         "fastest": (1.0 + 1e-9) * 2.0 * math.pi / (SAMPLES_OF_TURN * contents.period),
         "stepping": {
             "integrator": stepping.integrator,

@@ -5,6 +5,7 @@ are placed around the centre of mass of all that hangs in them, and above it. Al
 assumptions, which the files say; they are meant to be replaced.
 """
 
+import math
 import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -421,6 +422,7 @@ class FirstMachine:
             rear_mm=_text(350.0 * n.drum_depth),
             speed=f"{_text(n.speed * 30.0 / np.pi)} rpm",
             speed_source=source("speed"),
+            hold=f"{math.ceil(25.0 + abs(n.speed * 30.0 / np.pi - 90.0) / 15.0)} s",
         )
 
 

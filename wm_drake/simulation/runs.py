@@ -1,9 +1,11 @@
 """simulate(machine, case) -> Record: run one case with the engine of choice."""
 
-import functools
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, TypeAlias
+
+import numpy as np
 
 from wm_drake.engines import DEFAULT_ENGINE
 from wm_drake.engines.compiled.packing import pack
@@ -13,8 +15,12 @@ from wm_drake.engines.drake import run_drake, run_drake_accurately
 from wm_drake.engines.trajectory import Trajectory
 from wm_drake.errors import check_known, input_error
 from wm_drake.model.build import AnyMachine, machine_of
+from wm_drake.model.machine import Machine
+from wm_drake.parameters.machine import Integrator
 from wm_drake.simulation.cases import Case, case_of, notice_jumping_friction
+from wm_drake.simulation.convergence import COMPARED, Attempt, attributes_of, judged
 from wm_drake.simulation.first_call import compile_in_two_processes
+from wm_drake.simulation.measures import measure
 from wm_drake.simulation.records import Record, as_record
 from wm_drake.simulation.steps import checked_integrator, checked_step
 
@@ -47,8 +53,9 @@ def simulate(
         machine: A built machine, its parameters, or its name or file.
         case: The case to run, or the name of one of the machine's loads.
         engine: Name of an engine in `ENGINES`.
-        step: Step size; the output period of the machine must be an integer multiple of it. If
-            None, the step size of the machine is used. [s]
+        step: Largest step; the output period of the machine must be an integer multiple of it. If
+            None, that of the machine. A run that is not accurate with it has shorter ones; its
+            attrs["step_s"], ["error"] and ["converged"] say which and how accurate. [s]
         integrator: Integrator of the compiled engine, "auto", "multistep", "midpoint" or
             "runge_kutta"; None for that of the machine. With "auto" the steps may be shorter.
         progress: Called from time to time with the fraction done.
@@ -89,22 +96,52 @@ def simulate(
     chosen = checked_integrator(machine.parameters, integrator)
     if integrator is not None and engine != DEFAULT_ENGINE:
         raise input_error(f"is of the compiled engine, not of '{engine}'", key="integrator")
-    run = ENGINES[engine]
-    how: dict[str, Any] = {"engine": engine, "step_s": step}
-    numbers: dict[str, Any] = {"parameters": case.parameters, "gasket": case.gasket}
-    setup = machine.set_up(**numbers)
     if engine == DEFAULT_ENGINE:  # the other one controls its error
-        notice_jumping_friction(machine.parameters)
-        stepping = choose_stepping(setup, *pack(setup), case.profile, step, chosen)
-        step, run = (
-            stepping.step,
-            functools.partial(run, integrator=stepping.integrator, relaxation=stepping.relaxation),
-        )
-        how |= {"step_s": step, "integrator": stepping.integrator}
-    setup = machine.set_up(case.load, context=setup.context, **numbers)
-    trajectory = run(setup, case.profile, step, progress)
-    record = as_record(setup, case, trajectory)
-    record.attrs |= how
-    if trajectory.divergence:
+        record = _accurate(machine, case, step, chosen, progress)
+    else:
+        setup = machine.set_up(case.load, parameters=case.parameters, gasket=case.gasket)
+        trajectory = ENGINES[engine](setup, case.profile, step, progress)
+        record = as_record(setup, case, trajectory).assign_attrs(engine=engine, step_s=step)
+    if record.attrs["diverged"]:
         warnings.warn(record.attrs["diverged"], DivergenceWarning, stacklevel=2)
     return record
+
+
+def _accurate(
+    machine: Machine,
+    case: Case,
+    step: float,
+    integrator: Integrator,
+    progress: Callable[[float], None],
+) -> Record:
+    """Return the record of a run of the compiled engine, repeated until it is accurate."""
+    numbers: dict[str, Any] = {"parameters": case.parameters, "gasket": case.gasket}
+    setup, before, halvings = machine.set_up(**numbers), None, 0
+    parameters = setup.parameters
+    notice_jumping_friction(parameters)
+    stepping = choose_stepping(setup, *pack(setup), case.profile, step, integrator)
+    setup = machine.set_up(case.load, context=setup.context, **numbers)
+    period = case.profile.sample_period(parameters.output_period)
+    while True:
+        trajectory = run_compiled(
+            setup, case.profile, stepping.step, progress, period, stepping.integrator,
+            stepping.relaxation if stepping.integrator == "midpoint" else None
+        )  # fmt: skip
+        assert trajectory.estimates is not None  # the compiled engine estimates its errors
+        record = as_record(setup, case, trajectory)
+        attempt = Attempt(trajectory.estimates, stepping.step, halvings, record.attrs["diverged"])
+        if before or not attempt.holds(parameters.accuracy):
+            attempt = replace(attempt, **_compared(record))
+        accuracy, finer = judged(attempt, before, parameters.accuracy)
+        if finer is None:
+            how = {"engine": DEFAULT_ENGINE, "integrator": stepping.integrator}
+            return record.assign_attrs(how | attributes_of(accuracy))
+        before, halvings = attempt, halvings + finer.step
+        stepping, period = stepping.halved(finer.step), period / 2**finer.period
+
+
+def _compared(record: Record) -> dict[str, Any]:
+    """Return the measures of a record that are compared, and its largest displacement."""
+    table = measure(record, measures=COMPARED).table
+    values = {str(name): variable.values for name, variable in table.items()}
+    return {"values": values, "size": float(np.abs(record.detergent_displacement).max())}

@@ -14,13 +14,19 @@ if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     import xarray as xr
 
     from wm_drake.batch.ledger import Ledger
-    from wm_drake.batch.verification import Sample, StepError
     from wm_drake.model.machine import Machine
     from wm_drake.simulation.cases import Case
+    from wm_drake.simulation.convergence import StepSummary
     from wm_drake.simulation.records import Record
 
 RunCases: TypeAlias = "Callable[[Iterable[Case]], xr.Dataset]"
 """Function that runs cases and returns the table of their measures, as `simulate_many` does."""
+
+
+def _no_steps() -> "StepSummary":
+    from wm_drake.simulation.convergence import StepSummary
+
+    return StepSummary()
 
 
 @dataclass
@@ -35,6 +41,7 @@ class Executor:
         out: Folder of the results, or None.
         engine: Name of the engine of all runs.
         runs: Number of runs so far.
+        steps: Steps and errors of the runs so far.
     """
 
     ledger: "Ledger | None" = None
@@ -43,7 +50,7 @@ class Executor:
     out: Path | None = None
     engine: str = DEFAULT_ENGINE
     runs: int = 0
-    _sample: "Sample | None" = field(default=None, repr=False)
+    steps: "StepSummary" = field(default_factory=lambda: _no_steps(), repr=False)
     _report: Callable[..., None] | None = field(default=None, repr=False)
     _reported: int = field(default=0, repr=False)
 
@@ -100,12 +107,18 @@ class Executor:
 
         Records are too large for a ledger.
         """
+        from wm_drake.simulation.convergence import accuracy_in
         from wm_drake.studies.experiment import record_here
 
-        cases = list(self._sampled(machine, cases))
+        cases = list(cases)
+
+        def collect(number: int, record: "Record") -> None:
+            self.steps.add(cases[number].name, accuracy_in(record.attrs))
+            keep(number, record)
+
         how: dict[str, Any] = {"workers": self.workers, "engine": self.engine}
         with progress_bar(len(cases), what) as report:
-            record_here(machine, cases, keep, what, progress=report, **how)
+            record_here(machine, cases, collect, what, progress=report, **how)
 
     @contextmanager
     def progress(self, total: int, what: str = "runs") -> Iterator[Callable[..., None]]:
@@ -154,38 +167,15 @@ class Executor:
     ) -> "xr.Dataset":
         from wm_drake.batch import simulate_remembered
         from wm_drake.batch.cluster import run_on_cluster
+        from wm_drake.simulation.convergence import Accuracy
 
         assert self.ledger is not None, "a study that runs cases is declared with has_runs=True"
         how: dict[str, Any] = {"workers": self.workers, "engine": self.engine, "progress": report}
         if self.client is not None:
             how["run"] = partial(run_on_cluster, client=self.client)
-        sampled = self._sampled(machine, cases)
-        table = simulate_remembered(machine, sampled, self.ledger, measures=measures, **how)
+        table = simulate_remembered(machine, cases, self.ledger, measures=measures, **how)
         self.runs += table.sizes["run"]
+        accuracies = zip(*(table[name].values for name in Accuracy._fields), strict=True)
+        for name, accuracy in zip(table.case.values.tolist(), accuracies, strict=True):
+            self.steps.add(name, accuracy)
         return table
-
-    def _sampled(self, machine: "Machine", cases: "Iterable[Case]") -> "Iterator[Case]":
-        """Yield cases, and keep a sample of them for `step_error`."""
-        for case in cases:
-            if self.engine == DEFAULT_ENGINE:  # the other one controls its error
-                self.verify(machine, [case])
-            yield case
-
-    def verify(self, machine: "Machine", cases: "Iterable[Case]") -> None:
-        """Add cases to those of which a sample is run twice as fine, after the study."""
-        from wm_drake.batch.verification import Sample
-
-        if self._sample is None:
-            self._sample = Sample()
-        for case in cases:
-            self._sample.add(machine, case)
-
-    def step_error(self) -> "StepError | None":
-        """Return the error of the steps of a sample of the cases; None without cases."""
-        from wm_drake.batch.verification import remembered_step_error
-
-        if self._sample is None:
-            return None
-        if self.ledger is None:
-            return self._sample.step_error()
-        return remembered_step_error(self._sample, self.ledger)

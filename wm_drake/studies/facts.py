@@ -20,7 +20,7 @@ class Facts:
             or with several. [s]
         integrator: Integrator of the compiled engine, as the machine has it.
         engine: Name of the engine; "" without runs.
-        verified: What a sample of the runs gave twice as fine; "" without runs.
+        steps: Steps that the runs took and the error that remains; "" without runs.
         runs: Number of runs.
     """
 
@@ -29,7 +29,7 @@ class Facts:
     warnings: tuple[str, ...] = ()
     step: float = 0.0
     integrator: str = ""
-    verified: str = ""
+    steps: str = ""
     runs: int = 0
     engine: str = ""
 
@@ -44,7 +44,7 @@ class Facts:
         return [
             *([("Engine", self.engine)] if self.engine else []),
             *([("Largest step", step)] if self.step else []),
-            *([("Check of the step", self.verified)] if self.verified else []),
+            *([("Steps taken", self.steps)] if self.steps else []),
             ("Versions", ", ".join(f"{name} {text}" for name, text in versions().items())),
             ("Sources", sources_version()),
             ("Command", self.command),

@@ -230,19 +230,16 @@ def _executed(order: Order) -> tuple["Answer", Facts, tuple[str, ...]]:
         result = task.run(executor)
         for extend in filter(None, begun):
             result = extend(executor, result)
-        error = executor.step_error()
         if executor.ledger is not None:
             executor.ledger.mark_finished()
         step, integrator = _stepping(machine)
-        not_converged = (error.warning,) if error is not None and error.is_large else ()
+        not_converged = (executor.steps.warning,) if executor.steps.unconverged else ()
         for text in not_converged:
             say(f"warning: {text}", err=True)
         wall_s = time.perf_counter() - begin
         warned = (*about_machines, *_warnings(machines, friction_warnings), *not_converged)
-        verified = "" if error is None else error.text
-        facts = Facts(
-            order.command, wall_s, warned, step, integrator, verified, executor.runs, engine
-        )
+        steps = executor.steps.text
+        facts = Facts(order.command, wall_s, warned, step, integrator, steps, executor.runs, engine)
         files = _written(result, facts, order.run.out, run)
     return result, facts, files
 

@@ -19,7 +19,7 @@ from wm_drake.batch.runs import Runner, RunResult, ShownMotion
 from wm_drake.batch.work_items import BatchKey, Preparation, WorkItem
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.errors import InputError, Problem
-from wm_drake.live.machine import OpenMachine, drum_of, is_same
+from wm_drake.live.machine import SLIDER_STEPS, OpenMachine, drum_of, is_same
 from wm_drake.live.measures import foot_title, heads_of, mount_title, shown_measures
 from wm_drake.live.state import PageState
 from wm_drake.model.expectations import unusual_springs
@@ -53,18 +53,24 @@ BINS = 350
 """Number of time bins of a force; each is drawn from its smallest to its largest value."""
 
 DISTANCE = Quantity("distance", Unit("m", "mm"))
+NOT_CONVERGED = "not converged"
 MICRO, MILLI = 1e-6, 1e-3
 """Displacements are sent in whole micrometres, times in whole milliseconds."""
 
 
 def picture_runner_of(machine: OpenMachine) -> Runner:
     """Return the runner of the pictures of a machine: the first run of a batch has a motion."""
-    return Runner(machine.parameters, ("amplitudes", "gap"), histories=False, motions={0})
+    runner = Runner(machine.parameters, ("amplitudes", "gap"), histories=False, motions={0})
+    runner.most_steps = SLIDER_STEPS
+    return runner
 
 
 def runner_of(machine: OpenMachine) -> Runner:
     """Return the runner of the numbers of a machine: the first run of a batch has a history."""
-    return Runner(machine.parameters, shown_measures(machine.parameters), histories={0})
+    measures = shown_measures(machine.parameters)
+    runner = Runner(machine.parameters, measures, histories={0})
+    runner.most_steps = SLIDER_STEPS
+    return runner
 
 
 def picture(machine: OpenMachine, runner: Runner, state: PageState) -> dict[str, Any]:
@@ -105,7 +111,7 @@ def picture(machine: OpenMachine, runner: Runner, state: PageState) -> dict[str,
         "band": pass_band(profile, period),
         "stepping": {
             "integrator": batch_key.stepping.integrator,
-            "step": STEP.text(batch_key.stepping.step),
+            "step": STEP.text(main.accuracy.step if main.accuracy else batch_key.stepping.step),
         },
     }
 
@@ -208,6 +214,8 @@ def _rows(machine: OpenMachine, run: RunResult, variable: Variable) -> list[dict
     """Return a row for each number of a variable of a run."""
     values = plain(np.ravel(run.values[variable.name] * variable.unit.from_si(1.0)))
     heads = heads_of(machine.parameters, run.case.profile, variable)
+    if _unconverged(run):
+        return [head | {"value": None, "alarm": False, "missing": NOT_CONVERGED} for head in heads]
     return [
         head | {"value": value, "alarm": head["touches"] and value is not None and value <= 0.0}
         for head, value in zip(heads, values, strict=True)
@@ -215,9 +223,17 @@ def _rows(machine: OpenMachine, run: RunResult, variable: Variable) -> list[dict
 
 
 def _gap_of(run: RunResult) -> dict[str, Any]:
-    """Return the smallest gap of a run, and why it diverged if it did."""
+    """Return the smallest gap of a run, and why it has none: it diverged, or is not converged."""
+    if why := _unconverged(run):
+        return {"gap": None, "diverged": why}
     gap = None if run.gap is None else _gap(run.gap, run.case.profile)
     return {"gap": gap, "diverged": run.diverged}
+
+
+def _unconverged(run: RunResult) -> str:
+    """Return that a run is not converged, and its error; "" if it is."""
+    accuracy = run.accuracy
+    return "" if accuracy is None or accuracy.is_converged else accuracy.text
 
 
 def _gap(gap: Gap, profile: SpinProfile) -> dict[str, Any]:

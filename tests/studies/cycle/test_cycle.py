@@ -64,7 +64,7 @@ def test_windows_have_the_extremes_of_the_record(machine, case):
     assert rows == 150
     assert count == len(record.time) // rows
     displacement = record.displacement.values[: rows * count].reshape(count, rows, -1)
-    np.testing.assert_allclose(course.amplitude, 0.5 * np.ptp(displacement, axis=1), rtol=1e-9)
+    np.testing.assert_allclose(course.half_swing, 0.5 * np.ptp(displacement, axis=1), rtol=1e-9)
     left = record.mass_left.values[rows - 1 :: rows][:count]
     np.testing.assert_allclose(course.mass, left.sum(axis=1), rtol=1e-12)
     gap = Scene(machine.parameters).smallest_gap(

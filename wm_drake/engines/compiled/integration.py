@@ -11,6 +11,14 @@ from wm_drake.compiler.elementary import sine_cosine
 from wm_drake.compiler.lane_memory import aligned
 from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
 from wm_drake.engines.compiled.drum import sample_controller
+from wm_drake.engines.compiled.local_error import (
+    DIFFERENCED,
+    OF_MULTISTEP,
+    OF_RUNGE_KUTTA,
+    add_fourth_difference,
+    add_peaks,
+    steps_alike,
+)
 from wm_drake.engines.compiled.mechanics import (
     DRUM_ANGLE,
     follow_profile,
@@ -36,7 +44,7 @@ def work_arrays(size, inputs):
 
 
 @long_running
-def integrate_lanes(steps, begin, end, p, elements, x, work, history):
+def integrate_lanes(steps, begin, end, p, elements, x, work, sums, history):
     """Advance the states of `lanes.WIDTH` machines from the start of step `begin` to that of `end`.
 
     All arrays of floats are flat arrays of lanes: they hold one number of every machine, then the
@@ -51,6 +59,7 @@ def integrate_lanes(steps, begin, end, p, elements, x, work, history):
         elements: `Elements`, which all machines have in common.
         x: States; they are advanced.
         work: `Work`, the same from the first step to the last.
+        sums: `wm_drake.engines.compiled.local_error.Sums` of the runs, advanced.
         history: Samples, one after the other: the state, then `Begins.rates` accelerations. One is
             written at the start of each step that has a sample number.
     """
@@ -58,9 +67,9 @@ def integrate_lanes(steps, begin, end, p, elements, x, work, history):
     numbers, state, samples = lane_array(p), lane_array(x), lane_array(history)
     rate, inputs = lane_array(work.rate), lane_array(work.inputs)
     stage, total = lane_array(work.stage), lane_array(work.total)
-    past = Past(lane_array(work.past_rates), lane_array(work.past_inputs))
+    past, errors = Past(lane_array(work.past_rates), lane_array(work.past_inputs)), lane_array(sums)
     length, acceleration, drum, row, controls, one_derivative = steps
-    zero, begins = 0.0 * state[0], elements.begins
+    zero, begins, alike = 0.0 * state[0], elements.begins, 0
     for i in range(begin, end):
         sample_controller(state, drum[2 * i, 0], controls[i], numbers, elements.motor, begins.motor)
         hold_masses(numbers, state, begins.water, elements.water)
@@ -71,6 +80,13 @@ def integrate_lanes(steps, begin, end, p, elements, x, work, history):
             write_sample(samples, row[i], state, rate, elements)
         remember(past.rates, i, PAST_RATES, rate, begins.size)
         remember(past.inputs, i, PAST_INPUTS, inputs, begins.inputs)
+        add_peaks(errors, state, rate, row[i] >= 0)
+        alike = steps_alike(alike, i, begin, length, acceleration)
+        if alike >= DIFFERENCED:
+            factor = OF_MULTISTEP if one_derivative[i] else OF_RUNGE_KUTTA
+            add_fourth_difference(
+                errors, past.rates, i, length[i], factor, begins.size, PAST_RATES
+            )  # fmt: skip
         if one_derivative[i]:
             multistep_step(state, rate, past, stage, total, i, length[i], numbers, elements)
         else:

@@ -29,6 +29,12 @@ from wm_drake.compiler.lane_memory import aligned
 from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
 from wm_drake.elements.motion import BODY_STATE, TREE_STATE, rpy_rates
 from wm_drake.elements.telescopic_damper import DEFORMATION, TUBES_STATE_SIZE
+from wm_drake.engines.compiled.local_error import (
+    DIFFERENCED,
+    add_peaks,
+    add_second_difference,
+    steps_alike,
+)
 from wm_drake.engines.compiled.mechanics import (
     DRUM_ANGLE,
     DRUM_RATE,
@@ -58,7 +64,7 @@ def midpoint_work(size, inputs):
 
 
 @long_running
-def integrate_midpoint_lanes(steps, begin, end, p, elements, relaxation, x, work, history):
+def integrate_midpoint_lanes(steps, begin, end, p, elements, relaxation, x, work, sums, history):
     """Advance `lanes.WIDTH` machines by steps of the midpoint rule.
 
     Args:
@@ -70,16 +76,18 @@ def integrate_midpoint_lanes(steps, begin, end, p, elements, relaxation, x, work
         relaxation: R of each telescopic damper, by rows.
         x: States; they are advanced.
         work: `MidpointWork`, the same from the first step to the last.
+        sums: `wm_drake.engines.compiled.local_error.Sums` of the runs, advanced.
         history: Samples, as in `wm_drake.engines.compiled.integration`.
     """
     align_stack()
     numbers, state, samples = lane_array(p), lane_array(x), lane_array(history)
     rate, inputs, middle = lane_array(work.rate), lane_array(work.inputs), lane_array(work.middle)
     past, change = lane_array(work.past), lane_array(work.change)
-    matrices = lane_array(relaxation)
+    matrices, errors = lane_array(relaxation), lane_array(sums)
     length, acceleration, drum, row = steps
-    zero = 0.0 * state[0]
+    zero, alike = 0.0 * state[0], 0
     for i in range(begin, end):
+        alike = steps_alike(alike, i, begin, length, acceleration)
         hold_masses(numbers, state, elements.begins.water, elements.water)
         if row[i] >= 0 or i == 0:
             masses = mass_properties(numbers, zero + drum[2 * i, 1], zero + drum[2 * i, 2])
@@ -87,6 +95,7 @@ def integrate_midpoint_lanes(steps, begin, end, p, elements, relaxation, x, work
             state_derivative(state, rate, inputs, masses, speed, speed_rate, numbers, elements)
             if row[i] >= 0:
                 write_sample(samples, row[i], state, rate, elements)
+                add_peaks(errors, state, rate, True)
             if i == 0:
                 for k in range(elements.begins.size):
                     past[k] = rate[k]
@@ -96,6 +105,8 @@ def integrate_midpoint_lanes(steps, begin, end, p, elements, relaxation, x, work
         masses = mass_properties(numbers, zero + drum[node, 1], zero + drum[node, 2])
         speed, speed_rate = zero + drum[node, 0], zero + acceleration[i]
         state_derivative(middle, rate, inputs, masses, speed, speed_rate, numbers, elements)
+        add_peaks(errors, middle, rate, False)
+        add_second_difference(errors, rate, i, h, alike >= DIFFERENCED)
         advance(state, middle, rate, past, change, h, matrices, elements)
         state[DRUM_ANGLE] = zero + drum[2 * i + 2, 3]
         state[DRUM_RATE] = zero + drum[2 * i + 2, 0]

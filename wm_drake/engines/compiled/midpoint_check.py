@@ -30,21 +30,28 @@ LARGEST_GROWTH = 3.0
 """Largest growth in these steps beyond that of the linearised machine."""
 
 
-def relaxation_matrices(
-    setup: Setup, layout: Layout, jacobians: FloatArray, step: float
-) -> FloatArray:
-    """Return R of each telescopic damper at a step, from the Jacobian at rest. (dampers, 7, 7)
+def tube_jacobians(setup: Setup, layout: Layout, jacobians: FloatArray) -> FloatArray:
+    """Return the Jacobian at rest of the tubes of each telescopic damper. (dampers, 14, 14) [1/s]
 
     Args:
         setup, layout: The machine and its layout.
         jacobians: (lanes, n, n) of its free states, the first one at rest. [1/s]
+    """
+    place = _places(setup, layout)
+    moving = [[place[at + k] for k in MOVING] for at in layout.states.begins_of(TUBES)]
+    return np.array([jacobians[0][np.ix_(states, states)] for states in moving])
+
+
+def relaxation_matrices(tubes: FloatArray, step: float) -> FloatArray:
+    """Return R of each telescopic damper at a step. (dampers, 7, 7)
+
+    Args:
+        tubes: From `tube_jacobians`.
         step: Step size. [s]
     """
-    place, newton = _places(setup, layout), np.empty((TUBES_FREEDOM, TUBES_FREEDOM))
-    matrices = []
-    for begin in layout.states.begins_of(TUBES):
-        moving = [place[begin + k] for k in MOVING]
-        write_newton_matrix(jacobians[0][np.ix_(moving, moving)].ravel(), step, newton.ravel())
+    newton, matrices = np.empty((TUBES_FREEDOM, TUBES_FREEDOM)), []
+    for jacobian in tubes:
+        write_newton_matrix(np.ascontiguousarray(jacobian).ravel(), step, newton.ravel())
         matrices.append(np.linalg.inv(newton))
     return np.array(matrices)
 
@@ -53,7 +60,8 @@ def midpoint_follows(setup: Setup, layout: Layout, jacobians: FloatArray, step: 
     """Return whether steps of the midpoint rule grow no faster than the linearised machine.
 
     Args:
-        setup, layout, jacobians, step: As for `relaxation_matrices`.
+        setup, layout, jacobians: As for `tube_jacobians`.
+        step: Step size. [s]
     """
     from scipy.linalg import expm  # slow to import, for tubes only
 
@@ -69,7 +77,7 @@ def step_matrices(setup: Setup, layout: Layout, jacobians: FloatArray, step: flo
     """Return the matrices that take the linearised machine through a step of the midpoint rule.
 
     Args:
-        setup, layout, jacobians, step: As for `relaxation_matrices`.
+        setup, layout, jacobians, step: As for `midpoint_follows`.
 
     Returns:
         (lanes, m, m) for the free states, then what is kept from step to step: the acceleration
@@ -79,7 +87,9 @@ def step_matrices(setup: Setup, layout: Layout, jacobians: FloatArray, step: flo
     q, v, sponges = (np.array([place[k] for k in part]) for part in _parts(layout))
     n, moving, internal = jacobians.shape[1], len(v), len(sponges)
     relaxation = np.eye(moving)
-    for number, matrix in enumerate(relaxation_matrices(setup, layout, jacobians, step)):
+    for number, matrix in enumerate(
+        relaxation_matrices(tube_jacobians(setup, layout, jacobians), step)
+    ):
         at = BODY + TUBES_FREEDOM * number
         relaxation[at : at + TUBES_FREEDOM, at : at + TUBES_FREEDOM] = matrix
     state, kept, rates = np.split(np.eye(n + moving + internal), [n, n + moving])

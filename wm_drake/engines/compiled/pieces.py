@@ -7,6 +7,7 @@ import numpy as np
 
 from wm_drake.compiler.lane_memory import aligned, fill_lanes
 from wm_drake.compiler.lanes import WIDTH
+from wm_drake.engines.compiled.local_error import SUMS_SIZE
 from wm_drake.engines.compiled.packing import initial_state
 from wm_drake.engines.compiled.run import RunLanes, advance_of
 from wm_drake.engines.compiled.samples import trajectory_of
@@ -46,6 +47,7 @@ def run_pieces(
         _in_lanes(p),
         _in_lanes(begin),
         aligned(rows * size * WIDTH),
+        aligned(SUMS_SIZE * WIDTH),
         None if relaxation is None else _in_lanes(relaxation),
     )
     # each piece writes its samples from the first place on

@@ -1,13 +1,14 @@
 """Run machines through a spin profile with the compiled engine, at fixed steps."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from wm_drake.compiler.lane_memory import aligned, fill_lanes
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.engines.compiled.integration import integrate_lanes, work_arrays
+from wm_drake.engines.compiled.local_error import SUMS_SIZE, estimates_of
 from wm_drake.engines.compiled.midpoint import integrate_midpoint_lanes, midpoint_work
 from wm_drake.engines.compiled.packing import Layout, initial_state
 from wm_drake.engines.compiled.samples import trajectory_of
@@ -33,12 +34,14 @@ class RunLanes:
         p: Packed numbers.
         x: States; the integration advances them.
         samples: The samples, as `integrate_lanes` writes them.
+        sums: `wm_drake.engines.compiled.local_error.Sums`, zero before the first step.
         relaxation: Matrices of the midpoint rule; None for other integrators.
     """
 
     p: FloatArray
     x: FloatArray
     samples: FloatArray
+    sums: FloatArray
     relaxation: FloatArray | None = None
 
 
@@ -80,12 +83,14 @@ def run_compiled(
     relaxed = None
     if integrator == "midpoint" and relaxation is not None:
         relaxed = _in_lanes(relaxation)
-    lanes = RunLanes(_in_lanes(p), _in_lanes(begin), aligned(rows * size * WIDTH), relaxed)
+    sums, history = aligned(SUMS_SIZE * WIDTH), aligned(rows * size * WIDTH)
+    lanes = RunLanes(_in_lanes(p), _in_lanes(begin), history, sums, relaxed)
     one_derivative = Stepping(integrator, step).one_derivative(schedule)
     for done in integrate_runs(schedule, one_derivative, layout, lanes):
         progress(done)
     samples = lanes.samples.reshape(rows, size, WIDTH)[..., 0].copy()
-    return trajectory_of(samples, schedule, p, layout)
+    estimates = estimates_of(sums)
+    return replace(trajectory_of(samples, schedule, p, layout), estimates=estimates[0])
 
 
 def _in_lanes(values: FloatArray) -> FloatArray:
@@ -129,11 +134,14 @@ def advance_of(
     Arguments as for `integrate_runs`.
     """
     p, x, samples, elements = lanes.p, lanes.x, lanes.samples, layout.elements
+    sums = lanes.sums
     sizes = len(x) // WIDTH, layout.states.begins.inputs
     if lanes.relaxation is None:
         work, steps = work_arrays(*sizes), (*schedule.steps, one_derivative)
-        return lambda begin, end: integrate_lanes(steps, begin, end, p, elements, x, work, samples)
+        return lambda begin, end: integrate_lanes(
+            steps, begin, end, p, elements, x, work, sums, samples
+        )
     middle = midpoint_work(*sizes)
     return lambda begin, end: integrate_midpoint_lanes(
-        schedule.steps[:4], begin, end, p, elements, lanes.relaxation, x, middle, samples
+        schedule.steps[:4], begin, end, p, elements, lanes.relaxation, x, middle, sums, samples
     )

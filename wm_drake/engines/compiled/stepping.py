@@ -7,13 +7,18 @@ torque jumps. A choice depends on the parameters and the profile of a run only, 
 or on its load.
 """
 
+import functools
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from wm_drake.engines.compiled.linear import is_followed
-from wm_drake.engines.compiled.midpoint_check import midpoint_follows, relaxation_matrices
+from wm_drake.engines.compiled.midpoint_check import (
+    midpoint_follows,
+    relaxation_matrices,
+    tube_jacobians,
+)
 from wm_drake.engines.compiled.multistep import STEPS_BEFORE
 from wm_drake.engines.compiled.packing import Layout
 from wm_drake.engines.compiled.step_check import check_sample_time, check_step, linearised
@@ -62,12 +67,18 @@ class Stepping:
     Attributes:
         integrator: "multistep", "midpoint" or "runge_kutta".
         step: Step size. [s]
-        relaxation: Matrices R of the midpoint rule, one after the other; none for the others.
+        tubes: Jacobian at rest of the tubes of each telescopic damper, for the midpoint rule; none
+            for the others. (dampers, 14, 14) [1/s]
     """
 
     integrator: Integrator
     step: float
-    relaxation: FloatArray = field(default_factory=lambda: np.empty(0), compare=False)
+    tubes: FloatArray = field(default_factory=lambda: np.empty(0), compare=False)
+
+    @functools.cached_property
+    def relaxation(self) -> FloatArray:
+        """Return the matrices R of the midpoint rule, one after the other."""
+        return relaxation_matrices(self.tubes, self.step).ravel()
 
     def one_derivative(self, schedule: Schedule) -> np.ndarray:
         """Return which steps of a schedule take one derivative. (n,) bool
@@ -75,6 +86,10 @@ class Stepping:
         After a corner of the profile, the Runge-Kutta scheme starts the multistep integrator.
         """
         return (schedule.alike >= STEPS_BEFORE) & (self.integrator == "multistep")
+
+    def halved(self, times: int) -> "Stepping":
+        """Return the same with the step halved some times: what is stable stays so."""
+        return replace(self, step=self.step / 2**times)
 
 
 def choose_stepping(
@@ -163,8 +178,7 @@ def _midpoint(
         if fastest * length > LARGEST_TURN_OF_MIDPOINT:
             continue
         if midpoint_follows(setup, layout, jacobians, MARGIN * length):
-            matrices = relaxation_matrices(setup, layout, jacobians, length)
-            return Stepping("midpoint", length, matrices.ravel())
+            return Stepping("midpoint", length, tube_jacobians(setup, layout, jacobians))
     return None
 
 

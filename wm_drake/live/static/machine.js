@@ -141,11 +141,29 @@ export class Machine {
     return this.call('wm_set_up', this.v, this.c);
   }
 
-  /** Run a machine that is set up through a profile; keep its samples. */
+  /** Run a machine that is set up through a profile, with steps that are halved until it is accurate; keep its samples. */
   run(profile) {
+    const {accuracy, mostHalvings, sliderSteps} = this.model;
+    const stepping = steppingOf(profile, this.model, this.changes);
+    for (let halvings = 0; ; halvings += 1) {
+      this.runWith(profile, stepping);
+      const error = this.error();
+      const next = 0.5 * stepping.step;
+      this.accuracy = {error, isConverged: error <= accuracy, step: stepping.step, integrator: stepping.integrator};
+      if (error <= accuracy || halvings === mostHalvings || profile.time.at(-1) / next > sliderSteps) return;
+      stepping.step = next;
+    }
+  }
+
+  /** Return the error of the steps of the last run, as `estimates_of` of local_error.py. */
+  error() {
+    const [, worst, speed] = this.view(this.v + 8 * this.model.at.errors, 3);
+    return speed > 0 ? Math.sqrt(worst / speed) : 0;
+  }
+
+  runWith(profile, stepping) {
     const {model} = this;
     this.free = this.kept;
-    const stepping = steppingOf(profile, model, this.changes);
     const key = JSON.stringify([profile, stepping]);
     if (key !== this.scheduled) {
       this.schedule = scheduleOf(profile, stepping);

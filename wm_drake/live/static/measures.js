@@ -25,7 +25,7 @@ export function showMeasures(table, answer, ghost, label) {
     const largest = Math.max(0, ...changes.map((value) => Math.abs(value ?? 0)));
     return make('tr', {'data-row': row.title},
       make('th', {}, row.title),
-      make('td', {class: row.alarm ? 'now alarm' : 'now'}, row.value === null ? '–' : fixed(row.value, row.decimals)),
+      make('td', {class: row.alarm ? 'now alarm' : 'now'}, row.value === null ? row.missing ?? '–' : fixed(row.value, row.decimals)),
       make('td', {}, was === null ? '–' : fixed(was, row.decimals)),
       make('td', {}, change),
       ...measured.map(({amplitude}) => make('td', {}, row.sensor ? fixed(amplitude[row.sensor], 1) : '')),

@@ -64,7 +64,7 @@ function chosen(state) {
   if (fastest > model.fastest) throw wrong('profile.speed', `samples and filter of this page are for up to ${Math.floor(RPM * model.fastest)} rpm; export the machine with a faster profile`);
   if (!state.gasket && 'gasket' in model.places) changes.push([model.places.gasket, 0]);
   changes.push([model.at.speed, profile.speed[0]]);
-  return {changes, loads, profile, values, stepping};
+  return {changes, loads, profile, values};
 }
 
 /** Return the described load of a state, or null. */
@@ -132,7 +132,8 @@ const pool = new Pool(Math.max(1, Math.min(navigator.hardwareConcurrency || 2, O
 
 /* ---- answers, as the server gives them ---- */
 
-function gapOf({gap, diverged}, profile) {
+function gapOf({gap, diverged, accuracy}, profile) {
+  if (!accuracy.isConverged) return {gap: null, diverged: unconverged(accuracy)};
   const text = diverged === null ? '' : `the run diverged at ${diverged.toFixed(3)} s, with the steps of this page`;
   if (!gap) return {gap: null, diverged: text};
   const [moving, fixed] = data.pairs[gap.pair];
@@ -141,6 +142,10 @@ function gapOf({gap, diverged}, profile) {
     diverged: text,
   };
 }
+
+/** Return why the numbers of a run are not shown. */
+const unconverged = ({error, step}) => `not converged: with steps of ${inMs(step)} an error of up to ${Number((100 * error).toPrecision(2))} % remains; the command 'spin' takes shorter ones`;
+const inMs = (step) => `${Number((1e3 * step).toPrecision(6))} ms`;
 
 function speedAt({time, speed}, t) {
   const k = Math.max(0, Math.min(time.length - 2, time.findIndex((corner) => corner > t) - 1));
@@ -165,7 +170,7 @@ function corners(time, values, sign) {
 }
 
 async function run({state}) {
-  const {changes, loads, profile, values, stepping} = chosen(state);
+  const {changes, loads, profile, values} = chosen(state);
   const own = described(state);
   const all = own ? {described: own, ...loads} : loads;
   const first = own ? 'described' : state.load;
@@ -187,11 +192,11 @@ async function run({state}) {
     duration: profile.time.at(-1),
     profile: {time: profile.time, rpm: profile.speed.map((w) => RPM * w)},
     values, ...gapOf(main, profile),
-    gap_points: main.gap && {points: main.gap.points, frame: main.gap.frame},
+    gap_points: main.accuracy.isConverged && main.gap && {points: main.gap.points, frame: main.gap.frame},
     loads: names.map((load, k) => ({load, ...gapOf(found[k], profile)})),
     measured: own ? [] : data.measured[state.load][state.gasket ? 'yes' : 'no'] ?? [],
     warnings: [], band: data.band,
-    stepping: {integrator: stepping.integrator, step: `${Number((1e3 * stepping.step).toPrecision(6))} ms`},
+    stepping: {integrator: main.accuracy.integrator, step: inMs(main.accuracy.step)},
   };
 }
 
@@ -207,10 +212,13 @@ function measuringJob(state, kind) {
 function rowsOf(found) {
   const value = ({from: [name, index], factor}) => {
     const number = name === 'gap' ? found.gap?.distance : found[name]?.[index];
-    return Number.isFinite(number) ? factor * number : null;
+    return Number.isFinite(number) && found.accuracy.isConverged ? factor * number : null;
   };
   const rows = data.rows.map((row) => ({...row, value: value(row)}));
-  for (const row of rows) row.alarm = row.touches && row.value !== null && row.value <= 0;
+  for (const row of rows) {
+    row.alarm = row.touches && row.value !== null && row.value <= 0;
+    if (!found.accuracy.isConverged) row.missing = 'not converged';
+  }
   return rows;
 }
 

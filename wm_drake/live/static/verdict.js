@@ -9,7 +9,8 @@ const sizeOf = ({gap, diverged}) => (diverged ? -Infinity : gap?.distance ?? Inf
 /** Return the gaps with all loads of an answer, the smallest first; a run that diverged leads. */
 export const worstFirst = ({loads}) => [...loads].sort((a, b) => sizeOf(a) - sizeOf(b));
 
-const gapText = ({gap, diverged}) => (diverged ? 'diverged' : fixed(gap?.distance));
+const gapText = ({gap, diverged}) => (diverged ? FAILED(diverged) : fixed(gap?.distance));
+const FAILED = (why) => (why.startsWith('not converged') ? 'not converged' : 'diverged');
 
 /** Return the smallest gap of all loads in words, and whether the tub touches with that load. */
 export function smallestGap(answer) {
@@ -34,7 +35,7 @@ function contact(answer, ghost, show) {
   const [chosen] = answer.loads;
   const all = worstFirst(answer);
   const [first] = all;
-  if (first.diverged) return [`The run with load ${first.load} diverged: no answer.`];
+  if (first.diverged) return [`The run with load ${first.load} ${FAILED(first.diverged) === 'diverged' ? 'diverged' : 'is not converged'}: no answer.`];
   if (!first.gap) return ['The machine has no shapes: no gap is known.'];
   const distance = fixed(first.gap.distance);
   const which = all.length > 1 ? ` with load ${first.load}` : '';

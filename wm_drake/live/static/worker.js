@@ -86,6 +86,7 @@ export function answer(job) {
   return {
     status, good, time: job.kind === 'gap' ? [] : Array.from(time.slice(0, good)), rows,
     diverged: good < rows ? time[good] : null,
+    accuracy: machine.accuracy,
     gap: gap && {...gap, time: time[gap.row], frame: frameAt(gap.row)},
     ...more, ...(good > 1 && ['numbers', 'measures'].includes(job.kind) ? measures() : {}),
     ...(good > 1 && job.kind === 'numbers' ? {bands: machine.forces(Math.min(BINS, good))} : {}),

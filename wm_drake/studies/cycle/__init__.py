@@ -1,4 +1,4 @@
-"""Show a whole cycle of a machine: unbalance, speed, amplitudes, gap and loads of the feet.
+"""Show a whole cycle of a machine: unbalance, speed, swing, gap and loads of the feet.
 
 Enters: a machine, a load that may dry, a spin profile. Leaves: their course over the cycle, and
 their extremes in each part of it.

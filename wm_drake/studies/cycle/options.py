@@ -20,7 +20,7 @@ class CycleOptions(Options):
 
 CYCLE = Study(
     "cycle",
-    "Run a whole cycle with a load that dries: unbalance, speed, amplitudes, gap, floor forces.",
+    "Run a whole cycle with a load that dries: unbalance, speed, swing, gap, floor forces.",
     CycleOptions,
     imported("wm_drake.studies.cycle.task:CycleTask"),
     quick={"profile": "run_up"},

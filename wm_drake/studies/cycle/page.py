@@ -63,7 +63,7 @@ def cycle_answer(
 
 def _course_table(course: xr.Dataset) -> LabelledTable:
     """Return the course for a file."""
-    words = {name: f"amplitude {name}" for name in course.sensor.values.tolist()}
+    words = {name: f"half swing {name}" for name in course.sensor.values.tolist()}
     return LabelledTable("course", course, across="sensor", words=words, is_in_json=False)
 
 
@@ -76,10 +76,10 @@ def summary(case: Case, course: xr.Dataset) -> str:
             f" and {text_of(last.mass)} at the end; its unbalance goes from "
             f"{text_of(first.unbalance)} to {text_of(last.unbalance)}"
         )
-    largest = course.isel(course.amplitude.argmax(...))
+    largest = course.isel(course.half_swing.argmax(...))
     sentences = [
         f"{text}.",
-        f"The largest amplitude is {text_of(largest.amplitude)}, at sensor "
+        f"The largest half swing is {text_of(largest.half_swing)}, at sensor "
         f"{largest.sensor.item()} at {text_of(largest.drum_speed)} after {text_of(largest.time)}.",
     ]
     if course.gap.notnull().any():
@@ -103,7 +103,7 @@ SHOWN: dict[str, dict[str, Any]] = {
     "drum_speed": {},
     "mass": {"y": FROM_ZERO},
     "unbalance": {"y": FROM_ZERO},
-    "amplitude": {"y": FROM_ZERO, "by": "sensor"},
+    "half_swing": {"y": FROM_ZERO, "by": "sensor"},
     "gap": {"y": FROM_ZERO},
     "foot_smallest": {"drawn": ["foot_smallest", "foot_largest"]},
     "sideways": {"y": FROM_ZERO},
@@ -115,7 +115,7 @@ WORDS = {"foot_smallest": "load of a foot", "sideways": "force along the floor"}
 
 
 def course_plot(course: xr.Dataset) -> Plot:
-    """Return speed, unbalance, amplitudes, gap and loads of the feet over the cycle."""
+    """Return speed, unbalance, half swings, gap and loads of the feet over the cycle."""
     ends, panels = {"range": (0.0, shown(course.time)[-1].item())}, []
     for name, how in SHOWN.items():
         if name in course and course[name].notnull().any():

@@ -38,7 +38,9 @@ WINDOWS_OF_PIECE = 20
 
 OF_LOAD = MASS.named("mass of the load", decimals=2)
 UNBALANCE = Quantity("unbalance", Unit("kg*m", "g*m"), 0)
-AMPLITUDE = Quantity("amplitude", Unit("m", "mm"), 1)
+SWING = Quantity("half swing", Unit("m", "mm"), 1)
+"""Half of the distance from the smallest to the largest displacement of a window; an amplitude is
+that of the filtered displacement of a whole run (docs/theory/measures.md)."""
 GAP = of_measure("smallest_gap")
 FOOT = Quantity("load of a foot", Unit("N", "N"), 0)
 SLIDING = Quantity("horizontal force on the floor", Unit("N", "N"), 0)
@@ -69,7 +71,7 @@ class WindowExtremes:
             "drum_speed": SPEED.variable("time", self._windows(whole.state[:, 13]).mean(axis=1)),
             "mass": OF_LOAD.variable("time", masses.sum(axis=1)),
             "unbalance": UNBALANCE.variable("time", unbalance_of(setup, masses)),
-            "amplitude": AMPLITUDE.variable(
+            "half_swing": SWING.variable(
                 ("time", "sensor"), 0.5 * np.ptp(self._windows(displacement), axis=1)
             ),
             "gap": GAP.variable("time", self._gaps(whole)),
@@ -139,7 +141,7 @@ class Cycle(NamedTuple):
 
     Attributes:
         course: Over `time`, the middles of windows [s]: mean `drum_speed`, `mass` of the load and
-            its static `unbalance` at the end of the window, `amplitude` of each sensor, half of
+            its static `unbalance` at the end of the window, `half_swing` of each sensor, half of
             the distance from the smallest to the largest displacement, smallest `gap`; with a
             fixed cabinet smallest and largest load of a foot, `foot_smallest` and `foot_largest`,
             and largest force along the floor, `sideways`.
@@ -192,7 +194,7 @@ OF_PART: dict[str, tuple[Quantity, Callable[[FloatArray], float]]] = {
     "drum_speed": (SPEED.named("highest speed"), lambda values: np.abs(values).max()),
     "mass": (OF_LOAD.named("mass at the end"), lambda values: values[-1]),
     "unbalance": (UNBALANCE.named("unbalance at the end"), lambda values: values[-1]),
-    "amplitude": (AMPLITUDE.named("largest amplitude"), np.max),
+    "half_swing": (SWING.named("largest half swing"), np.max),
     "gap": (GAP, np.min),
     "foot_smallest": (FOOT.named("smallest load of a foot"), np.min),
     "foot_largest": (FOOT.named("largest load of a foot"), np.max),

@@ -13,7 +13,7 @@ from wm_drake.parameters.measured import EXPERIMENT
 from wm_drake.report import figure as fig
 from wm_drake.report.formatting import MISSING, listed
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import CHANGE, SHARE, Quantity, of_measure, quantity_of
+from wm_drake.report.quantity import CHANGE, SHARE, SPEED, Quantity, of_measure, quantity_of
 from wm_drake.report.table import readable
 from wm_drake.simulation.displacements import envelopes, smooth_envelope
 from wm_drake.simulation.measures.registry import tabulated
@@ -50,8 +50,9 @@ COMPARED = (
 )
 """Variables of measures that the table of differences begins with."""
 
-AMPLITUDE, STEADY = "amplitude", "steady amplitude"
-"""Measures in a table of differences; the latter is the mean envelope in the steady state."""
+AMPLITUDE, STEADY = "amplitude", "steady amplitude at "
+"""Measures in a table of differences; the latter is the mean envelope in the steady state, and its
+name ends with the drum speed."""
 
 STEADY_PART = 0.5
 """Part of a stretch of constant speed, at its end, that counts as the steady state.
@@ -168,7 +169,8 @@ def _numbers(runs: SpinRuns) -> dict[tuple[str, str, str, str], float]:
         shown = {name.replace("_", " "): table[name] for name in names if name in table}
         if window := steady_window(case.case.profile):
             steady = steady_amplitudes(case.record, window)
-            shown[STEADY] = of_measure("amplitude").on(steady)
+            speed = SPEED.text(abs(case.case.profile.speed_at(window[1])))
+            shown[f"{STEADY}{speed}"] = of_measure("amplitude").on(steady)
         for words, array in shown.items():
             quantity = quantity_of(array)
             labels = itertools.product(*(map(str, array[dim].values) for dim in array.dims))
@@ -269,7 +271,9 @@ def _of_variant(name: str, runs: SpinRuns) -> str:
 
 def _places(data: xr.Dataset, measure: str) -> xr.Dataset:
     """Return the compared numbers of a measure, a `place` for each row and variant."""
-    of_measure = data.isel(row=data.measure.values == measure).stack(place=("row", "variant"))
+    names = data.measure.values.tolist()
+    chosen = [name == measure or (measure == STEADY and name.startswith(STEADY)) for name in names]
+    of_measure = data.isel(row=chosen).stack(place=("row", "variant"))
     return of_measure.isel(place=np.isfinite(of_measure.change.values))
 
 
@@ -309,7 +313,8 @@ def _steady_sentences(data: xr.Dataset) -> Iterator[str]:
             at = int(np.where(kind, sizes, -1.0).argmax())
             worst = places.isel(place=at)
             yield (
-                f"Steady amplitudes {words} {DISPLACEMENT.text(LARGE_STEADY)} differ by up to "
+                f"{worst.measure.item().replace('amplitude', 'amplitudes').capitalize()} {words} "
+                f"{DISPLACEMENT.text(LARGE_STEADY)} differ by up to "
                 f"{quantity.text(sizes[at])} ({worst.of.item()}, load {worst['load'].item()}: "
                 f"{STEADY_SIZE.text(reference[at])}, {worst.variant.item()} "
                 f"{STEADY_SIZE.text(value[at])})."

@@ -23,6 +23,7 @@ from wm_drake.parameters import MachineParameters, Sensor
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report.quantity import SPEED, STEP, TIME, of_measure
 from wm_drake.simulation.cases import Case, is_as_measured
+from wm_drake.simulation.convergence import Accuracy
 from wm_drake.simulation.displacements import band_of, largest_motion
 from wm_drake.simulation.measures import MEASURES, Measures, measure
 from wm_drake.simulation.records import Record, sample_period, why_diverged
@@ -36,12 +37,14 @@ class CaseResult:
     """Result of one case: its record, which has times of its own, and its measures.
 
     `wall_s` is its share of the time for simulation and measures of all cases. [s]
+    `accuracy` is None if it is not known.
     """
 
     case: Case
     record: Record
     measures: Measures
     wall_s: float
+    accuracy: Accuracy | None = None
 
     @property
     def has_gasket(self) -> bool:
@@ -80,6 +83,8 @@ class CaseResult:
         words = f"steps of up to {step} with controlled error"
         if "integrator" in how:
             words = f"{how['integrator']}, steps of {step}"
+        if self.accuracy is not None:
+            words += f", {self.accuracy.text}"
         return f"{words}, samples every {STEP.text(sample_period(self.record))}"
 
     def speed_at(self, time: float) -> float:
@@ -210,18 +215,24 @@ def run_spin(
         'middle'
     """
     built = machine if isinstance(machine, Machine) else build_machine(machine)
-    ended, scene, begin = dict[int, tuple[Record, Measures]](), Scene(built.parameters), time.time()
+    scene, begin = Scene(built.parameters), time.time()
+    ended = dict[int, tuple[Record, Measures, Accuracy | None]]()
 
     def collect(runs: list[RunResult]) -> None:
         for run in runs:
             assert run.record is not None  # all are kept
-            ended[run.number] = run.record, measure(run.record, scene)
+            ended[run.number] = run.record, measure(run.record, scene), run.accuracy
             progress(run.number, 1.0)
 
-    options = BatchOptions((), histories=True, engine=engine, **chosen)
+    shown = (m for m in MEASURES.values() if m.is_in_spin and m.applies(built.parameters))
+    compared = tuple(one.name for one in shown)
+    options = BatchOptions((), histories=True, engine=engine, compared=compared, **chosen)
     run_cases(built, cases, options, collect, progress)
     share = (time.time() - begin) / max(1, len(cases))
-    results = (CaseResult(case, *ended[number], share) for number, case in enumerate(cases))
+    results = (
+        CaseResult(case, *ended[number][:2], share, ended[number][2])
+        for number, case in enumerate(cases)
+    )
     return SpinRuns(built.parameters, engine, tuple(results), comparison)
 
 

@@ -4,7 +4,6 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from wm_drake.engines import DEFAULT_ENGINE
 from wm_drake.errors import check_known, input_error, shortened
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters
@@ -110,8 +109,10 @@ class SpinTask(Task):
                     progress=of_all,
                     comparison=comparison,
                 )
-                if self.engine == DEFAULT_ENGINE:  # the other one controls its error
-                    executor.verify(planned.machine, planned.cases)
+                for result in variants[planned.name].results:
+                    if result.accuracy is not None:
+                        name = result.case.name if is_one else f"{planned.name}: {result.case.name}"
+                        executor.steps.add(name, result.accuracy)
                 finished += len(planned.cases)
         return self._answer(variants)
 
