@@ -23,7 +23,7 @@ from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters, SpinProfile, load_machine, with_values
 from wm_drake.parameters.recorded import Synchronous
-from wm_drake.parameters.recorded_sensors import RecordedSensor, RecordedTest, recorded_test_of
+from wm_drake.parameters.recorded_sensors import RecordedSensor, recorded_test_of
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.records import Record
@@ -97,9 +97,9 @@ def _found(machine: Machine, seed: int, by: Any) -> FloatArray:
     points = machine.set_up().accelerometer_points
     places = {name: points[name[:2]] for name in SENSORS}
     recordings = _recordings(_record(machine, planted), sensors, places, generator)
-    run, test = _record(machine, parameters), RecordedTest(sensors=sensors)
+    run = _record(machine, parameters)
     predicted = predicted_signals(run, sensors, places)
-    pairs = tuple(without_edges(paired(r, run, predicted, test)) for r in recordings)
+    pairs = tuple(without_edges(paired(r, run, predicted)) for r in recordings)
     load = RecordedLoad("middle", lambda changed: changed.loads["middle"], pairs)
     free = SoughtNumbers(parameters, sought, "calibrated")
     model = RecordModel(Experiment(machine, ()), free, sensors, (load,), places, by)

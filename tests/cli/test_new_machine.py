@@ -82,6 +82,31 @@ def test_a_table_of_parts_gives_the_bodies(wm_drake):
 UNITS = {"kg mm^2": 1e6, "g mm^2": 1e9, "g cm^2": 1e7, "kg cm^2": 1e4, "lb in^2": 3417.17, "t mm^2": 1e3, "lb ft^2": 23.7304}  # fmt: skip
 
 
+def test_totals_and_assemblies_beside_their_parts_are_refused(tmp_path):
+    """Add rows that are the sum of all parts, of some, and of some of both bodies, rounded."""
+    generator, path = np.random.default_rng(4), tmp_path / "parts.csv"
+    masses = np.round(generator.uniform(0.5, 9.0, 8), 2)
+    centres = np.round(generator.uniform(-200.0, 200.0, (8, 3)))
+    bodies = ["drum" if k > 5 else "tub" for k in range(8)]
+
+    def row(name, body, mass, centre):
+        return f"{name},{body},{mass:g},{','.join(f'{c:g}' for c in centre)},0.03,0.03,0.03,0,0,0\n"
+
+    def text(rows, more=""):
+        return f"{','.join(COLUMNS)}\n{''.join(rows)}{more}"
+
+    rows = [row(f"p{k}", bodies[k], masses[k], centres[k]) for k in range(8)]
+    path.write_text(text(rows))
+    assert read_parts(path)["tub"].mass == pytest.approx(masses[:6].sum())
+    for used in ([0, 1, 2, 3, 4, 5], [1, 3, 4], [6, 7], list(range(8))):
+        mass = masses[used].sum()
+        centre = np.round(masses[used] @ centres[used] / mass, 1)
+        path.write_text(text(rows, row("sum", "tub", np.round(mass, 2), centre)))
+        names = ", ".join(f"p{k}" for k in used)
+        with pytest.raises(InputError, match=rf"parts.csv:10: part 'sum' .* of {names} together"):
+            read_parts(path)
+
+
 def part(mass=12.0, centre=(0, 0, 0), inertia=(0.6, 0.8, 0.6, 0, 0, 0), name="part"):
     return f"{name},tub,{','.join(map(str, (mass, *centre, *inertia)))}\n"
 

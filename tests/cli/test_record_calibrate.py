@@ -13,7 +13,7 @@ from lab_writers import write_mdf
 
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import load_machine, load_profile, with_values
-from wm_drake.parameters.recorded_sensors import RecordedSensor
+from wm_drake.parameters.recorded_sensors import RecordedSensor, load_recorded_test
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.recorded_signal import recorded_signal
 from wm_drake.simulation.runs import simulate
@@ -36,7 +36,7 @@ def plant(changes, seed=1, repeats=3, angle=0.0, stem="run", of_load="middle"):
     record, points = simulate(machine, case), machine.set_up().accelerometer_points
     generator = np.random.default_rng(seed)
     frames = parameters.accelerometer_frames()
-    lines = ["loads: middle\nsensors:\n"]
+    lines = ["load: middle\nsensors:\n"]
     signals = {}
     for number, name in enumerate(SENSORS, 1):
         tilt = TILT * generator.choice([-1.0, 1.0], 3) / np.sqrt(3.0)
@@ -91,6 +91,10 @@ def test_a_planted_friction_is_found(calibrate, by):
     assert (verdict["verdict"], verdict["structure"]) == ("good", "not refuted")
     text = Path("out/calibrated.yaml").read_text()
     assert "calibrated to run_0.mf4" in text
+    test = load_recorded_test(Path("out/calibrated_test.yaml"))
+    for name, sensor in test.sensors.items():  # gains and tilts that were planted, as found
+        assert sensor.gain == pytest.approx(1.0, abs=4.0 * GAIN)
+        assert np.abs(sensor.tilt).max() < 4.0 * TILT, name
 
 
 SOON = ("springs", "envelope")
@@ -129,7 +133,7 @@ def test_a_wrong_structure_is_called_wrong(calibrate, what, by):
 def test_wrong_unknowns_are_refused(calibrate, unknown, message):
     Path("run.csv").write_text("time [s],Xr [mm]\n0,1\n1,2\n")
     Path("p.yaml").write_text(PROFILE)
-    Path("test.yaml").write_text("loads: middle\nsensors: {Xr: {axis: x, frame: sensor_Xr}}\n")
+    Path("test.yaml").write_text("load: middle\nsensors: {Xr: {axis: x, frame: sensor_Xr}}\n")
     error = calibrate(["run.csv"], "--unknown", unknown, code=2)
     assert message in error
     assert len(error.strip().splitlines()) == 1
@@ -143,7 +147,7 @@ def test_noise_is_refused(calibrate):
     write_mdf(Path("run.mf4"), time, noise)
     frames = parameters.accelerometer_frames()
     places = [f"  {n}: {{frame: {frames[n[:2]]}, axis: {n[-1]}}}\n" for n in SENSORS]
-    Path("test.yaml").write_text(f"loads: middle\nsensors:\n{''.join(places)}")
+    Path("test.yaml").write_text(f"load: middle\nsensors:\n{''.join(places)}")
     Path("p.yaml").write_text(PROFILE)
     error = calibrate(["run.mf4"], "--unknown", FRICTION, code=2)
     assert error.startswith("run.mf4: no sensor shows the turning drum")
@@ -224,7 +228,7 @@ def test_quantities_of_a_free_file_and_a_record_of_a_named_load(calibrate):
 def test_options_that_do_not_fit_records_are_refused(calibrate, words, message):
     Path("run.csv").write_text("time [s],Xr [mm]\n0,1\n1,2\n")
     Path("p.yaml").write_text(PROFILE)
-    Path("test.yaml").write_text("loads: middle\nsensors: {Xr: {axis: x, frame: sensor_Xr}}\n")
+    Path("test.yaml").write_text("load: middle\nsensors: {Xr: {axis: x, frame: sensor_Xr}}\n")
     Path("free.yaml").write_text(f"spring_preload: {{prior: '(100, 20) N', source: test}}\n{FREE}")
     error = calibrate(["run.csv"], *words, code=2)
     assert message in error

@@ -9,7 +9,15 @@ import pandas as pd
 import pytest
 from machine_with_bearing import BEARING, UNITS
 
+from wm_drake.model.build import build_machine
+from wm_drake.parameters import load_machine, load_profile
+from wm_drake.parameters.recorded_sensors import recorded_test_of
+from wm_drake.parameters.unbalance_cases import load_unbalance_cases
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.recorded_signal import recorded_signal
 from wm_drake.simulation.records import versions
+from wm_drake.simulation.runs import simulate
+from wm_drake.studies.compare.task import sensor_points
 from wm_drake.studies.spin_cycle.measured import RMS_COLUMNS
 
 PROFILE = """
@@ -142,11 +150,31 @@ def test_measured_accelerations_are_integrated(study):
     pd.DataFrame({"time_s": time, **channels}).to_csv("records/front.csv", index=False)
     shown = json.loads(study("--json", "--accelerations", "records").out)
     error = 0.01 * shown["regions"][1]["mean_error_percent"]
-    front = rms_of(shown).sel(case="front", region="R2")
+    front = rms_of(shown, "rms_recorded").sel(case="front", region="R2")
     expected = np.linalg.norm(front - 2.0 / np.sqrt(2.0)) / np.linalg.norm(
         np.full(9, 2.0 / np.sqrt(2.0))
     )
     assert error == pytest.approx(expected, rel=0.02)
+
+
+def test_accelerometers_with_gravity_agree_with_a_perfect_machine(study):
+    """Record the machine itself, with gravity along axes that turn with the tub."""
+    study("--case", "front")
+    machine = build_machine(load_machine("reference"))
+    (case,) = (c for c in load_unbalance_cases(Path("c.csv")) if c.name == "front")
+    run = simulate(machine, Case("front", case.load(machine.parameters), load_profile("p.yaml")))
+    test = recorded_test_of(machine.parameters)
+    points = sensor_points(machine, test)
+    signals = {
+        n: recorded_signal(run, s, points[n]) for n, s in test.sensors.items() if n[2:3] == "_"
+    }
+    Path("records").mkdir()
+    pd.DataFrame({"time_s": run.time.values, **signals}).to_csv("records/front.csv", index=False)
+    ended = study("--json", "--case", "front", "--accelerations", "records", "--overwrite")
+    shown = json.loads(ended.out)
+    assert max(row["mean_error_percent"] for row in shown["regions"]) < 0.1
+    without = rms_of(shown, "rms_recorded") / rms_of(shown) - 1.0
+    assert np.abs(without).max() > 0.02  # what the sensors add to the motion
 
 
 @pytest.mark.slow

@@ -228,3 +228,12 @@ def test_unbalance_that_no_drum_can_have_is_refused():
     drum = SpatialInertia(9.0, [0.0, 0.06, 0.0], UnitInertia(0.04, 0.04, 0.04))
     with pytest.raises(InputError, match="too large for mass and inertia"):
         with_load(drum, Load.model_validate({"couple": {"moment": 5.0}}))
+
+
+@pytest.mark.parametrize(("text", "share"), [("0.6", 0.6), ("60 %", 0.6), ("60%", 0.6)])
+def test_a_share_of_water_may_be_in_percent(text, share):
+    water = {"share": text, "speed": "(0, 400) rpm", "left": "(100, 60) %", "time_constant": "20 s"}
+    mass = {"mass": "1 kg", "radius": "240 mm", "y": "0 mm", "water": water}
+    (found,) = Load.model_validate({"unbalances": [mass]}).unbalances
+    assert found.water.share == pytest.approx(share)
+    assert found.water.left == pytest.approx((1.0, 0.6))

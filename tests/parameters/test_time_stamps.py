@@ -25,14 +25,14 @@ def test_other_samples_are_untouched():
 
 
 def test_a_loop_with_a_coarse_clock_is_that_of_the_fine_one(tmp_path):
-    """Repeat every second stamp; means of neighbours are half a step later."""
+    """Repeat every second stamp; samples lie in the middle of their ticks, half a step earlier."""
     time = 0.01 * np.arange(200)
     rows = [f"{t:.6f},{np.sin(7 * t):.9f},{np.cos(7 * t):.9f}" for t in time]
     coarse = [f"{time[k - k % 2]:.6f}{row[row.index(',') :]}" for k, row in enumerate(rows)]
     path = tmp_path / "loop.csv"
     path.write_text("\n".join(["time [s],displacement [mm],force [N]", *coarse]))
-    with pytest.warns(InputNotice, match="200 samples"):
+    with pytest.warns(InputNotice, match="ticks of 0.02 s"):
         loop = read_loop(path)
-    assert len(loop.time) == 100
-    expected = np.sin(7 * (loop.time + 0.005)) * np.cos(7 * 0.005)
+    assert len(loop.time) == 200
+    expected = np.sin(7 * (loop.time - loop.time[0]))
     np.testing.assert_allclose(1e3 * loop.displacement, expected, atol=1e-8)

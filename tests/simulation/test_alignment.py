@@ -6,6 +6,7 @@ from lab_machine import recorded_channels
 
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import SpinProfile, load_machine
+from wm_drake.parameters.recorded.pulses import counted
 from wm_drake.parameters.recorded_sensors import recorded_test_of
 from wm_drake.simulation.alignment import align_pulses, align_signals, align_speed
 from wm_drake.simulation.cases import Case
@@ -47,7 +48,7 @@ def test_from_pulses(planted):
     record, _, time, _, at = planted
     angle = np.interp(at, record.time.values, record.drum_angle.values)
     numbers = np.arange(np.ceil(angle[0] / np.pi), angle[-1] / np.pi)
-    pulses = np.interp(numbers * np.pi, angle, time)
+    pulses = counted(np.interp(numbers * np.pi, angle, time), "Tacho")[0]
     found = align_pulses(pulses, np.pi, record)
     assert found.offset == pytest.approx(BEGIN, abs=1e-3)
     assert found.rate == pytest.approx(1e-6 * PPM, abs=3e-5)

@@ -602,6 +602,10 @@ class LaneRun(Run):
         return np.stack(list(self.item.numbers.setup.accelerometer_points.values()))
 
     @property
+    def gravity(self) -> float:
+        return self.item.numbers.setup.parameters.gravity
+
+    @property
     def mount_sums(self) -> FloatArray:
         return self.lane.mounts
 

@@ -6,9 +6,11 @@ May import: all other rooms; neither pydrake nor a plotting library.
 """
 
 import atexit
+import codecs
 import copy
 import functools
 import gc
+import os
 import pkgutil
 import sys
 from typing import Annotated, Any
@@ -141,6 +143,10 @@ def _options(
 
 def main() -> None:
     """Run the command; an error of the input or the disk ends it with a message and exit code 2."""
+    if codecs.lookup(sys.getfilesystemencoding()).name == "ascii" and not sys.flags.utf8_mode:
+        # Drake cannot be imported in such a locale, as LC_ALL=C with PYTHONUTF8=0 makes it
+        command = [sys.executable, "-X", "utf8", "-m", "wm_drake", *sys.argv[1:]]
+        os.execve(sys.executable, command, {**os.environ, "PYTHONUTF8": "1"})
     # Imports and studies make a million objects that stay; looking through them would take a
     # quarter of the time of the imports. Results are freed without the collector.
     gc.set_threshold(1_000_000, 20, 20)

@@ -137,10 +137,17 @@ def read_parts(path: Path) -> dict[str, Mass]:
     numbers = finite_numbers(table[COLUMNS[2:]], path)
     parts, problems, known = dict[str, list[Mass]](tub=[], drum=[]), list[Problem](), set[str]()
     names, bodies = (table[name].fillna("").astype(str).str.strip() for name in COLUMNS[:2])
-    for line, name, body, row in zip(data_lines(path), names, bodies, numbers, strict=True):
+    lines = data_lines(path)
+    sums = {lines[k]: ", ".join(names[list(of)]) for k, of in _sums(numbers[:, :4]).items()}
+    for line, name, body, row in zip(lines, names, bodies, numbers, strict=True):
         part = Mass(float(row[0]), 1e-3 * row[1:4], inertia_matrix(*row[4:]), "")
         if body not in parts:
             fault = f"has the body '{body}'; allowed are tub, drum"
+        elif line in sums:
+            fault = (
+                f"has the mass and the centre of mass of {shortened(sums[line], 100)} together; a "
+                "total, or an assembly beside its parts, counts them twice: leave out either"
+            )
         elif not name:
             fault = "has no name"
         elif name in known:
@@ -164,6 +171,42 @@ def read_parts(path: Path) -> dict[str, Mass]:
         body: combined(of, f"{len(of)} parts of {path.name}, combined")
         for body, of in parts.items()
     }
+
+
+MOST_SUBSETS = 14
+"""Most parts of which all subsets are added up; of more, those of rows below each other are."""
+
+SAME_MASS, SAME_PLACE_MM = 2e-3, 1.0
+"""Largest relative difference of two masses, and largest of two centres of mass that are rounded,
+that count as the same."""
+
+
+def _sums(rows: FloatArray) -> dict[int, tuple[int, ...]]:
+    """Return the rows that have the mass and the centre of mass of others together, and which.
+
+    Args:
+        rows: Mass [kg] and centre of mass [mm] of each part, (n, 4).
+    """
+    count = len(rows)
+    windows = [range(a, b) for a in range(count) for b in range(a + 2, count + 1)]
+    subsets = np.zeros((len(windows), count), dtype=bool)
+    for row, window in zip(subsets, windows, strict=True):
+        row[window.start : window.stop] = True
+    if count <= MOST_SUBSETS:
+        subsets = (np.arange(2**count)[:, None] >> np.arange(count)) & 1 > 0
+    sums = {}
+    moments = rows[:, :1] * rows[:, 1:]
+    for number, (mass, *centre) in enumerate(rows):
+        others = subsets.copy()
+        others[:, number] = False
+        others = others[others.sum(axis=1) > 1]
+        totals = others @ rows[:, 0]
+        near = np.abs(totals - mass) <= SAME_MASS * abs(mass)
+        centres = (others[near] @ moments) / totals[near, None]
+        same = np.abs(centres - np.array(centre)).max(axis=1, initial=0.0) <= SAME_PLACE_MM
+        if same.any():
+            sums[number] = tuple(np.flatnonzero(others[near][same][0]).tolist())
+    return sums
 
 
 LARGEST_MM = 1500.0

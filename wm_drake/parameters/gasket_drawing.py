@@ -149,7 +149,7 @@ class PronySeries(Frozen):
     """
 
     time: Annotated[tuple[Annotated[float, Field(gt=0.0)], ...], u.Unit("s", "s")]
-    share: tuple[Annotated[float, u.PureNumber(), Field(gt=0.0, lt=1.0)], ...]
+    share: tuple[Annotated[float, u.Fraction(), Field(gt=0.0, lt=1.0)], ...]
 
     @model_validator(mode="after")
     def _is_a_series(self) -> "PronySeries":

@@ -49,6 +49,7 @@ class RecordedSensor(Frozen):
         low_pass: Corner of the recorder's low-pass, a Butterworth filter.
         low_pass_order: Its order.
         noise: Standard deviation of the noise of a sample, in a unit of the quantity.
+        place_deviation: Standard deviation of each coordinate of its place, for fits.
         channel: Name of the channel in the files. Default: the name of the sensor.
         unit: Unit of a channel whose file has none.
     """
@@ -66,6 +67,7 @@ class RecordedSensor(Frozen):
     low_pass: Annotated[u.Frequency, Field(gt=0.0)] | None = None
     low_pass_order: Annotated[int, Field(ge=1, le=8)] = 4
     noise: Annotated[float, Field(ge=0.0)] = 0.0
+    place_deviation: Annotated[u.Length, Field(ge=0.0, le=0.1)] = 0.0
     channel: str = ""
     unit: str = ""
 
@@ -132,11 +134,14 @@ class RecordedTest(Frozen):
 
     Attributes:
         load: Name of the load of the machine, or load file.
+        load_deviation: Relative standard deviation of its mass, for fits; 0 for a mass that is
+            known, or is an unknown of the fit itself.
         sensors: Sensors, by name.
         speed: Channel of the drum speed, if there is one.
     """
 
     load: str | None = None
+    load_deviation: Annotated[float, u.Fraction(), Field(ge=0.0, le=0.3)] = 0.0
     sensors: Annotated[dict[Name, RecordedSensor], Field(min_length=1)]
     speed: SpeedChannel | None = None
 

@@ -32,7 +32,7 @@ class Water(Frozen):
         time_constant: Time constant with which the water leaves.
     """
 
-    share: Annotated[u.Ratio, Field(gt=0.0, lt=1.0)]
+    share: Annotated[float, u.Fraction(), Field(gt=0.0, lt=1.0)]
     speed: u.Speeds
     left: u.Ratios
     time_constant: Annotated[u.Duration, Field(gt=0.0)]

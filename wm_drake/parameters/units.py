@@ -544,15 +544,20 @@ class PureNumber(Unit):
 
 
 @dataclass(frozen=True)
-class Share(PureNumber):
-    """A share, such as 0.3 or 30 %."""
-
-    shown: str = "%"
+class Fraction(PureNumber):
+    """A part of a whole, shown as 0.3; 30 % is read too."""
 
     def number(self, text: str) -> float:
         """Return a text such as ``'30 %'`` or ``'0.3'`` as a number."""
         body = text.strip()
         return 0.01 * super().number(body[:-1]) if body.endswith("%") else super().number(body)
+
+
+@dataclass(frozen=True)
+class Share(Fraction):
+    """A part of a whole, shown as 30 %."""
+
+    shown: str = "%"
 
 
 Ratio = Annotated[float, PureNumber()]

@@ -18,6 +18,7 @@ import xarray as xr
 from scipy.optimize import least_squares
 
 from wm_drake.parameters.recorded import resampled
+from wm_drake.parameters.recorded.pulses import Pulses
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.orders import PERIOD, frequency_map, order_vectors
 from wm_drake.simulation.records import Record, sample_period
@@ -110,24 +111,28 @@ def align_speed(time: FloatArray, speed: FloatArray, run: Record) -> Alignment:
     return fit.alignment(Alignment(offset), middle, "speed")
 
 
-def align_pulses(pulses: FloatArray, angle: float, run: Record) -> Alignment:
+def align_pulses(pulses: Pulses, angle: float, run: Record) -> Alignment:
     """Align the pulses of a tacho with the angle of the drum in a run.
 
+    Where their count is lost, it starts anew with another constant.
+
     Args:
-        pulses: Rising times of the pulses. (n,) [s]
         angle: Angle of the drum between two pulses. [rad]
     """
-    stamps, of_run = run.time.values, np.abs(run.drum_angle.values)
-    between = 0.5 * (pulses[1:] + pulses[:-1])
-    offset = _offset_of_speed(*_means(between, angle / np.diff(pulses)), run)
-    middle, counted = float(np.mean(pulses)), angle * np.arange(len(pulses))
+    stamps, of_run, times = run.time.values, np.abs(run.drum_angle.values), pulses.times
+    speed, between = angle * np.diff(pulses.counts) / np.diff(times), 0.5 * (times[1:] + times[:-1])
+    offset = _offset_of_speed(*_means(between, speed), run)
+    middle, turned = float(np.mean(times)), angle * pulses.counts
 
     def residuals(x: FloatArray) -> FloatArray:
-        at, inside = _places(offset + x[0] + pulses + x[1] * (pulses - middle), run)
-        return np.where(inside, np.interp(at, stamps, of_run) - counted - x[2], 0.0)
+        at, inside = _places(offset + x[0] + times + x[1] * (times - middle), run)
+        start = x[2:][pulses.pieces]
+        return np.where(inside, np.interp(at, stamps, of_run) - turned - start, 0.0)
 
-    first = float(np.median(np.interp(offset + pulses, stamps, of_run) - counted))
-    fit = _robust(residuals, (0.0, 0.0, first), (OFFSET_SD, RATE_SD, UNKNOWN_ANGLE), SCALE_OF_PHASE)
+    apart = np.interp(offset + times, stamps, of_run) - turned
+    starts = [float(np.median(apart[pulses.pieces == k])) for k in np.unique(pulses.pieces)]
+    priors = (OFFSET_SD, RATE_SD, *[UNKNOWN_ANGLE] * len(starts))
+    fit = _robust(residuals, (0.0, 0.0, *starts), priors, SCALE_OF_PHASE)
     return fit.alignment(Alignment(offset), middle, "pulses")
 
 

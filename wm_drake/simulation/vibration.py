@@ -69,6 +69,43 @@ def region_displacements(
     return np.stack(direct, axis=1), np.stack(integrated, axis=1)
 
 
+def specific_forces(
+    motion: FloatArray,
+    acceleration: FloatArray,
+    points: FloatArray,
+    rest_pose: FloatArray,
+    gravity: float,
+) -> FloatArray:
+    """Return what accelerometers glued to the tub record: a_Q - g, along axes that turn with it.
+
+    The axes are those of W at rest. Where the tub tilts, gravity is in the signals, which an
+    integration takes for a motion.
+
+    Args:
+        motion, acceleration, points, rest_pose: As for `region_displacements`.
+        gravity: Acceleration of free fall. [m/s^2]
+
+    Returns:
+        (n, k, 3) [m/s^2]
+    """
+    turned = np.stack(generic(rotation_from_rpy)(*motion[:, :3].T), axis=1).reshape(-1, 3, 3)
+    rest = np.array(generic(rotation_from_rpy)(*rest_pose[:3])).reshape(3, 3)
+    force = point_accelerations(motion, acceleration, points) + np.array([0.0, 0.0, gravity])
+    return np.asarray(np.einsum("ij,nkj,npk->npi", rest, turned, force))
+
+
+def displacement_of(acceleration: FloatArray, period: float) -> FloatArray:
+    """Return the high-passed displacements [m] of recorded accelerations [m/s^2] (n, k).
+
+    The bias of a sensor is a mean with a Hann window: a plain mean would include the velocity at
+    the end of the record divided by its duration.
+    """
+    if not len(acceleration):
+        return acceleration
+    bias = np.average(acceleration, axis=0, weights=np.hanning(len(acceleration) + 2)[1:-1])
+    return high_passed(integrated_twice(acceleration - bias, period), period, HIGH_PASS_HZ)
+
+
 def tub_motion_of(record: Record) -> tuple[FloatArray, FloatArray]:
     """Return states (n, 13) and accelerations (n, 6) of the tub in the form of this module."""
     angle = record.drum_angle.values[:, None]

@@ -169,7 +169,7 @@ def test_noise_is_refused(color):
         spectrum[1:] *= np.arange(1.0, len(spectrum))[:, None] ** (-0.5 * color)
         noise = np.fft.irfft(spectrum, len(wave), axis=0)
         with pytest.raises(InputError, match=r"x\.csv: no sensor shows the turning drum"):
-            check_pair(pair_of(run, noise, np.tile(wave, 6)), {})
+            check_pair(pair_of(run, noise, np.tile(wave, 6)))
 
 
 @pytest.mark.parametrize("frequency", [3.0, 20.0])
@@ -179,10 +179,10 @@ def test_a_weak_vibration_is_no_noise(frequency):
         run, wave = steady(frequency, 2e-3, 6e-3, seed)
         noise = 6e-3 * np.random.default_rng([seed, 1]).standard_normal((len(wave), 2))
         predicted = steady(frequency)[1]
-        check_pair(pair_of(run, np.hstack([noise, wave]), np.tile(predicted, 3)), {})
+        check_pair(pair_of(run, np.hstack([noise, wave]), np.tile(predicted, 3)))
 
 
 def test_a_record_of_few_revolutions_tells_nothing():
     run, wave = steady(3.0, seconds=2.5)
     with pytest.raises(InputError, match="8 revolutions"):
-        check_pair(pair_of(run, wave, wave), {})
+        check_pair(pair_of(run, wave, wave))

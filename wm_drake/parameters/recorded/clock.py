@@ -1,19 +1,17 @@
 """Several clocks become one: common span, no value beyond a record, gaps left out, no aliases."""
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from wm_drake.errors import InputNotice, Problem, input_error
-from wm_drake.parameters.csv_files import with_distinct_times
+from wm_drake.parameters.recorded.health import Channel, Finding, Kind, examined
 from wm_drake.parameters.recorded.signal import Signal
+from wm_drake.parameters.recorded.stamps import HOLE, clock_jumps, with_ticks_spread
 from wm_drake.parameters.types import FloatArray
-
-HOLE = 10.0
-"""Steps of time, in medians, above which samples are missing: nothing is interpolated there."""
 
 SAME_RATE = 1.05
 """Largest ratio of two sampling rates that count as the same."""
@@ -41,12 +39,15 @@ class Synchronous:
     Attributes:
         path: The file.
         time: Strictly rising (n,). [s] It is zero where the first of the channels begins to count.
-        values: Samples of each channel, by its word (n,). NaN where the channel has none.
+        values: Samples of each channel, by its word (n,). NaN where the channel has none, or where
+            a check of its health leaves samples out.
+        findings: What these checks found.
     """
 
     path: Path
     time: FloatArray
     values: Mapping[str, FloatArray]
+    findings: tuple[Finding, ...] = ()
 
     @property
     def gaps(self) -> FloatArray:
@@ -99,22 +100,35 @@ def notice(path: Path, message: str, key: str = "") -> None:
     warnings.warn(str(Problem(str(path), key, message)), InputNotice, stacklevel=2)
 
 
-def synchronous(
-    path: Path, signals: Mapping[str, Signal], factors: Mapping[str, float], main: Sequence[str]
-) -> Synchronous:
+@dataclass(frozen=True)
+class Use:
+    """How the samples of a channel are used.
+
+    Attributes:
+        factor: Factor that converts them to SI.
+        kind: What they record, for the checks of their health.
+        is_main: Whether the channel may set the clock; others follow.
+    """
+
+    factor: float = 1.0
+    kind: Kind = "signal"
+    is_main: bool = True
+
+
+def synchronous(path: Path, signals: Mapping[str, Signal], uses: Mapping[str, Use]) -> Synchronous:
     """Return channels in SI on the slowest clock of the main ones, over the span that all have.
 
     Args:
         signals: Channels by word.
-        factors: Factor of each channel that converts it to SI.
-        main: Words of the channels that may set the clock; the others follow.
+        uses: How each is used.
 
     Raises:
         InputError: a channel cannot be used, was not sampled over time, its time falls, or two
-            channels have no time in common.
+            channels have no time in common; or a check finds what cannot be left out.
     """
-    clocks = _clocks(path, signals, factors)
-    leading = [clock for clock in clocks if set(clock.words) & set(main)]
+    findings: list[Finding] = []
+    clocks = [_examined(path, clock, uses, findings) for clock in _clocks(path, signals)]
+    leading = [clock for clock in clocks if any(uses[word].is_main for word in clock.words)]
     lead = max(leading, key=lambda clock: clock.step)
     begin = max(clock.time[0] for clock in clocks)
     end = min(clock.time[-1] for clock in clocks)
@@ -131,14 +145,38 @@ def synchronous(
             _say_rate(path, clock, lead)
             columns = resampled(clock.time, clock.samples, time, lead.step)
         values |= dict(zip(clock.words, columns.T, strict=True))
-    result = Synchronous(path, time, {word: values[word] for word in signals})
-    _say_gaps(result)
+    result = Synchronous(path, time, {word: values[word] for word in signals}, tuple(findings))
+    _say_gaps(result, {finding.channel for finding in findings})
     return result
 
 
-def _clocks(
-    path: Path, signals: Mapping[str, Signal], factors: Mapping[str, float]
-) -> list[_Clock]:
+def _examined(
+    path: Path, clock: _Clock, uses: Mapping[str, Use], findings: list[Finding]
+) -> _Clock:
+    """Return channels in SI without the samples that the checks of their health leave out.
+
+    Raises:
+        InputError: a check finds what cannot be left out.
+    """
+    channels = [
+        Channel(word, uses[word].kind, clock.time, column, uses[word].factor)
+        for word, column in zip(clock.words, clock.samples.T, strict=True)
+    ]
+    of_clock = [*clock_jumps(channels)]
+    columns = []
+    for channel in channels:
+        values, of_channel = examined(channel)
+        columns.append(values * channel.factor)
+        of_clock += of_channel
+    for finding in of_clock:
+        if not finding.is_bridged:
+            raise input_error(str(finding), where=str(path), key=finding.channel)
+        notice(path, str(finding), finding.channel)
+    findings += of_clock
+    return replace(clock, samples=np.column_stack(columns))
+
+
+def _clocks(path: Path, signals: Mapping[str, Signal]) -> list[_Clock]:
     """Return the channels by their time stamps, which rise, from the first start on."""
     starts = {signal.start for signal in signals.values()}
     known = [start for start in starts if start is not None]
@@ -168,7 +206,7 @@ def _clocks(
             grouped.append((start, time, [word], signal))
     clocks = []
     for start, time, words, signal in grouped:
-        columns = [signals[word].values * factors[word] for word in words]
+        columns = [signals[word].values for word in words]
         kept = np.isfinite(time)
         if not kept.all():
             notice(path, f"{np.sum(~kept)} samples have no time; they are left out")
@@ -177,7 +215,9 @@ def _clocks(
             [time[kept] + 1e-9 * (start - first), *(one[kept] for one in columns)]
         )
         table[~np.isfinite(table)] = np.nan
-        table = with_distinct_times(table, str(path))
+        table, remark = with_ticks_spread(path, table)
+        if remark:
+            notice(path, remark)
         if len(table) < 2:
             raise input_error(
                 f"has {len(table)} samples; at least two are needed",
@@ -234,12 +274,12 @@ def _say_rate(path: Path, clock: _Clock, lead: _Clock) -> None:
         )
 
 
-def _say_gaps(channels: Synchronous) -> None:
-    """Say how many samples of which channel are left out."""
+def _say_gaps(channels: Synchronous, said: Collection[str]) -> None:
+    """Say how many samples of which channel are left out, but of those of which it is said."""
     step = float(np.median(np.diff(channels.time))) if len(channels.time) > 1 else 0.0
     for word, column in channels.values.items():
         missing = ~np.isfinite(column)
-        if missing.any():
+        if missing.any() and word not in said:
             spans = int(np.sum(np.diff(np.concatenate([[False], missing]).astype(int)) == 1))
             notice(
                 channels.path,

@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 
 from wm_drake.errors import InputError, input_error, nearest_names, shortened
-from wm_drake.parameters.recorded.clock import Synchronous, notice, synchronous
+from wm_drake.parameters.recorded.clock import Synchronous, Use, notice, synchronous
 from wm_drake.parameters.recorded.formats import read_signals
+from wm_drake.parameters.recorded.health import Channel, Kind, examined
 from wm_drake.parameters.recorded.signal import SECOND, Abscissa, Signal, word_of
+from wm_drake.parameters.recorded.stamps import clock_jumps
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit, factor_of, plain_unit
 
@@ -21,6 +23,9 @@ TIME_NAMES = (
     *("date/time", "zeit", "uhrzeit", "zeitstempel"),
 )
 """Names of a channel of time, in small letters, for files without a time of their own."""
+
+FEW_LEVELS = 8
+"""Most values of a channel of pulses, where none says what a channel records."""
 
 MOST_LISTED = 12
 """Most channels that a message lists."""
@@ -33,6 +38,13 @@ LEAST_STEP = 2e-5
 
 MOST_SECONDS = 1e11
 """Time above which seconds are not plausible: counts since 1970 in a smaller unit. [s]"""
+
+
+LIKELY, LONGEST = 5.0, 50.0
+"""Largest ratio of the durations of a record and its profile, without and with a unit of time."""
+
+TIME_FACTORS = {"ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0, "d": 86400.0}
+"""Units of a time that is not in seconds. [s]"""
 
 
 @dataclass(frozen=True)
@@ -59,12 +71,14 @@ class ChannelUse:
         unit: Unit to which it is converted; None to leave it in its own.
         default: Unit of a channel without one; "" if there is none.
         is_main: Whether it may set the clock; others, such as a drum speed, follow.
+        kind: What it records, for the checks of its health.
     """
 
     signal: Signal
     unit: Unit | None
     default: str = ""
     is_main: bool = True
+    kind: Kind = "signal"
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,37 +187,58 @@ class Recording:
                 row["remark"] = "time" if is_time(signal) else error.problems[0].message
             else:
                 row |= _rate_and_span(time)
+                row["remark"] = signal.fault or self._findings(address, signal, time)
             rows.append(row)
         return rows
 
-    def synchronous(self, uses: Mapping[str, ChannelUse], time_unit: str = "s") -> Synchronous:
+    def _findings(self, address: str, signal: Signal, time: FloatArray) -> str:
+        """Return what the checks of its health find in a channel, with the kind that it looks."""
+        if is_time(signal) or len(time) != len(signal.values) or not np.isfinite(time).all():
+            return ""
+        kind: Kind = "vibration"
+        unit, factor = self.unit_of(address, signal), 1.0
+        if not unit and word_of(signal.name)[0] in ("speed", "rpm"):
+            unit = SPEED.shown
+        if is_speed(unit):
+            kind, factor = "speed", factor_of(unit, SPEED)
+        elif len(np.unique(signal.values)) <= FEW_LEVELS:
+            kind = "pulses"
+        channel = Channel(address, kind, time, signal.values, factor)
+        findings = [*clock_jumps([channel])] if np.all(np.diff(time) > 0.0) else []
+        return "; ".join(map(str, [*findings, *examined(channel)[1]]))
+
+    def synchronous(
+        self, uses: Mapping[str, ChannelUse], time_unit: str = "s", duration: float | None = None
+    ) -> Synchronous:
         """Return channels in SI units on one clock; see `wm_drake.parameters.recorded.clock`.
 
         Args:
             uses: The channels by word.
             time_unit: Unit of a column of time without one; "" if there is none.
+            duration: Duration of what was recorded, if it is known. [s]
 
         Raises:
             InputError: a channel cannot be used, its unit does not fit, or the times do not.
         """
         self._check_names(uses)
         assumed: dict[str, list[str]] = {}
-        factors, signals = {}, {}
+        used, signals = {}, {}
         for word, each in uses.items():
             signals[word] = self._with_time_unit(each.signal, time_unit, assumed)
             text = self.unit_of(word, each.signal, each.unit)
             if not text and each.default:
                 assumed.setdefault(each.default, []).append(word)
-            factors[word] = self._factor(word, text or each.default, each)
+            if duration is not None:
+                _check_duration(self.path, each.signal.abscissa, signals[word], duration)
+            factor = self._factor(text or each.default, each)
+            used[word] = Use(factor, each.kind, each.is_main)
         for unit, words in assumed.items():
             shown = shortened(", ".join(dict.fromkeys(words)), 80)
             notice(
                 self.path,
                 f"{shown}: the file has no unit; {unit} is assumed (--unit NAME=UNIT names one)",
             )
-        return synchronous(
-            self.path, signals, factors, [word for word, each in uses.items() if each.is_main]
-        )
+        return synchronous(self.path, signals, used)
 
     def unit_of(self, word: str, signal: Signal, unit: Unit | None = None) -> str:
         """Return the text of the unit of a channel: that of the file, or that which the user names.
@@ -232,14 +267,14 @@ class Recording:
             )
         return in_file
 
-    def _factor(self, word: str, text: str, use: ChannelUse) -> float:
+    def _factor(self, text: str, use: ChannelUse) -> float:
         if use.unit is None:
             return 1.0
         name = use.signal.title or use.signal.name
         if not text:
             raise input_error(
-                f"has no unit; write '{word} [{use.unit.shown}]' in the header, or name it: "
-                f"--unit '{word}={use.unit.shown}'",
+                f"has no unit; write '{name} [{use.unit.shown}]' in the header, or name it: "
+                f"--unit '{name}={use.unit.shown}'",
                 where=str(self.path),
                 key=name,
             )
@@ -317,6 +352,15 @@ def _suffix(signal: Signal, unit: Unit | None) -> str:
 def is_time(signal: Signal) -> bool:
     """Return whether a channel is one of time, by its name."""
     return bool({signal.name.lower(), word_of(signal.name)[0]} & set(TIME_NAMES))
+
+
+def is_speed(unit: str) -> bool:
+    """Return whether a unit is one of a drum speed, but not of a frequency."""
+    try:
+        factor_of(unit, SPEED)
+    except ValueError:
+        return False
+    return plain_unit(unit) not in ("", "Hz")
 
 
 def _over(signal: Signal, clock: Signal, axis: Abscissa) -> Signal:
@@ -404,6 +448,37 @@ def _check_seconds(path: Path, axis: Abscissa) -> None:
             where=str(path),
             key=axis.name,
         )
+
+
+def _check_duration(path: Path, axis: Abscissa, signal: Signal, duration: float) -> None:
+    """Check that a record lasts about as long as what was recorded.
+
+    Raises:
+        InputError: it does not; the message names the units of time that would fit.
+    """
+    time = signal.time(path)
+    span = float(np.nanmax(time) - np.nanmin(time)) if np.isfinite(time).any() else 0.0
+    has_unit = bool(axis.kind or plain_unit(axis.unit))
+    most = LONGEST if has_unit else LIKELY
+    if not span or 1.0 / most <= span / duration <= most:
+        return
+    assumed = "" if has_unit else "has no unit, and "
+    fitting = [
+        f"--unit time={unit}"
+        for unit, factor in TIME_FACTORS.items()
+        if 1.0 / LIKELY <= span * factor / duration <= LIKELY
+    ]
+    steps = np.diff(time)
+    if not has_unit and np.all(steps == 1.0):
+        rate = len(time) / duration
+        fitting = [f"a time in place of numbers of samples (a rate of about {rate:.2g} Hz fits)"]
+    hint = f"the unit may be another: {' or '.join(fitting)}" if fitting and not has_unit else ""
+    raise input_error(
+        f"{assumed}in seconds the record lasts {span:.6g} s, the profile {duration:.4g} s; "
+        f"{hint or 'give the record and the profile of the same run'}",
+        where=str(path),
+        key=axis.name or "time",
+    )
 
 
 def listed(addresses: Iterable[str]) -> str:

@@ -2,6 +2,7 @@
 
 import functools
 import itertools
+import json
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -283,6 +284,10 @@ class RecordedRun(Run):
     @property
     def accelerometer_points(self) -> FloatArray:
         return self._values["accelerometer_point"]
+
+    @property
+    def gravity(self) -> float:
+        return float(json.loads(self.record.attrs["parameters"])["gravity"])
 
     @functools.cached_property
     def mount_sums(self) -> FloatArray:

@@ -12,6 +12,7 @@ SHIPPED = (
     "gap:GAP",
     "gap:CONTACTS",
     "regions:REGIONS",
+    "regions:RECORDED",
     "mounts:MOUNTS",
     "drive:DRIVE",
     "feet:FEET",

@@ -18,7 +18,7 @@ Need: TypeAlias = Literal["sensors", "shapes", "tub", "mounts", "feet", "springs
 
     sensors   `Run.displacement`, `Run.filtered` and `Run.amplitudes`
     shapes    `Run.gap`, `Run.scene` and `Run.poses`
-    tub       `Run.tub_motion`, `Run.tub_acceleration` and `Run.accelerometer_points`
+    tub       `Run.tub_motion`, `Run.tub_acceleration`, `Run.gravity`, `Run.accelerometer_points`
     mounts    `Run.mount_sums`
     feet      `Run.feet`
     springs   `Run.smallest_tensions` and `Run.smallest_elongations`
@@ -119,6 +119,11 @@ class Run(ABC):
     @abstractmethod
     def accelerometer_points(self) -> FloatArray:
         """Return the points of the accelerometers in T. (k, 3) [m]"""
+
+    @property
+    @abstractmethod
+    def gravity(self) -> float:
+        """Return the acceleration of free fall. [m/s^2]"""
 
     @property
     @abstractmethod

@@ -17,7 +17,7 @@ from scipy.interpolate import CubicSpline
 
 from wm_drake.batch.ledger import Ledger, LedgerEntry, key_of
 from wm_drake.errors import InputError
-from wm_drake.parameters import Load, SpinProfile
+from wm_drake.parameters import Load, SpinProfile, Unbalance
 from wm_drake.parameters.recorded_sensors import RecordedSensor
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
@@ -50,6 +50,9 @@ GAIN_SD = 0.01
 TILT_SD = float(np.deg2rad(2.0))
 """Deviation of each of two angles by which the axis of a sensor is off: an assumption. [rad]"""
 
+LEAST_PLACE_SD = 1e-5
+"""Deviation of the place of a sensor that is known, where that of another one is not. [m]"""
+
 OFFSET_SD, RATE_SD, ANGLE_SD = 1e-4, 1e-6, 0.05
 """Smallest deviations of a clock [s, 1] and of the angle of the drum at the start [rad]: what the
 alignment claims is not better than the model it aligns with. An assumption."""
@@ -57,12 +60,16 @@ alignment claims is not better than the model it aligns with. An assumption."""
 REACH = 6.0
 """Bounds of such an unknown, in deviations."""
 
-RunKey: TypeAlias = tuple[bytes, str, SpinProfile, float]
-"""What determines a run: numbers of the machine, load, profile, angle of the drum."""
+RunKey: TypeAlias = tuple[bytes, str, SpinProfile, float, float]
+"""What determines a run: numbers of the machine, load, profile, angle of the drum, factor of the
+mass of the load."""
 
-ColumnKey: TypeAlias = tuple[int, RunKey, int, float, float, float, float]
+ColumnKey: TypeAlias = tuple[int, RunKey, int, float, float, tuple[float, ...]]
 """What determines the signal of a sensor: recording, run, number of the sensor, offset and rate of
-the clock, and both angles of the axis."""
+the clock, both angles of the axis, and by what its place is off."""
+
+PLACE_STEP = 1e-3
+"""Step of a derivative by the place of a sensor. [m]"""
 
 AT_ONCE = 16
 """Number of points after which the values are kept. Each fills a SIMD lane of two cores at most."""
@@ -81,6 +88,7 @@ class RecordModel(BlockModel):
         by: What is fitted.
         ledger: Where the values at each point are kept as soon as they are computed, so that a
             search that was killed goes through the same points again without runs; or None.
+        load_deviation: Relative deviation of the mass of each load; 0 if it is known.
     """
 
     sensors: Mapping[str, RecordedSensor]
@@ -88,6 +96,7 @@ class RecordModel(BlockModel):
     points: Mapping[str, FloatArray]
     by: By
     ledger: Ledger | None = None
+    load_deviation: float = 0.0
 
     misfit = MISFIT
     most_misfit = 2.0
@@ -106,21 +115,37 @@ class RecordModel(BlockModel):
     @cached_property
     def unknowns(self) -> tuple[Unknown, ...]:
         """Unknowns of the machine, then those of the recorder."""
-        return (*self.free.unknowns, *self._of_sensors, *self._of_recordings)
+        return (
+            *self.free.unknowns,
+            *self._of_sensors,
+            *self._of_loads,
+            *self._of_recordings,
+        )
+
+    @cached_property
+    def has_places(self) -> bool:
+        """Whether the place of a sensor is uncertain."""
+        return any(sensor.place_deviation for sensor in self.sensors.values())
 
     @cached_property
     def _of_sensors(self) -> tuple[Unknown, ...]:
-        """Gain and two angles of the axis of each sensor."""
-        angle = Unit("rad", "deg")
-        return tuple(
-            unknown
-            for name in self.sensors
-            for unknown in (
-                _nuisance(f"gain of {name}", 1.0, GAIN_SD, Unit("", "")),
-                _nuisance(f"tilt of {name}", 0.0, TILT_SD, angle),
-                _nuisance(f"other tilt of {name}", 0.0, TILT_SD, angle),
-            )
-        )
+        """Gain, two angles of the axis and, where they are uncertain, the place of each sensor."""
+        angle, length, unknowns = Unit("rad", "deg"), Unit("m", "mm"), []
+        for name, sensor in self.sensors.items():
+            unknowns.append(_nuisance(f"gain of {name}", 1.0, GAIN_SD, Unit("", "")))
+            unknowns.append(_nuisance(f"tilt of {name}", 0.0, TILT_SD, angle))
+            unknowns.append(_nuisance(f"other tilt of {name}", 0.0, TILT_SD, angle))
+            for axis in "xyz" if self.has_places else "":
+                width = max(sensor.place_deviation, LEAST_PLACE_SD)
+                unknowns.append(_nuisance(f"{axis} of {name}", 0.0, width, length))
+        return tuple(unknowns)
+
+    @cached_property
+    def _of_loads(self) -> tuple[Unknown, ...]:
+        """Factor of the mass of each load, if it is uncertain."""
+        names = [load.name for load in self.loads] if self.load_deviation else []
+        width, unit = self.load_deviation, Unit("", "")
+        return tuple(_nuisance(f"mass of load {name}", 1.0, width, unit) for name in names)
 
     @cached_property
     def _of_recordings(self) -> tuple[Unknown, ...]:
@@ -207,19 +232,19 @@ class RecordModel(BlockModel):
             np.stack([self._columns[key] for key in self._keys(block.load, pair, point)], axis=1)
             for pair in block.pairs
         ]
-        return mean_of(np.stack(each)) * self._sensors_at(point)[:, 0]
+        return mean_of(np.stack(each)) * self.sensors_at(point)[:, 0]
 
-    def _sensors_at(self, point: FloatArray) -> FloatArray:
-        """Return gain and both angles of each sensor at a point (k, 3)."""
+    def sensors_at(self, point: FloatArray) -> FloatArray:
+        """Return gain, both angles, and by what the place is off, of each sensor (k, 3 or 6)."""
         count = len(self.free.unknowns)
-        return point[count : count + 3 * len(self.sensors)].reshape(-1, 3)
+        return point[count : count + len(self._of_sensors)].reshape(len(self.sensors), -1)
 
     def _keys(self, load: RecordedLoad, pair: Pair, point: FloatArray) -> list[ColumnKey]:
         """Return what determines the signal of each sensor of a recording at a point."""
         run = self._key(load, pair, point)
         offset, rate = self._of(pair, point)[:2].tolist()
-        tilts = self._sensors_at(point)[:, 1:].tolist()
-        return [(id(pair), run, k, offset, rate, *tilt) for k, tilt in enumerate(tilts)]
+        off = self.sensors_at(point)[:, 1:].tolist()
+        return [(id(pair), run, k, offset, rate, tuple(each)) for k, each in enumerate(off)]
 
     def _reduce(self, load: RecordedLoad, pair: Pair, points: FloatArray) -> None:
         """Keep what is fitted of the signals of a recording at points, all new ones at once."""
@@ -229,8 +254,8 @@ class RecordModel(BlockModel):
             return
         time = pair.run.time.values
         columns = []
-        for _, run, k, offset, rate, *tilt in new:
-            signal = self._runs[run][:, k] @ np.array([1.0, *tilt])
+        for _, run, k, offset, rate, off in new:
+            signal = self._runs[run][:, k] @ np.array([1.0, *off])
             if offset or rate:
                 moved = time + offset + rate * (time - 0.5 * time[-1])
                 signal = CubicSpline(time, signal)(np.clip(moved, time[0], time[-1]))
@@ -247,7 +272,11 @@ class RecordModel(BlockModel):
         """Return what determines the run of a recording at a point."""
         numbers = point[: len(self.free.unknowns)].tobytes()
         angle = float(self._of(pair, point)[2]) if self.by == "history" else 0.0
-        return numbers, load.name, profile_of(pair.run), angle
+        factor = 1.0
+        if self._of_loads:
+            first = len(self.free.unknowns) + len(self._of_sensors)
+            factor = float(point[first + self.loads.index(load)])
+        return numbers, load.name, profile_of(pair.run), angle, factor
 
     def _run(self, points: FloatArray) -> None:
         """Run what is not kept of points, and keep the signals (n, k, 3), NaN of failed runs."""
@@ -264,28 +293,56 @@ class RecordModel(BlockModel):
         for key, (load, pair, point) in needed.items():
             if key in self._runs:
                 continue
-            self._runs[key] = np.full((len(pair.run.time), len(self.sensors), 3), np.nan)
+            self._runs[key] = np.full(
+                (len(pair.run.time), len(self.sensors), 6 if self.has_places else 3), np.nan
+            )
             try:
                 machine = self.free.parameters_at(point[: len(self.free.unknowns)])
             except InputError:
                 continue
             if self.experiment.can_run(machine):
-                turned = turned_load(load.load_at(machine), key[-1])
+                turned = scaled_load(turned_load(load.load_at(machine), key[3]), key[4])
                 cases[key] = Case(load.name, turned, profile_of(pair.run), parameters=machine)
         keys = list(cases)
 
         def keep(number: int, record: Record) -> None:
             if not why_diverged(record):
-                self._runs[keys[number]] = turned_signals(record, self.sensors, self.points)
+                self._runs[keys[number]] = self._signals(record)
 
         if cases:
             self.experiment.record(self.experiment.machine, list(cases.values()), keep, "records")
+
+    def _signals(self, record: Record) -> FloatArray:
+        """Return signals of a run and their derivatives by angles and places. (n, k, 3 or 6)"""
+        signals = turned_signals(record, self.sensors, self.points)
+        parts = [signals]
+        for step in PLACE_STEP * np.eye(3) if self.has_places else ():
+            moved = {name: point + step for name, point in self.points.items()}
+            of_moved = turned_signals(record, self.sensors, moved)
+            parts.append((of_moved[:, :, :1] - signals[:, :, :1]) / PLACE_STEP)
+        return np.concatenate(parts, axis=2)
 
 
 def _nuisance(name: str, expected: float, deviation: float, unit: Unit) -> Unknown:
     reach = REACH * deviation
     prior = (expected, deviation)
     return Unknown(name, expected - reach, expected + reach, unit, prior=prior)
+
+
+def scaled_load(load: Load, factor: float) -> Load:
+    """Return a load whose masses and moments are larger by a factor."""
+    if factor == 1.0:
+        return load
+
+    def scaled(part: Any) -> Any:
+        name = "mass" if isinstance(part, Unbalance) else "moment"
+        return part.model_copy(update={name: factor * getattr(part, name)}) if part else None
+
+    return Load(
+        unbalances=tuple(map(scaled, load.unbalances)),
+        static=scaled(load.static),
+        couple=scaled(load.couple),
+    )
 
 
 def turned_load(load: Load, angle: float) -> Load:

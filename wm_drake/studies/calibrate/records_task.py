@@ -1,6 +1,7 @@
 """Check the options of a fit to recordings, and run it."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,11 +17,14 @@ from wm_drake.studies.calibrate.options import CalibrateOptions
 from wm_drake.studies.calibrate.parameter_map import read_parameter_map
 from wm_drake.studies.calibrate.recorded import RecordedLoad, without_edges
 from wm_drake.studies.calibrate.records import RecordModel
+from wm_drake.studies.calibrate.test_file import calibrated_test, clock_remarks, test_text
 from wm_drake.studies.compare.pairs import QUANTITIES
+from wm_drake.studies.compare.recordings import check_distinct
 from wm_drake.studies.compare.task import CompareTask
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.experiment import Experiment, record_here
 from wm_drake.studies.fitting.sought import SoughtNumbers, sought_in
+from wm_drake.studies.health import health_part
 from wm_drake.studies.study import Task
 
 OF_TARGETS = ("targets", "deviation", "weight", "limit", "leave_out")
@@ -62,6 +66,7 @@ class CalibrateRecordsTask(Task):
             CompareTask(options.model_copy(update={"records": files, "load": load}), machine)
             for load, files in _by_load(options).items()
         ]
+        check_distinct([recording for test in self.tests for recording in test.recordings])
 
     @property
     def identity(self) -> Mapping[str, Any]:
@@ -70,6 +75,7 @@ class CalibrateRecordsTask(Task):
         return {
             "records": [str(path) for path in options.records],
             "unknowns": self.free.unknowns,
+            "test": self.tests[0].test.model_dump_json(),
             "fitted": f"{options.by}, seed {options.seed}",
         }
 
@@ -81,16 +87,21 @@ class CalibrateRecordsTask(Task):
         ]
         model = record_model(executor, self.free, self.tests, loads, self.options.by)
         title = f"Machine {self.machine.parameters.name} calibrated to records"
-        return fitted_answer(executor, model, self.options.seed, (title, "calibrated"))
+        return fitted_answer(executor, model, self.options.seed, (title, "calibrated"), self.tests)
 
 
 def fitted_answer(
-    executor: Executor, model: RecordModel, seed: int, words: tuple[str, str]
+    executor: Executor,
+    model: RecordModel,
+    seed: int,
+    words: tuple[str, str],
+    tests: Sequence[CompareTask],
 ) -> Answer:
     """Fit a model to its recordings, and return the answer.
 
     Args:
         words: Title of the page, and name of the file of the machine with the values found.
+        tests: Of the recordings.
     """
     with executor.fraction("search") as report:
         fit, data = calibrated(model, seed, lambda fraction, least: report(fraction))
@@ -110,7 +121,12 @@ def fitted_answer(
         names = [n for n, sensor in model.sensors.items() if sensor.quantity == quantity.words]
         if names:
             parts.append(compared(data.sel(sensor=names), quantity, fitted))
-    return fit_answer(model, fit, data, texts, parts)
+    parts.append(health_part({p.recording.path.name: p.recording.findings for p in model.pairs}))
+    answer = fit_answer(model, fit, data, texts, parts)
+    calibrated_sensors = calibrated_test(model, fit, tests[0].test)
+    name, text = f"{words[1]}_test.yaml", test_text(calibrated_sensors, clock_remarks(model, fit))
+    warnings = [warning for test in tests for warning in test.warnings]
+    return replace(answer, files={**answer.files, name: text}, warned=(*warnings, *answer.warned))
 
 
 def recorded_load(test: CompareTask, executor: Executor, load_at: Any) -> RecordedLoad:
@@ -144,9 +160,11 @@ def record_model(
                 where="RECORD",
             )
     record = partial(record_here, workers=executor.workers)  # records are used at once
-    experiment = Experiment(tests[0].machine, (), record=record)
-    sensors, points = tests[0].sensors, tests[0].points
-    return RecordModel(experiment, free, sensors, tuple(loads), points, by, executor.ledger)
+    first, ledger = tests[0], executor.ledger
+    experiment, deviation = Experiment(first.machine, (), record=record), first.test.load_deviation
+    return RecordModel(
+        experiment, free, first.sensors, tuple(loads), first.points, by, ledger, deviation
+    )
 
 
 def _by_load(options: CalibrateOptions) -> dict[str | None, tuple[Path, ...]]:

@@ -1,17 +1,18 @@
 """Check that recordings show the drum, and are like what their sensors should record."""
 
-from collections.abc import Mapping, Sequence
-
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 from scipy.stats import beta
 
 from wm_drake.errors import input_error
-from wm_drake.parameters.recorded_sensors import RecordedSensor
 from wm_drake.parameters.types import FloatArray
-from wm_drake.report.quantity import SHARE
+from wm_drake.report.quantity import SHARE, SPEED
 from wm_drake.simulation.band import HIGHEST_PART
 from wm_drake.simulation.orders import REVOLUTIONS, order_vectors
-from wm_drake.studies.compare.pairs import QUANTITIES, Pair, order_one
+from wm_drake.simulation.records import profile_of
+from wm_drake.studies.compare.diagnosis import Diagnosis
+from wm_drake.studies.compare.pairs import OFFSET, Pair, order_one
+from wm_drake.studies.compare.recordings import TestRecording
 
 FALSE_ALARM = 1e-4
 """Probability that a record of noise alone passes; about twice that if its signals align its clock,
@@ -21,25 +22,23 @@ NEIGHBOURS = (1.0 - 3.0 / REVOLUTIONS, 1.0 + 3.0 / REVOLUTIONS)
 """Orders on both sides of 1 that a Blackman window of `REVOLUTIONS` just separates from it."""
 
 
-REVERSED = -0.5
-"""Correlation of order 1 below which a sensor is taken to have the other sign."""
+CONTRADICTION = 0.05
+"""Largest misfit of a recorded drum speed, by the highest speed of the profile."""
+
+RATIOS = (1.0, 1 / 4, 1 / 3, 1 / 2, 2 / 3, 3 / 2, 2.0, 3.0, 4.0)
+"""Ratios of the true drum speed to the recorded one that are tried."""
+
+UPSIDE_DOWN = 1.5
+"""Difference of a mean, by gravity, above which gravity has the other sign: 2, not 1 or 0."""
+
+LARGER = 2.0
+"""Smallest ratio of the amplitude of another order to that of order 1 that tells another ratio."""
 
 LEAST_CORRELATION = 0.2
 """Largest correlation of signals that have nothing in common: an assumption."""
 
 
-def check_pair(pair: Pair, sensors: Mapping[str, RecordedSensor]) -> None:
-    """Check that a recording shows the turning drum, and is like its prediction.
-
-    Raises:
-        InputError: its signals are noise, a sensor has the other sign, or none is like its
-            prediction.
-    """
-    _check_order_one(pair)
-    _check_signs(pair, sensors)
-
-
-def _check_order_one(pair: Pair) -> None:
+def check_pair(pair: Pair) -> None:
     """Check that order 1 of a sensor stands out of the noise.
 
     Raises:
@@ -60,10 +59,67 @@ def _check_order_one(pair: Pair) -> None:
     raise input_error(
         f"no sensor shows the turning drum above noise: order 1 has {SHARE.text(shares[best])} of "
         f"the power of orders 1, {orders} in {list(pair.recording.channels.values)[best]}, and "
-        f"noise up to {SHARE.text(limits[best])}; a sensor needs more. Are channels, profile and "
-        "load those of the test?",
+        f"noise up to {SHARE.text(limits[best])}; a sensor needs more",
         where=str(pair.recording.path),
     )
+
+
+def check_orders(recording: TestRecording) -> None:
+    """Check that the sensors vibrate with the recorded drum speed, not with a multiple of it.
+
+    The amplitudes of other orders of the recorded speed are compared with those of order 1.
+
+    Raises:
+        InputError: most sensors have one other order that is far larger.
+    """
+    speed, time = recording.speed, recording.channels.time
+    if speed is None or recording.about is None or not np.isfinite(speed).any():
+        return
+    known = np.isfinite(speed)
+    angle = cumulative_trapezoid(np.interp(time, time[known], np.abs(speed[known])), time)
+    values = np.stack([*recording.channels.values.values()], axis=1)
+    values = np.where(known[:, None], values, np.nan)
+    vectors = order_vectors(values, np.append(0.0, angle), time, np.array(RATIOS))
+    powers = np.nan_to_num(np.abs(vectors.values) ** 2).sum(axis=0)  # order, sensor
+    best = np.argmax(powers, axis=0)
+    order = int(np.bincount(best).argmax())
+    is_larger = powers[order] > LARGER**2 * powers[0]
+    if RATIOS[order] != 1.0 and np.mean((best == order) & is_larger) > 0.5:
+        about = recording.about
+        raise input_error(
+            f"the sensors vibrate with {RATIOS[order]:.3g} times the recorded drum speed, in which "
+            f"order 1 is smaller by a factor of {LARGER:g} or more: the tacho has another ratio; "
+            f"with ratio: {about.ratio / RATIOS[order]:.4g} both agree",
+            where=str(recording.path),
+            key=about.channel,
+        )
+
+
+def check_speed(pair: Pair) -> None:
+    """Check that a recorded speed is that of the run.
+
+    Raises:
+        InputError: it is not; the message says whether the sensors turn with it.
+    """
+    speed, run = pair.speed, pair.run
+    if speed is None:
+        return
+    at = pair.alignment.of_run(pair.recording.channels.time)
+    inside = np.isfinite(speed) & (at >= 0.0) & (at <= float(run.time[-1]))
+    profile = profile_of(run)
+    misfit = profile.highest_speed
+    if inside.any():
+        of_run = np.interp(at[inside], run.time.values, np.abs(run.drum_speed.values))
+        misfit = float(np.sqrt(np.mean((np.abs(speed[inside]) - of_run) ** 2)))
+    if misfit > CONTRADICTION * profile.highest_speed:
+        raise input_error(
+            f"the recorded drum speed contradicts the profile: at the best offset of the clock, "
+            f"{OFFSET.text(pair.alignment.offset)}, they differ by {SPEED.text(misfit)} (RMS). The "
+            "sensors vibrate with the recorded speed, so the profile is that of another run: name "
+            "the right one (--profile), or drive the model with the recorded speed (--speed "
+            "measured)",
+            where=str(pair.recording.path),
+        )
 
 
 def shares_of_order_one(pair: Pair) -> tuple[FloatArray, np.ndarray]:
@@ -110,68 +166,19 @@ def largest_share_of_noise(count: np.ndarray, probability: float) -> FloatArray:
     return np.asarray(beta.isf(probability, size / 3.0, 2.0 * size / 3.0))
 
 
-def _check_signs(pair: Pair, sensors: Mapping[str, RecordedSensor]) -> None:
-    """Check that no sensor has the other sign, and that the signals have something in common.
-
-    Signs are told by the correlations of order 1, or by gravity. The angle of the drum at the start
-    is unknown, so a single sensor without gravity can have either sign.
+def judged(diagnosis: Diagnosis, pair: Pair) -> str:
+    """Return a sentence on a recording that is not like its prediction; "" if it is.
 
     Raises:
-        InputError: a sensor has the other sign, or no signal is like its prediction.
+        InputError: its vibrations are not, and a cause explains it; or no sensor is like its
+            prediction at all.
     """
-    path = str(pair.recording.path)
-    correlations = order_one(pair).correlation
-    for name, sensor in sensors.items():
-        k = list(sensors).index(name)
-        if _has_opposite_gravity(pair, sensor, k):
-            raise _reversed(path, name, "its mean has the other sign than gravity")
-        value = float(correlations.sel(sensor=name))
-        if value < REVERSED:
-            text = f"its order 1 has the correlation {value:.2f} with the prediction"
-            raise _reversed(path, name, text)
-    if len(sensors) and float(np.abs(correlations).max()) < LEAST_CORRELATION:
-        raise input_error(
-            f"no signal is like its prediction: the largest correlation of order 1 is "
-            f"{float(np.abs(correlations).max()):.2f}; is it the load, the profile and the machine "
-            "of the test? A channel of the drum speed would align it",
-            where=path,
-        )
-
-
-LEAST_GRAVITY = 3.0
-"""Smallest mean of an accelerometer that tells its sign. [m/s^2]"""
-
-
-def _has_opposite_gravity(pair: Pair, sensor: RecordedSensor, k: int) -> bool:
-    if not sensor.shows_gravity:
-        return False
-    measured, predicted = (float(np.nanmean(signal[:, k])) for signal in pair.both)
-    return measured * predicted < 0.0 and min(abs(measured), abs(predicted)) > LEAST_GRAVITY
-
-
-def _reversed(path: str, name: str, why: str) -> Exception:
-    return input_error(
-        f"has the other sign than its sensor is declared with: {why}; turn its axis, or set "
-        "polarity (negative for a signal of the other sign)",
-        where=path,
-        key=name,
-    )
-
-
-def gravity_warnings(pairs: Sequence[Pair], sensors: Mapping[str, RecordedSensor]) -> list[str]:
-    """Return a warning of each accelerometer that does not show the gravity that it should."""
-    warnings = []
-    for k, (name, sensor) in enumerate(sensors.items()):
-        if not sensor.shows_gravity:
-            continue
-        measured, predicted = (
-            float(np.mean([np.nanmean(pair.both[side][:, k]) for pair in pairs])) for side in (0, 1)
-        )
-        unit = QUANTITIES["acceleration"]
-        if abs(measured - predicted) > 1.0:
-            warnings.append(
-                f"{name}: its mean is {unit.text(measured)}, with gravity it would be "
-                f"{unit.text(predicted)}. If it is AC-coupled or without gravity, say so: "
-                "ac_coupling, or gravity: removed."
-            )
-    return warnings
+    if not (diagnosis.unlike or diagnosis.shifted):
+        return ""
+    path = pair.recording.path
+    is_upside_down = max(diagnosis.means.values(), default=0.0) > UPSIDE_DOWN
+    if (diagnosis.unlike or is_upside_down) and diagnosis.explanations:
+        raise input_error(diagnosis.text, where=str(path))
+    if float(np.abs(order_one(pair).correlation.values).max(initial=0.0)) < LEAST_CORRELATION:
+        raise input_error(f"no signal is like its prediction; it {diagnosis.text}", where=str(path))
+    return f"{path.name} {diagnosis.text}."

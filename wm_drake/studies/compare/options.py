@@ -32,7 +32,9 @@ class CompareOptions(Options):
         "NAME",
     )
     unit: tuple[str, ...] = option(
-        (), "Unit of a channel whose file has none: 'Acc 1=g'. Repeatable.", "NAME=UNIT"
+        (),
+        "Unit of a channel whose file has none: 'Acc 1=g', or of all: g. Repeatable.",
+        "NAME=UNIT",
     )
     channels: str | None = option(
         None,

@@ -16,7 +16,6 @@ from wm_drake.simulation.displacements import band_of
 from wm_drake.simulation.netcdf import netcdf_bytes
 from wm_drake.studies.answer import Answer, Part, Plot, pictures_first
 from wm_drake.studies.compare.agreement import agreement_of
-from wm_drake.studies.compare.checks import gravity_warnings
 from wm_drake.studies.compare.pairs import QUANTITIES, Pair
 from wm_drake.studies.compare.signals import places_of, repeats_of
 from wm_drake.studies.compare.study import (
@@ -31,6 +30,7 @@ from wm_drake.studies.compare.study import (
     regions_of,
     sensors_of,
 )
+from wm_drake.studies.health import health_part
 
 NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 
@@ -62,7 +62,8 @@ def compare_answer(
         parts.append(_gaps(gaps))
     if any(sensor.quantity == "acceleration" for sensor in sensors.values()):
         parts.append(_integrated(integrated_of(repeats, sensors, pairs)))
-    parts += [_clocks(pairs), _declared(sensors)]
+    findings = {pair.recording.path.name: pair.recording.findings for pair in pairs}
+    parts += [_clocks(pairs), health_part(findings), _declared(sensors)]
     low, high = band_of(pairs[0].run)
     records = ", ".join(pair.recording.path.name for pair in pairs)
     return Answer(
@@ -73,7 +74,6 @@ def compare_answer(
         (("Records", records), *details, ("Pass band", f"{low:g} to {high:.3g} Hz")),
         METHOD,
         files={"signals.nc": netcdf_bytes(_signals(pairs, sensors))},
-        warned=tuple(gravity_warnings(pairs, sensors)),
     )
 
 

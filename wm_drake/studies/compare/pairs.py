@@ -8,7 +8,7 @@ import xarray as xr
 
 from wm_drake.errors import input_error
 from wm_drake.parameters import SpinProfile
-from wm_drake.parameters.recorded_sensors import RecordedSensor, RecordedTest
+from wm_drake.parameters.recorded_sensors import RecordedSensor
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.report.quantity import SPEED, TIME, Quantity
@@ -21,11 +21,8 @@ from wm_drake.simulation.alignment import (
     vectors_of_order_one,
 )
 from wm_drake.simulation.recorded_signal import recorded_signal
-from wm_drake.simulation.records import Record, profile_of
-from wm_drake.studies.compare.recordings import TestRecording, pulse_angle, speed_of_pulses
-
-CONTRADICTION = 0.05
-"""Largest misfit of a recorded drum speed, by the highest speed of the profile."""
+from wm_drake.simulation.records import Record
+from wm_drake.studies.compare.recordings import TestRecording, pulse_angle
 
 SPEED_STEP = 0.25
 """Time between the points of a measured profile. [s]"""
@@ -81,17 +78,10 @@ def predicted_signals(
     return np.stack(columns, axis=1)
 
 
-def paired(
-    recording: TestRecording, run: Record, predicted: FloatArray, test: RecordedTest
-) -> Pair:
-    """Return a recording on the times of a run.
-
-    Raises:
-        InputError: its speed, or its signals without one, contradict the run.
-    """
-    speed = recorded_speed(recording, test)
-    alignment = _alignment(recording, run, predicted, test)
-    return replace(pair_at(recording, run, predicted, alignment), speed=speed)
+def paired(recording: TestRecording, run: Record, predicted: FloatArray) -> Pair:
+    """Return a recording on the times of a run."""
+    alignment = _alignment(recording, run, predicted)
+    return replace(pair_at(recording, run, predicted, alignment), speed=recording.speed)
 
 
 def pair_at(
@@ -103,51 +93,14 @@ def pair_at(
     return Pair(recording, run, alignment, measured, predicted)
 
 
-def recorded_speed(recording: TestRecording, test: RecordedTest) -> FloatArray | None:
-    """Return the recorded drum speed at the samples of a recording. (n,) [rad/s]"""
-    if recording.pulses is not None and test.speed is not None:
-        return speed_of_pulses(recording, test.speed)
-    return recording.speed
-
-
-def _alignment(
-    recording: TestRecording, run: Record, predicted: FloatArray, test: RecordedTest
-) -> Alignment:
-    time, speed = recording.channels.time, recorded_speed(recording, test)
+def _alignment(recording: TestRecording, run: Record, predicted: FloatArray) -> Alignment:
+    time, speed = recording.channels.time, recording.speed
     if speed is None:
         values = np.stack([*recording.channels.values.values()], axis=1)
         return align_signals(time, values, predicted, run)
-    if recording.pulses is not None and test.speed is not None:
-        result = align_pulses(recording.pulses, pulse_angle(test.speed), run)
-    else:
-        result = align_speed(time, speed, run)
-    _check_speed(recording, speed, run, result)
-    return result
-
-
-def _check_speed(
-    recording: TestRecording, speed: FloatArray, run: Record, alignment: Alignment
-) -> None:
-    """Check that a recorded speed is that of the run.
-
-    Raises:
-        InputError: it is not.
-    """
-    at = alignment.of_run(recording.channels.time)
-    inside = np.isfinite(speed) & (at >= 0.0) & (at <= float(run.time[-1]))
-    profile = profile_of(run)
-    if not inside.any():
-        misfit = profile.highest_speed
-    else:
-        of_run = np.interp(at[inside], run.time.values, np.abs(run.drum_speed.values))
-        misfit = float(np.sqrt(np.mean((np.abs(speed[inside]) - of_run) ** 2)))
-    if misfit > CONTRADICTION * profile.highest_speed:
-        raise input_error(
-            f"the recorded drum speed contradicts the profile: at the best offset of the clock, "
-            f"{OFFSET.text(alignment.offset)}, they differ by {SPEED.text(misfit)} (RMS); drive "
-            "the model with the recorded speed (--speed measured), or name its profile (--profile)",
-            where=str(recording.path),
-        )
+    if recording.pulses is not None and recording.about is not None:
+        return align_pulses(recording.pulses, pulse_angle(recording.about), run)
+    return align_speed(time, speed, run)
 
 
 def measured_profile(recording: TestRecording, speed: FloatArray) -> tuple[SpinProfile, Alignment]:

@@ -16,15 +16,20 @@ from wm_drake.parameters.recorded import (
     Synchronous,
     read_recording,
 )
-from wm_drake.parameters.recorded.clock import HOLE, notice
+from wm_drake.parameters.recorded.clock import notice
+from wm_drake.parameters.recorded.health import Finding
+from wm_drake.parameters.recorded.pulses import LEAST_PULSES, Pulses, counted, rises
+from wm_drake.parameters.recorded.stamps import HOLE
 from wm_drake.parameters.recorded_sensors import RecordedSensor, RecordedTest, SpeedChannel
 from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import Unit, factor_of
 
 LEAST_SAMPLES = 200
 """Smallest number of samples of a recording."""
 
-LEAST_PULSES = 20
-"""Smallest number of pulses of a tacho that tell a speed."""
+MATCHED, COPIED = 100, 0.3
+"""Samples of a record that are looked for in another one, and largest RMS difference of a copy, by
+the noise of its samples; that of two repeats is at least 1.4."""
 
 ROUNDED = 1.0
 """Largest distance of time stamps from a straight line, in steps, of a clock that rounds them."""
@@ -37,12 +42,16 @@ class TestRecording:
     Attributes:
         channels: Signals of the sensors by name, in SI units of what each measures.
         speed: Drum speed on the same clock (n,), NaN where there is none; None without one. [rad/s]
-        pulses: Times of the pulses of a tacho (k,), on the same clock; None without one. [s]
+        pulses: Pulses of a tacho, on the same clock; None without one.
+        about: What is known of the speed; None without one.
+        findings: What the checks of their health found.
     """
 
     channels: Synchronous
     speed: FloatArray | None = None
-    pulses: FloatArray | None = None
+    pulses: Pulses | None = None
+    about: SpeedChannel | None = None
+    findings: tuple[Finding, ...] = ()
 
     @property
     def path(self) -> Path:
@@ -50,8 +59,14 @@ class TestRecording:
         return self.channels.path
 
 
-def read_test(path: Path, test: RecordedTest, names: ChannelNames) -> TestRecording:
+def read_test(
+    path: Path, test: RecordedTest, names: ChannelNames, unit: str, duration: float
+) -> TestRecording:
     """Read the channels of the sensors of a test.
+
+    Args:
+        unit: Unit of channels without one, of sensors that it fits; "" for none.
+        duration: Duration of the profile. [s]
 
     Raises:
         InputError: no sensor of the test has a channel, a channel has no value, or the file cannot
@@ -60,24 +75,42 @@ def read_test(path: Path, test: RecordedTest, names: ChannelNames) -> TestRecord
     recording = read_recording(path, names)
     used = _sensor_channels(recording, test)
     uses = {
-        name: ChannelUse(signal, test.sensors[name].signal_unit, test.sensors[name].unit)
+        name: ChannelUse(
+            signal,
+            s.signal_unit,
+            s.unit or (unit if fits(unit, s.signal_unit) else ""),
+            kind="vibration",
+        )
         for name, signal in used.items()
+        for s in (test.sensors[name],)
     }
     about = test.speed or _named_speed(recording)
     shaft = None if about is None else recording.chosen(names.channels.get("speed", about.channel))
     if about is not None and shaft is not None and about.kind == "speed":
-        uses["speed"] = ChannelUse(shaft, SPEED, about.unit, is_main=False)
-    channels = _with_even_stamps(recording.synchronous(uses))
-    values = dict(channels.values)
+        uses["speed"] = ChannelUse(shaft, SPEED, about.unit, is_main=False, kind="speed")
+    channels = _with_even_stamps(recording.synchronous(uses, duration=duration))
+    values, findings = dict(channels.values), channels.findings
     speed = values.pop("speed", None)
     channels = replace(channels, values=values)
     _check_values(channels, used)
-    pulses = None
-    if about is not None and shaft is not None and about.kind == "pulses":
-        pulses = _pulses(recording, shaft) + _later(shaft, [*used.values()])
-    if speed is not None and about is not None:
-        speed = speed / about.ratio
-    return TestRecording(channels, speed, pulses)
+    if about is None or shaft is None:
+        return TestRecording(channels, findings=findings)
+    if about.kind == "speed":
+        assert speed is not None
+        return TestRecording(channels, speed / about.ratio, None, about, findings)
+    pulses, irregular = _pulses(recording, shaft)
+    pulses = replace(pulses, times=pulses.times + _later(shaft, [*used.values()]))
+    speed = pulse_angle(about) * pulses.speed(channels.time)
+    return TestRecording(channels, speed, pulses, about, (*findings, *irregular))
+
+
+def fits(text: str, unit: Unit) -> bool:
+    """Return whether a unit, as instruments write it, measures what another one does."""
+    try:
+        factor_of(text, unit)
+    except ValueError:
+        return False
+    return bool(text)
 
 
 def _sensor_channels(recording: Recording, test: RecordedTest) -> dict[str, Signal]:
@@ -146,29 +179,21 @@ def _with_even_stamps(channels: Synchronous) -> Synchronous:
     return replace(channels, time=line)
 
 
-def _pulses(recording: Recording, shaft: Signal) -> FloatArray:
-    """Return the times of rises through the middle of a signal, after its own start. [s]"""
-    path = recording.path
-    uses = {"pulses": ChannelUse(shaft, None)}
-    channels = recording.synchronous(uses)
-    values, time = channels.values["pulses"], channels.time
-    valid = np.isfinite(values)
-    low, high = np.percentile(values[valid], (1.0, 99.0)) if valid.any() else (0.0, 0.0)
-    if valid.any() and np.max(values[valid]) - low > 3.0 * (high - low):  # short pulses
-        high = float(np.max(values[valid]))
-    middle, quarter = 0.5 * (low + high), 0.25 * (high - low)
-    states = np.where(values > middle + quarter, 1, np.where(values < middle - quarter, -1, 0))
-    known = np.flatnonzero((states != 0) & valid)
-    rises = known[1:][(states[known[1:]] > 0) & (states[known[:-1]] < 0)]
-    before = known[:-1][(states[known[1:]] > 0) & (states[known[:-1]] < 0)]
-    if len(rises) < LEAST_PULSES:
+def _pulses(recording: Recording, shaft: Signal) -> tuple[Pulses, tuple[Finding, ...]]:
+    """Return the pulses of a tacho after its own start, and what is irregular in them."""
+    channels = recording.synchronous({"pulses": ChannelUse(shaft, None, kind="pulses")})
+    times = rises(channels.time, channels.values["pulses"])
+    if len(times) < LEAST_PULSES:
         raise input_error(
-            f"has {len(rises)} pulses; at least {LEAST_PULSES} are needed for a speed",
-            where=str(path),
+            f"has {len(times)} pulses; at least {LEAST_PULSES} are needed for a speed",
+            where=str(recording.path),
             key=shaft.name,
         )
-    part = (middle - values[before]) / (values[rises] - values[before])
-    return np.asarray(time[before] + part * (time[rises] - time[before]))
+    resolution = float(np.median(np.diff(channels.time)))
+    pulses, findings = counted(times, shaft.name, resolution)
+    for finding in findings:
+        notice(recording.path, str(finding), finding.channel)
+    return pulses, (*channels.findings, *findings)
 
 
 def _later(shaft: Signal, others: Sequence[Signal]) -> float:
@@ -179,18 +204,44 @@ def _later(shaft: Signal, others: Sequence[Signal]) -> float:
     return 1e-9 * (shaft.start - min(starts))
 
 
-def speed_of_pulses(recording: TestRecording, about: SpeedChannel) -> FloatArray:
-    """Return the drum speed of the pulses at the samples of a recording. (n,) [rad/s]"""
-    assert recording.pulses is not None
-    times = recording.pulses
-    between = 0.5 * (times[1:] + times[:-1])
-    speed = pulse_angle(about) / np.diff(times)
-    return np.interp(recording.channels.time, between, speed, left=np.nan, right=np.nan)
-
-
 def pulse_angle(about: SpeedChannel) -> float:
     """Return the angle of the drum between two pulses. [rad]"""
     return 2.0 * np.pi / (about.pulses_per_turn * about.ratio)
+
+
+def check_distinct(recordings: Sequence[TestRecording]) -> None:
+    """Check that no recording is a copy of another one, with other stamps, name or length.
+
+    Repeats have noise of their own: the difference of two is larger than their noise. A copy has
+    none but what was rounded.
+
+    Raises:
+        InputError: two have the same samples.
+    """
+    for number, one in enumerate(recordings):
+        for other in recordings[:number]:
+            names = [name for name in one.channels.values if name in other.channels.values]
+            pairs = [(one.channels.values[n], other.channels.values[n]) for n in names]
+            if pairs and all(_is_copy(a, b) for a, b in pairs):
+                raise input_error(
+                    f"has the same samples as {other.path}; a copy is no repeat, and tells nothing "
+                    "of the scatter: give it once",
+                    where=str(one.path),
+                )
+
+
+def _is_copy(a: FloatArray, b: FloatArray) -> bool:
+    """Return whether two signals have the same samples where they overlap best."""
+    short, long = sorted((a[np.isfinite(a)], b[np.isfinite(b)]), key=len)
+    noise = float(np.std(np.diff(short, 4))) / np.sqrt(70.0) if len(short) > 8 else 0.0
+    if not noise:
+        return False
+    block = short[len(short) // 3 : len(short) // 3 + MATCHED]
+    if len(block) < MATCHED or len(long) < MATCHED:
+        return False
+    windows = np.lib.stride_tricks.sliding_window_view(long, MATCHED)
+    least = np.min(np.mean((windows - block) ** 2, axis=1))
+    return bool(np.sqrt(least) < COPIED * noise)
 
 
 def used_sensors(

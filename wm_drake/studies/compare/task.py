@@ -20,9 +20,10 @@ from wm_drake.parameters.recorded_sensors import (
 )
 from wm_drake.parameters.types import FloatArray
 from wm_drake.simulation.cases import Case
-from wm_drake.simulation.records import Record, why_diverged
+from wm_drake.simulation.records import Record, profile_of, why_diverged
 from wm_drake.studies.answer import Answer
-from wm_drake.studies.compare.checks import check_pair
+from wm_drake.studies.compare.checks import check_orders, check_pair, check_speed, judged
+from wm_drake.studies.compare.diagnosis import Diagnosis, Suspect, diagnosed
 from wm_drake.studies.compare.gaps import gaps_of
 from wm_drake.studies.compare.options import CompareOptions
 from wm_drake.studies.compare.page import compare_answer
@@ -32,17 +33,30 @@ from wm_drake.studies.compare.pairs import (
     pair_at,
     paired,
     predicted_signals,
-    recorded_speed,
     speed_of_order_one,
 )
-from wm_drake.studies.compare.recordings import TestRecording, read_test, used_sensors
+from wm_drake.studies.compare.recordings import (
+    TestRecording,
+    check_distinct,
+    read_test,
+    used_sensors,
+)
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import channel_names, existing_file, problems_of_file, selected_cases
 from wm_drake.studies.study import Task
 
+MOST_LOADS = 8
+"""Most loads of a machine that are tried where a recording is not like its prediction."""
+
 
 class CompareTask(Task):
-    """The comparison with checked options."""
+    """The comparison with checked options.
+
+    Attributes:
+        warnings: Sentences on recordings that are not like their predictions.
+    """
+
+    warnings: tuple[str, ...] = ()
 
     def __init__(self, options: CompareOptions, machine: Machine, case: Case | None = None) -> None:
         """Read test, recordings, load and profile.
@@ -63,12 +77,17 @@ class CompareTask(Task):
         with problems_of_file(options.test or Path("--machine")):
             self.points = sensor_points(machine, self.test)
         self.case = case or self._case()
-        names, _ = channel_names(options, ("time", "speed", *self.test.sensors))
+        names, unit = channel_names(options, ("time", "speed", *self.test.sensors))
         paths = [existing_file(path, "RECORD") for path in options.records]
         for path in paths:
             if paths.count(path) > 1:
                 raise input_error(f"'{path}' is given twice", where="RECORD")
-        recordings = [read_test(path, self.test, names) for path in paths]
+        recordings = [
+            read_test(path, self.test, names, unit, self.case.profile.duration) for path in paths
+        ]
+        check_distinct(recordings)
+        for recording in recordings:
+            check_orders(recording)
         self.sensors = used_sensors(recordings, self.test)
         self.recordings = [_of_sensors(recording, self.sensors) for recording in recordings]
 
@@ -91,26 +110,56 @@ class CompareTask(Task):
         gaps = gaps_of(pairs, self.sensors, self.points, Scene(self.machine.parameters))
         driven = "that of the profile" if self.options.speed == "profile" else "recorded"
         details = (("Load", self.case.name), ("Drum speed of the model", driven))
-        return compare_answer(self.machine.parameters, pairs, self.sensors, gaps, details)
+        answer = compare_answer(self.machine.parameters, pairs, self.sensors, gaps, details)
+        return replace(answer, warned=self.warnings)
 
     def pairs(self, executor: Executor) -> list[Pair]:
         """Run the machine, and return the recordings on the times of the runs.
 
         Raises:
-            InputError: a recording contradicts its run, or shows nothing of it; see `check_pair`.
+            InputError: a recording contradicts its run, shows nothing of it, or a discrete cause
+                explains why it is not like its prediction; see `wm_drake.studies.compare.checks`.
         """
         pairs = self._pairs(executor)
         for pair in pairs:
-            check_pair(pair, self.sensors)
+            if self.options.speed == "profile":
+                check_speed(pair)
+            check_pair(pair)
+        said = [judged(self.diagnosis(executor, pair), pair) for pair in pairs]
+        self.warnings = tuple(filter(None, said))
         return pairs
 
+    def diagnosis(self, executor: Executor, pair: Pair) -> Diagnosis:
+        """Return what explains a recording that is not like its prediction."""
+        declared = Suspect("", pair, self.sensors, self.points)
+        first = diagnosed(declared)
+        if not first.unlike or (first.explanations and len(first.explanations[0].causes) == 1):
+            return first
+        profile = profile_of(pair.run)
+        backwards = profile.model_copy(update={"speed": tuple(-w for w in profile.speed)})
+        others = {"the drum turned the other way (a profile of speeds below 0)": backwards}
+        cases = [replace(self.case, profile=backwards)]
+        for name, load in list(self.machine.parameters.loads.items())[:MOST_LOADS]:
+            if load != self.case.load:
+                others[f"the load was {name} (--load {name})"] = profile
+                cases.append(replace(self.case, load=load, profile=profile))
+        suspects = []
+        for words, run in zip(others, self._cases(executor, cases), strict=True):
+            predicted = predicted_signals(run, self.sensors, self.points)
+            if pair.alignment.source == "signals":
+                other = paired(pair.recording, run, predicted)
+            else:
+                other = pair_at(pair.recording, run, predicted, pair.alignment)
+            suspects.append(Suspect(words, other, self.sensors, self.points))
+        return diagnosed(declared, suspects)
+
     def _pairs(self, executor: Executor) -> list[Pair]:
-        speeds = [recorded_speed(recording, self.test) for recording in self.recordings]
+        speeds = [recording.speed for recording in self.recordings]
         pairs: list[Pair] = []
         if self.options.speed == "profile" or any(speed is None for speed in speeds):
             run = self._runs(executor, [self.case.profile])[0]
             predicted = predicted_signals(run, self.sensors, self.points)
-            pairs = [paired(one, run, predicted, self.test) for one in self.recordings]
+            pairs = [paired(one, run, predicted) for one in self.recordings]
         if self.options.speed == "profile":
             return pairs
         followed = [
@@ -124,10 +173,11 @@ class CompareTask(Task):
         ]
 
     def _runs(self, executor: Executor, profiles: Sequence[SpinProfile]) -> list[Record]:
-        cases = [
-            replace(self.case, name=f"{self.case.name} {number}", profile=profile)
-            for number, profile in enumerate(profiles, 1)
-        ]
+        return self._cases(executor, [replace(self.case, profile=one) for one in profiles])
+
+    def _cases(self, executor: Executor, runs: Sequence[Case]) -> list[Record]:
+        name = self.case.name
+        cases = [replace(run, name=f"{name} {number}") for number, run in enumerate(runs, 1)]
         records: dict[int, Record] = {}
         executor.records(self.machine, cases, records.__setitem__, "runs")
         for record in records.values():

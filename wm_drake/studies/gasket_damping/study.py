@@ -98,7 +98,10 @@ def read_records(parameters: MachineParameters, entries: Sequence[str]) -> dict[
 def _recorded(path: Path, sensors: Sequence[str]) -> xr.DataArray:
     """Return the displacements at sensors in a recorded file (time, sensor). [m]"""
     recording = read_recording(path)
-    uses = {name: ChannelUse(recording.chosen(name), LENGTH, LENGTH.shown) for name in sensors}
+    uses = {
+        name: ChannelUse(recording.chosen(name), LENGTH, LENGTH.shown, kind="vibration")
+        for name in sensors
+    }
     channels = recording.synchronous(uses)
     return xr.DataArray(
         np.stack([channels.values[name] for name in sensors], axis=1),

@@ -1,8 +1,11 @@
 """Show the orders of a record: waterfall and order map of each signal."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import xarray as xr
 
+from wm_drake.parameters.recorded.health import Finding
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report import figure as fig
 from wm_drake.report.labelled import LabelledTable
@@ -10,6 +13,7 @@ from wm_drake.report.quantity import SPEED, quantity_of, shown, text_of
 from wm_drake.simulation.netcdf import netcdf_bytes
 from wm_drake.simulation.orders import REVOLUTIONS
 from wm_drake.studies.answer import Answer, Part, Plot
+from wm_drake.studies.health import health_part
 from wm_drake.studies.orders.study import FREQUENCY, at_orders_shown, largest_of_orders
 
 WATERFALL_LINES = 40
@@ -19,12 +23,13 @@ MAP_COLUMNS = 400
 """Largest number of columns of an order map."""
 
 
-def orders_answer(maps: xr.Dataset, source: str) -> Answer:
+def orders_answer(maps: xr.Dataset, source: str, findings: Sequence[Finding] = ()) -> Answer:
     """Return the answer of the study.
 
     Args:
         maps: As of `orders_of` in `wm_drake.studies.orders.study`.
         source: Name of the file.
+        findings: What the checks of its health found in the file.
     """
     unit = quantity_of(maps.amplitude).unit_text
     plots = tuple(
@@ -50,6 +55,7 @@ def orders_answer(maps: xr.Dataset, source: str) -> Answer:
         (
             Part("Waterfall and order map", plots),
             Part("Largest orders", (largest, LabelledTable("orders", at_orders_shown(maps)))),
+            health_part({source: findings}),
         ),
         (("File", source),),
         files={"orders.nc": netcdf_bytes(_without_quantities(maps[["amplitude"]]))},

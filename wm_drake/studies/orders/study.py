@@ -45,7 +45,8 @@ def read_signals(path: Path, names: ChannelNames | None = None, unit: str = "") 
 
     Returns:
         Over `time` [s] and `signal`: `value`, in the unit of the first signal of a recorded file,
-        which may be any text; and `drum_angle` [rad]. Attribute `source`: name of the file.
+        which may be any text; and `drum_angle` [rad]. Attributes `source`, name of the file, and
+        `findings` of the checks of a recorded file.
     """
     names = names or ChannelNames()
     if path.suffix.lower() == ".nc" and not names.channels:
@@ -54,17 +55,19 @@ def read_signals(path: Path, names: ChannelNames | None = None, unit: str = "") 
     speed, used = _speed_and_signals(recording)
     shown, factor, measured = _common_unit(recording, used, unit or ACCELERATION.si)
     uses = {
-        word: ChannelUse(each, measured, unit or ACCELERATION.si) for word, each in used.items()
+        word: ChannelUse(each, measured, unit or ACCELERATION.si, kind="vibration")
+        for word, each in used.items()
     }
     channels = evenly(
         recording.synchronous(
-            {**uses, "speed": ChannelUse(speed, DRUM_SPEED, "rpm", is_main=False)}
+            {**uses, "speed": ChannelUse(speed, DRUM_SPEED, "rpm", is_main=False, kind="speed")}
         )
     )
     angle, turning = _angle(channels.values["speed"], channels.time, path)
     values = {word: np.where(turning, channels.values[word] / factor, np.nan) for word in used}
     unit_read = Unit(shown.replace(" ", "*"), shown.replace(" ", "*"))
-    return _signals(unit_read, channels.time, angle, values)
+    signals = _signals(unit_read, channels.time, angle, values)
+    return signals.assign_attrs(findings=channels.findings)
 
 
 def _signals(

@@ -22,4 +22,4 @@ class OrdersTask(Task):
     def run(self, executor: Executor) -> Answer:  # noqa: ARG002
         """Compute the maps."""
         maps = orders_of(self.signals, self.highest, self.source)
-        return orders_answer(maps, self.source)
+        return orders_answer(maps, self.source, self.signals.attrs.get("findings", ()))

@@ -21,6 +21,7 @@ from wm_drake.studies.spin_cycle.study import (
     INTEGRATED,
     PHASE,
     average_errors,
+    compared_of,
     disagreement,
     largest,
     missing_regions,
@@ -73,8 +74,8 @@ def summary(cases: Sequence[UnbalanceCase], data: xr.Dataset, engine: str) -> st
 def _about_measurement(data: xr.Dataset) -> str:
     if "measured" not in data:
         return "No measurement was given for comparison."
-    errors = average_errors(data.rms, data.measured)
-    missing = missing_regions(data.rms, data.measured)
+    errors = average_errors(compared_of(data), data.measured)
+    missing = missing_regions(compared_of(data), data.measured)
     without = f" without {listed(list(missing))}" if missing else ""
     return (
         f"Compared with the measurement{without}, the average error is "
@@ -93,7 +94,7 @@ def warnings_of(parameters: MachineParameters, data: xr.Dataset, period: str) ->
         f"Case {text}. Regions that this run did not complete have no values."
         for text in diverged_runs(data)
     ]
-    texts += missing_warnings(data.rms, data.measured) if "measured" in data else []
+    texts += missing_warnings(compared_of(data), data.measured) if "measured" in data else []
     touching = data.case.values[data.smallest_gap.values <= 0.0].tolist()
     if touching:
         texts.append(

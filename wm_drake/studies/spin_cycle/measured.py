@@ -17,7 +17,7 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.band import HIGH_PASS_HZ
-from wm_drake.simulation.vibration import high_passed, integrated_twice, region_rms
+from wm_drake.simulation.vibration import displacement_of, region_rms
 
 DIMS = ("case", "region", "accelerometer", "axis")
 
@@ -76,7 +76,7 @@ def read_accelerations(
 
     The folder has one file for each measured case, CASE.csv or one of another recorded format;
     cases without a file are NaN. Its time starts with the profile; its channels are SENSOR_AXIS
-    (S1_x, ...). The bias of each sensor is estimated by a mean with a Hann window and subtracted.
+    (S1_x, ...). They are compared with what such sensors would record of the model.
 
     Args:
         names: Name in the files of ``time`` or of an accelerometer's axis, such as ``S1_x``; units
@@ -108,7 +108,7 @@ def read_accelerations(
             continue
         time, acceleration = _samples(path, _words(labels), names, unit or ACCELERATION.si)
         period = float((time[-1] - time[0]) / (len(time) - 1))
-        rms = region_rms(_displacement(acceleration, period), period, profile)
+        rms = region_rms(displacement_of(acceleration, period), period, profile)
         rows.append(rms.reshape(empty.shape))
     return xr.DataArray(np.array(rows), labels, DIMS)
 
@@ -141,7 +141,9 @@ def _samples(
     """
     recording = read_recording(path, names)
     uses = {
-        word: ChannelUse(recording.word(word) or recording.chosen(word), ACCELERATION, unit)
+        word: ChannelUse(
+            recording.word(word) or recording.chosen(word), ACCELERATION, unit, kind="vibration"
+        )
         for word in words
     }
     channels = recording.synchronous(uses)
@@ -174,14 +176,3 @@ def _samples(
             where=str(path),
         )
     return time, np.stack(list(channels.values.values()), axis=1)
-
-
-def _displacement(acceleration: FloatArray, period: float) -> FloatArray:
-    """Return the high-passed displacements [m] of accelerations [m/s^2] (n, k).
-
-    Args:
-        period: Sampling interval. [s]
-    """
-    # a plain mean would include the velocity at the end of the record divided by its duration
-    bias = np.average(acceleration, axis=0, weights=np.hanning(len(acceleration)))
-    return high_passed(integrated_twice(acceleration - bias, period), period, HIGH_PASS_HZ)

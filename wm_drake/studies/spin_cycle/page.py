@@ -14,7 +14,7 @@ from wm_drake.studies.answer import Answer, Part, Plot, diverged_runs
 from wm_drake.studies.spin_cycle.figures import bars_figure, heat_map_figure, profile_figure
 from wm_drake.studies.spin_cycle.findings import case_description, summary, warnings_of
 from wm_drake.studies.spin_cycle.measured import DIMS
-from wm_drake.studies.spin_cycle.study import largest
+from wm_drake.studies.spin_cycle.study import compared_of, largest
 from wm_drake.studies.spin_cycle.tables import (
     by_channel,
     cases_table,
@@ -130,7 +130,8 @@ def bars_plot(data: xr.Dataset, case: str, title: str) -> Plot:
         f"{title}: RMS displacement per region. Each row is a sensor, each column an axis. All "
         "panels have the same scale."
     )
-    figure = bars_figure(of_case.rms, of_case.get("rms_from_acceleration"), measured)
+    computed = of_case.rms if measured is None else compared_of(of_case)
+    figure = bars_figure(computed, of_case.get("rms_from_acceleration"), measured)
     return Plot(figure, f"{title}: RMS displacement per region.", caption)
 
 
@@ -144,5 +145,9 @@ def _numbers(data: xr.Dataset, chosen: Sequence[str]) -> list[LabelledTable]:
         across="channel",
         is_in_json=False,
     )
-    names = [name for name in ("rms", "measured", "rms_from_acceleration") if name in data]
+    names = [
+        name
+        for name in ("rms", "measured", "rms_from_acceleration", "rms_recorded")
+        if name in data
+    ]
     return [shown, *(rms_table(name, data[name]) for name in names), *files_of(data)]

@@ -28,16 +28,20 @@ from wm_drake.studies.spin_cycle.options import SpinCycleDataOptions
 MEASURES = ("regions", "gap", "spring tensions", "mounts", "cabinet")
 """Measures of each run, as for `simulate_many`."""
 
+RECORDED, RECORDED_REGIONS = "region_displacement_recorded", "recorded regions"
+"""What accelerometers would tell of a run, which is compared with those of a measurement; and the
+measure that has it."""
+
 GRAMS = Quantity("mass", Unit("kg", "g"), 0)
 PHASE = Quantity("phase", Unit("rad", "deg"), 0)
 ERROR = Quantity("average error", Share(), 1)
 INTEGRATED = Quantity("direct vs. integrated", Share(), 2)
 
 
-def measures_of(parameters: MachineParameters) -> tuple[str, ...]:
+def measures_of(parameters: MachineParameters, *more: str) -> tuple[str, ...]:
     """Return the measures of each run of a machine: also of its feet and of its motor."""
     feet = ("feet", "feet regions") if parameters.cabinet else ()
-    return (*MEASURES, *feet, *(("drive",) if motor_of(parameters.drive) else ()))
+    return (*MEASURES, *more, *feet, *(("drive",) if motor_of(parameters.drive) else ()))
 
 
 def runs_of(
@@ -79,8 +83,10 @@ def run_spin_cycle(
     data = placed(table, {"case": [case.name for case in cases]}).rename(
         region_displacement="rms", region_displacement_integrated="rms_from_acceleration"
     )
-    for name in ("rms", "rms_from_acceleration"):
-        data[name] = RMS.on(data[name])
+    data = data.rename({RECORDED: "rms_recorded"} if RECORDED in data else {})
+    for name in ("rms", "rms_from_acceleration", "rms_recorded"):
+        if name in data:
+            data[name] = RMS.on(data[name])
     published = [case.published_error_percent for case in cases]
     errors = ERROR.to_si([np.nan if error is None else error for error in published])
     labels = {
@@ -101,6 +107,11 @@ def labels_of(
     return dict(
         zip(DIMS, ([case.name for case in cases], regions, sensors, list(AXES)), strict=True)
     )
+
+
+def compared_of(data: xr.Dataset) -> xr.DataArray:
+    """Return what is compared with a measurement: what accelerometers tell, if they measured it."""
+    return data.rms_recorded if "rms_recorded" in data else data.rms
 
 
 def disagreement(data: xr.Dataset) -> xr.DataArray:

@@ -17,6 +17,7 @@ from wm_drake.studies.spin_cycle.study import (
     ERROR,
     INTEGRATED,
     average_errors,
+    compared_of,
     disagreement,
     largest,
     region_errors,
@@ -45,7 +46,9 @@ def cases_table(data: xr.Dataset) -> LabelledTable:
         "tension of any spring; a spring goes slack at 0."
     )
     if "measured" in data:
-        shown["average_error"] = ERROR.variable("case", average_errors(data.rms, data.measured))
+        shown["average_error"] = ERROR.variable(
+            "case", average_errors(compared_of(data), data.measured)
+        )
         caption += (
             " Average error: mean over regions, sensors and axes of |measured − computed| / "
             "measured."
@@ -88,7 +91,7 @@ def regions_table(profile: SpinProfile, data: xr.Dataset) -> LabelledTable:
         "over all sensors and axes, for the worst case."
     )
     if "measured" in data:
-        errors = region_errors(data.rms, data.measured)
+        errors = region_errors(compared_of(data), data.measured)
         mean = ERROR.named("mean error, [A] Eq. (9)")
         shown["mean_error"] = mean.variable("region", errors.mean("case"))
         # as in [A], of these cases, not an estimate for a population

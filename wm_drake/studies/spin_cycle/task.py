@@ -11,6 +11,7 @@ from wm_drake.studies.spin_cycle.measured import DIMS, RMS
 from wm_drake.studies.spin_cycle.options import SpinCycleDataOptions
 from wm_drake.studies.spin_cycle.page import spin_cycle_answer
 from wm_drake.studies.spin_cycle.study import (
+    RECORDED_REGIONS,
     cases_of_table,
     measured_displacements,
     measures_of,
@@ -27,6 +28,7 @@ class SpinCycleTask(Task):
         self.machine = machine
         self.profile = runnable_profile(options.profile, machine.parameters)
         self.cases = cases_of_table(options.cases, options.case)
+        self.more = (RECORDED_REGIONS,) if options.accelerations else ()
         self.measured = measured_displacements(
             options, machine.parameters, self.cases, self.profile
         )
@@ -39,7 +41,7 @@ class SpinCycleTask(Task):
     def run(self, executor: Executor) -> Answer:
         """Run all cases."""
         parameters = self.machine.parameters
-        measures = measures_of(parameters)
+        measures = measures_of(parameters, *self.more)
         evaluate = partial(executor.simulate, self.machine, measures, what="cases")
         data = run_spin_cycle(parameters, self.cases, self.profile, evaluate)
         if self.measured is not None:

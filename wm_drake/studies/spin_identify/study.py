@@ -23,7 +23,7 @@ from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.fitting.problem import Errors
 from wm_drake.studies.fitting.sought import Sought, SoughtNumbers, sought_in, sought_of
 from wm_drake.studies.spin_cycle.measured import DIMS
-from wm_drake.studies.spin_cycle.study import labels_of, runs_of
+from wm_drake.studies.spin_cycle.study import RECORDED, labels_of, runs_of
 
 PLANTED = (0.8, 1.25)
 """Range of the ratio of true number to machine's number in a virtual experiment."""
@@ -132,7 +132,8 @@ class SpinModel(BlockModel):
         """
         labels = {"point": range(len(points)), "case": [case.name for case in self.cases]}
         runs = self.experiment.over(labels, self._runs(points))
-        return np.asarray(runs.region_displacement.values)
+        name = RECORDED if RECORDED in runs else "region_displacement"
+        return np.asarray(runs[name].values)
 
     def _runs(self, points: FloatArray) -> Iterator[Case]:
         for point in points:

@@ -44,6 +44,7 @@ class SpinIdentifyTask(Task):
         self.cases = cases_of_table(options.cases, names)
         self.sought = unknowns_of(machine.parameters, options.unknown)
         self.measured, self.tests = None, dict[str, CompareTask]()
+        self.measures = ("recorded regions" if options.accelerations else "regions",)
         if options.record:
             self.tests = self._tests()
         else:
@@ -94,7 +95,7 @@ class SpinIdentifyTask(Task):
             return self._fitted(executor)
         seed, truth = self.options.seed, None
         with executor.fraction("search") as report:
-            experiment = Experiment(self.machine, ("regions",), executor.simulate)
+            experiment = Experiment(self.machine, self.measures, executor.simulate)
             model = spin_model(experiment, self.sought, self.profile, self.cases, self.measured)
             if self.measured is None:
                 planted = planted_values(self.sought, seed)
@@ -119,4 +120,5 @@ class SpinIdentifyTask(Task):
             self.options.by,
         )
         title = f"Parameters of machine {parameters.name} identified from records of a spin cycle"
-        return fitted_answer(executor, model, self.options.seed, (title, "identified"))
+        words, tests = (title, "identified"), list(self.tests.values())
+        return fitted_answer(executor, model, self.options.seed, words, tests)

@@ -1,0 +1,338 @@
+"""Find what explains a recording that is not like its prediction: a few discrete causes are tried.
+
+Compared are the complex amplitudes of order 1 of all sensors, which have the phases between them,
+and the means of accelerometers, which show gravity. Each cause changes what is predicted, or which
+channel belongs to which sensor; one that is named has been tried on the data, and fits.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import combinations, product
+
+import numpy as np
+
+from wm_drake.parameters.recorded_sensors import RecordedSensor
+from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import Share
+from wm_drake.report.quantity import Quantity
+from wm_drake.simulation.orders import order_vectors
+from wm_drake.simulation.recorded_signal import recorded_signal
+from wm_drake.studies.compare.pairs import Pair
+
+GRAVITY = 9.81
+"""Size by which a difference of means is divided. [m/s^2]"""
+
+UNLIKE = 0.3
+"""Misfit of order 1 of a sensor from which causes are tried: an assumption, more than tilts, gains
+and most models are off by."""
+
+UNLIKE_MEAN = 0.1
+"""Difference of the means of an accelerometer, by gravity, from which causes are tried."""
+
+EXPLAINS, EXPLAINED = 0.4, 0.4
+"""Largest misfit with a cause, by that without, and in all: an assumption."""
+
+MOST_CAUSES = 3
+"""Most causes that are tried together."""
+
+ALIKE = 1.5
+"""Largest ratio of the misfit of a cause that is named to that of the best one."""
+
+LEAST_GAIN = 0.7
+"""Largest ratio of the misfit with a further cause to that without it."""
+
+CORNERS = (0.16, 0.5, 1.6, 5.0)
+"""Corners of AC couplings that are tried. [Hz]"""
+
+FACTORS = {"g": 9.80665, "mg": 9.80665e-3, "in": 0.0254, "mm": 1e-3, "a tenth": 0.1}
+"""Factors of units that are tried, and their reciprocals."""
+
+SHIFTS = 0.002 * np.arange(-10, 11)
+"""Shifts of the clock that are allowed for. [s]"""
+
+MISFIT = Quantity("misfit", Share(), 0)
+
+
+@dataclass(frozen=True)
+class Variant:
+    """What a sensor may be other than declared.
+
+    Attributes:
+        words: What it is, and how a test declares it.
+        sensor: The sensor.
+    """
+
+    words: str
+    sensor: RecordedSensor
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """A cause, or several together, and how well they fit.
+
+    Attributes:
+        causes: In words.
+        misfit: Root mean square of the misfits of the sensors.
+    """
+
+    causes: tuple[str, ...]
+    misfit: float
+
+    def __str__(self) -> str:
+        """Return the causes with their misfit."""
+        return f"{' and '.join(self.causes)} (misfit {MISFIT.text(self.misfit)})"
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What was tried, and what explains a recording.
+
+    Attributes:
+        misfit: Root mean square of the misfits of the sensors as they are declared.
+        vibrations, means: Misfits of each sensor, of order 1 and of the mean.
+        explanations: What explains it, best first.
+        shift: Shift of the clock that fits best as declared. [s]
+    """
+
+    misfit: float
+    vibrations: Mapping[str, float]
+    means: Mapping[str, float]
+    explanations: tuple[Explanation, ...] = ()
+    shift: float = 0.0
+
+    @property
+    def unlike(self) -> list[str]:
+        """Return the sensors whose vibration is unlike its prediction."""
+        return [name for name, value in self.vibrations.items() if value > UNLIKE]
+
+    @property
+    def shifted(self) -> list[str]:
+        """Return the sensors whose mean is not that of gravity."""
+        return [name for name, value in self.means.items() if value > UNLIKE_MEAN]
+
+    @property
+    def text(self) -> str:
+        """Return what explains the recording, or that nothing does."""
+        names = ", ".join(dict.fromkeys([*self.unlike, *self.shifted]))
+        head = f"is not like its prediction in {names} (misfit {MISFIT.text(self.misfit)})"
+        if self.explanations:
+            return f"{head}; what explains it: {'; or '.join(map(str, self.explanations))}"
+        return f"{head}; tried: {TRIED}: none of these explains it"
+
+
+TRIED = (
+    "exchanged channels, polarity, axis, gravity, AC coupling, unit, direction of rotation, other "
+    "loads"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """What is compared of signals.
+
+    Attributes:
+        vectors: Complex amplitudes of order 1 (windows, signals).
+        means: Means (signals).
+        speed: Drum speed of the windows (windows). [rad/s]
+    """
+
+    vectors: np.ndarray
+    means: FloatArray
+    speed: FloatArray
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """Which channel each sensor has, which variant it is, and by what it is multiplied."""
+
+    channels: tuple[int, ...]
+    variants: tuple[int, ...]
+    factors: tuple[float, ...]
+    causes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Suspect:
+    """A run that a recording may be of.
+
+    Attributes:
+        words: What is other about it; "" for the run as declared.
+        pair: The recording on the times of the run.
+        sensors, points: Sensors by name, and their positions in T. [m]
+    """
+
+    words: str
+    pair: Pair
+    sensors: Mapping[str, RecordedSensor]
+    points: Mapping[str, FloatArray]
+    variants: tuple[tuple[Variant, ...], ...] = field(init=False)
+    measured: _Seen = field(init=False)
+    predicted: tuple[_Seen, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Compute what is compared, once."""
+        run, put = self.pair.run, object.__setattr__
+        variants = tuple(tuple(variants_of(sensor)) for sensor in self.sensors.values())
+        put(self, "variants", variants)
+        put(self, "measured", _seen(self.pair.measured, self.pair))
+        predicted = []
+        for name, of_sensor in zip(self.sensors, variants, strict=True):
+            columns = [recorded_signal(run, v.sensor, self.points[name]) for v in of_sensor]
+            predicted.append(_seen(np.stack(columns, axis=1), self.pair))
+        put(self, "predicted", tuple(predicted))
+
+    @property
+    def declared(self) -> _Trial:
+        """Return the trial with all sensors as declared."""
+        count = len(self.sensors)
+        causes = (self.words,) if self.words else ()
+        return _Trial(tuple(range(count)), (0,) * count, (1.0,) * count, causes)
+
+    def misfits(self, trial: _Trial) -> tuple[FloatArray, FloatArray, float]:
+        """Return misfits of order 1 and of the means of the sensors (k,) each, and the shift. [s]
+
+        Order 1 may be turned by the unknown angle of the drum at the start, and by a small shift of
+        the clock; its difference is divided by the larger of both.
+        """
+        columns = list(trial.channels)
+        chosen = list(zip(self.predicted, trial.variants, trial.factors, strict=True))
+        measured = self.measured.vectors[:, columns]
+        computed = np.stack([factor * seen.vectors[:, v] for seen, v, factor in chosen], axis=1)
+        known = np.isfinite(measured) & np.isfinite(computed)
+        m, c = np.where(known, measured, 0.0), np.where(known, computed, 0.0)
+        powers = np.sum(np.abs(m) ** 2, axis=0), np.sum(np.abs(c) ** 2, axis=0)
+        size = np.maximum(np.maximum(*powers), 1e-300)
+        turns = np.exp(1j * np.outer(SHIFTS, self.measured.speed))
+        alike = (turns @ (m * np.conj(c))) / size  # shift, sensor
+        start = np.exp(-1j * np.angle(alike.sum(axis=1)))[:, None]
+        squares = (powers[0] + powers[1]) / size - 2.0 * np.real(alike * start)
+        best = int(np.argmin(squares.sum(axis=1)))
+        means = np.array([factor * seen.means[v] for seen, v, factor in chosen])
+        is_shown = [sensor.quantity == "acceleration" for sensor in self.sensors.values()]
+        apart = np.abs(self.measured.means[columns] - means) / GRAVITY * np.array(is_shown)
+        return np.sqrt(np.maximum(squares[best], 0.0)), apart, float(SHIFTS[best])
+
+    def total(self, trial: _Trial) -> float:
+        """Return the root mean square of the misfits of all sensors."""
+        vibrations, means, _ = self.misfits(trial)
+        return float(np.sqrt(np.mean(vibrations**2 + np.minimum(means, 2.0) ** 2)))
+
+    def further(self, trial: _Trial) -> Iterator[_Trial]:
+        """Yield a trial with one more cause, about sensors that are unlike their predictions."""
+        vibrations, means, _ = self.misfits(trial)
+        names = list(self.sensors)
+        wrong = [int(k) for k in np.flatnonzero((vibrations > UNLIKE) | (means > UNLIKE_MEAN))]
+        for i, j in combinations(range(len(names)), 2):
+            one, other = (self.sensors[names[k]] for k in (i, j))
+            if (i in wrong or j in wrong) and one.quantity == other.quantity:
+                yield from _exchanged(trial, names, i, j)
+        for k in wrong:
+            for number, sign in product(range(len(self.variants[k])), (1.0, -1.0)):
+                if number == trial.variants[k] and sign > 0.0:
+                    continue
+                texts = [self.variants[k][number].words if number else ""]
+                texts.append("it has the other sign (polarity: negative)" if sign < 0.0 else "")
+                words = f"{names[k]}: {' and '.join(filter(None, texts))}"
+                yield _changed(trial, {k: (number, sign)}, words)
+        for unit, factor in FACTORS.items():
+            for size in (factor, 1.0 / factor):
+                words = f"are larger than declared by the factor {size:.4g} ({unit})"
+                for group in {tuple(wrong), *((k,) for k in wrong)}:
+                    changes = {k: (trial.variants[k], size) for k in group}
+                    said = ", ".join(names[k] for k in group)
+                    if group:
+                        yield _changed(trial, changes, f"the units of {said} {words}")
+
+
+def variants_of(sensor: RecordedSensor) -> Iterator[Variant]:
+    """Yield a sensor as declared, and as it may be."""
+    yield Variant("as declared", sensor)
+    for axis in "xyz":
+        if axis != sensor.axis:
+            turned = sensor.model_copy(update={"axis": axis})
+            yield Variant(f"its axis is {axis}, not {sensor.axis} (axis: {axis})", turned)
+    if sensor.shows_gravity:
+        without = sensor.model_copy(update={"gravity": "removed"})
+        yield Variant("gravity is taken out of it (gravity: removed)", without)
+        for corner in CORNERS:
+            text = f"it is AC-coupled at about {corner:g} Hz (ac_coupling: {corner:g} Hz)"
+            yield Variant(text, sensor.model_copy(update={"ac_coupling": corner}))
+
+
+def diagnosed(declared: Suspect, others: Sequence[Suspect] = ()) -> Diagnosis:
+    """Return what explains a recording.
+
+    Causes are tried one by one, and on top of the best one further ones.
+
+    Args:
+        declared: The run as declared.
+        others: Other runs that it may be of.
+    """
+    vibrations, means, shift = declared.misfits(declared.declared)
+    misfit = declared.total(declared.declared)
+    names = list(declared.sensors)
+    result = Diagnosis(
+        misfit,
+        dict(zip(names, vibrations.tolist(), strict=True)),
+        dict(zip(names, means.tolist(), strict=True)),
+        shift=shift,
+    )
+    if not (result.unlike or result.shifted):
+        return result
+    tested = list[Explanation]()
+    for suspect in (declared, *others):
+        tried = [(suspect.total(suspect.declared), suspect.declared)]
+        if not suspect.words:
+            tried.clear()
+        trial, least = suspect.declared, suspect.total(suspect.declared)
+        while len(trial.causes) < MOST_CAUSES and not _is_like(suspect, trial):
+            more = sorted(
+                ((suspect.total(t), t) for t in suspect.further(trial)), key=lambda each: each[0]
+            )
+            if not more or more[0][0] > LEAST_GAIN * least:
+                break
+            tried += more[:3]
+            least, trial = more[0]
+        tested += [Explanation(t.causes, value) for value, t in tried]
+    fitting = [e for e in tested if e.misfit <= min(EXPLAINED, EXPLAINS * misfit)]
+    fitting.sort(key=lambda e: e.misfit * (1.0 + 0.2 * len(e.causes)) + 0.01 * len(e.causes))
+    best = fitting[0].misfit if fitting else 0.0
+    kept = [e for e in fitting[:3] if e.misfit <= ALIKE * best + 0.005]
+    return replace(result, explanations=tuple(kept))
+
+
+def _is_like(suspect: Suspect, trial: _Trial) -> bool:
+    vibrations, means, _ = suspect.misfits(trial)
+    return bool((vibrations <= UNLIKE).all() and (means <= UNLIKE_MEAN).all())
+
+
+def _exchanged(trial: _Trial, names: Sequence[str], i: int, j: int) -> Iterator[_Trial]:
+    """Yield a trial with two channels exchanged, also with the other sign of either of them."""
+    channels = list(trial.channels)
+    channels[i], channels[j] = channels[j], channels[i]
+    words = f"the channels of {names[i]} and {names[j]} are exchanged"
+    swapped = replace(trial, channels=tuple(channels))
+    yield replace(swapped, causes=(*trial.causes, words))
+    for k in (i, j):
+        text = f"{words}, and {names[k]} has the other sign, as of a sensor turned by 90 degrees"
+        yield _changed(swapped, {k: (trial.variants[k], -1.0)}, text)
+
+
+def _changed(trial: _Trial, changes: Mapping[int, tuple[int, float]], words: str) -> _Trial:
+    """Return a trial with the variant, and a further factor, of some sensors."""
+    variants, factors = list(trial.variants), list(trial.factors)
+    for k, (variant, factor) in changes.items():
+        variants[k] = variant
+        factors[k] *= factor
+    causes = (*trial.causes, words)
+    return replace(trial, variants=tuple(variants), factors=tuple(factors), causes=causes)
+
+
+def _seen(signals: FloatArray, pair: Pair) -> _Seen:
+    """Return order 1 and means of signals (n, c) at the times of a run."""
+    run = pair.run
+    angle, time = run.drum_angle.values, run.time.values
+    vectors = order_vectors(signals, angle, time, np.array([1.0])).isel(order=0)
+    valid = np.isfinite(signals)
+    sums, counts = np.where(valid, signals, 0.0).sum(axis=0), np.maximum(valid.sum(axis=0), 1)
+    return _Seen(vectors.values, sums / counts, np.abs(vectors.speed.values))
