@@ -113,13 +113,13 @@ def figure(found: np.ndarray) -> Figure:
     allowed = wm.load_machine("reference").accuracy
     marks = (
         Line(ends, ends, name="estimate = error", color=QUIET),
-        Line(ends, 0.5 * ends, name="half of it", color=QUIET, dash="dash"),
-        Line(ends, np.full(2, 1e2 * allowed), name="accepted below", color=QUIET, dash="dot"),
+        Line(ends, 0.5 * ends, name="half of it", color=QUIET, dash="dashed"),
+        Line(ends, np.full(2, 1e2 * allowed), name="accepted below", color=QUIET, dash="dotted"),
         Points(1e2 * np.maximum(found[:, 0], 1e-7), 1e2 * found[:, 1], name="runs", color=OURS),
     )
-    log = {"is_log": True}
-    panel = Panel(marks, Axis("true error, %", (-5, 3), **log), Axis("estimate, %", **log))
-    return in_grid([panel])
+    x, y = Axis(label="true error, %", is_log=True), Axis(label="estimate, %", is_log=True)
+    panel = Panel(marks=marks, x=x, y=y)
+    return Figure(panels=in_grid([panel], 1), height=420.0)
 
 
 def main() -> None:
