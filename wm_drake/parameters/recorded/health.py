@@ -254,7 +254,7 @@ def _is_stuck(channel: Channel, number: int) -> bool:
     if channel.kind == "speed":  # steady at last
         least = max(least, AWAY * np.nanmedian(np.abs(around)))
     elif not begin:  # at rest at first
-        least = max(least, np.nanmax(np.abs(around)))
+        least = max(least, AWAY * np.nanmax(np.abs(around)))
     elif len(steps) < 2:
         least = max(least, np.nanmedian(np.abs(around)))
     return bool(np.nanmax(steps, initial=0.0) > least)
