@@ -131,6 +131,7 @@ def main() -> None:
     arguments = parser.parse_args()
     warnings.simplefilter("ignore", wm.errors.InputNotice)
     text, found = ["| machine | step, ms | estimate, % | error, % |", "|---|---|---|---|"], []
+    print("\n".join(text))
     for row in ROWS[:1] if arguments.quick else ROWS:
         for step, estimate, error in runs(row):
             found.append((error, estimate))

@@ -79,6 +79,7 @@ FILES = {  # what a block with a file is called in the commands of its page
     ],
     "docs/how-to/rubber.md": ["rubber.yaml"],
     "docs/how-to/tolerances.md": ["mine.yaml", "limits.yaml"],
+    "docs/reference/vary-file.md": ["vary.yaml"],
     "docs/theory/ball-ring.md": ["balls.yaml"],
     "docs/theory/liquid-ring.md": ["liquid.yaml"],
 }

@@ -18,7 +18,7 @@ from wm_drake.studies.study import SHIPPED, Study
 PACKAGE = Path(wm_drake.__file__).parent
 ORDER = (
     {"errors"},
-    {"registry"},
+    {"registry", "written_files"},
     {"compiler"},
     {"laws"},
     {"parameters"},
@@ -44,7 +44,8 @@ DRAWING = {"page", "figures", "tables", "words"}
 PARTS = ("options", "study", "page", "task")
 """Parts of a study: each imports those before it only."""
 # laws do without much more
-WITHOUT_DRAKE = {"registry", "errors", "compiler", "parameters", "solid", "elements", "rigs", "cli"}
+WITHOUT_DRAKE = {"registry", "written_files", "errors", "compiler", "parameters", "solid"}
+WITHOUT_DRAKE |= {"elements", "rigs", "cli"}
 
 
 def imported(name, source, is_package=False):

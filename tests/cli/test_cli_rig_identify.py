@@ -89,7 +89,7 @@ def test_a_whole_matrix_writes_loops_and_one_page(wm_drake):
     assert len(list(Path("out").glob("loop_*.csv"))) == 18  # [C] Table 1
     assert len(pd.read_csv("out/measures.csv")) == 18
     page = Path("out/report.html").read_text()
-    assert page.count("<figure data-picture") == 5
+    assert page.count("<figure data-picture") == 6
     assert re.findall(r'(?:src|href)="(?!data:|#|https://doi.org/)', page) == []
 
 

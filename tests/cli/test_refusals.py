@@ -226,8 +226,8 @@ CASES = {  # command -> arguments, message, more files
         ("--unknown gasket.stiffness", "--unknown: gasket.stiffness: unknown key 'stiffness'"),
         ("--unknown 'gasket.stiffness_x=(2, 8) N'", "unit 'N' does not fit"),
         ("--unknown gasket.stiffness_x=2..8", "'2' has no unit; write for example '1 N/mm'"),
-        ("--unknown 'gasket.stiffness_x=2 N/mm'", "'2 N/mm' is not a range; write for example '(1, 2) N/mm'"),
-        ("--unknown 'gasket.stiffness_x=(-5, 2) N/mm'", "'(-5, 2) N/mm' is out of range; allowed is >= 0"),
+        ("--unknown 'gasket.stiffness_x=2 N/mm'", "'gasket.stiffness_x=2 N/mm' is not NAME=LOW..HIGH"),
+        ("--unknown 'gasket.stiffness_x=(-5, 2) N/mm'", "-5 N/mm to 2 N/mm is out of range; allowed is >= 0"),
         ("--unknown 'gasket.stiffness_x=(8, 2) N/mm'", "bounds 8 N/mm to 2 N/mm are not a range"),
     ],
     "study gasket-damping --out out": [

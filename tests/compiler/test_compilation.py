@@ -187,21 +187,21 @@ def test_compiled_code_lies_in_a_folder_named_by_the_sources(tmp_path, monkeypat
         Path(wm_drake.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__")
     )
     monkeypatch.setattr(compilation, "_PACKAGE", copy)
-    before = compilation._cache_folder()
-    assert compilation._cache_folder() == before
+    before = compilation._cache_folders()
+    assert compilation._cache_folders() == before
     # laws that others call, the registry, and types whose fields are a packed order
     names = ("laws/friction.py", "compiler/vectors.py", "elements/friction_damper.py")
     for name in (*names, "parameters/damper_laws.py", "parameters/elements.py"):
         source = copy / name
         source.write_text(source.read_text() + "# changed\n")
-        after = compilation._cache_folder()
+        after = compilation._cache_folders()
         assert after != before
         before = after
 
 
 def test_compiled_code_lies_where_the_user_says(tmp_path, monkeypatch):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    assert Path(compilation._cache_folder()).parent == tmp_path
+    assert Path(compilation._cache_folders()[0]).parent == tmp_path
 
 
 def double(x):
@@ -210,7 +210,7 @@ def double(x):
 
 
 def test_a_law_is_compiled_anew_if_nothing_can_be_stored(monkeypatch):
-    def no_folder(function):
+    def no_folder(function, _read_only):
         raise RuntimeError(f"cannot cache {function}: no locator available")
 
     monkeypatch.setattr(compilation, "LawCache", no_folder)

@@ -17,8 +17,6 @@ from wm_drake.live.exported import bundled, export_page
 from wm_drake.parameters import SpinProfile
 from wm_drake.report.scripts import Scripts
 from wm_drake.simulation.cases import Case
-from wm_drake.studies.spin.options import SpinOptions
-from wm_drake.studies.spin.task import SpinTask
 
 
 @pytest.mark.parametrize(
@@ -92,9 +90,9 @@ def test_a_report_allows_the_page_in_its_frame_and_nothing_of_its_texts(monkeypa
     assert "frame-src" not in Scripts().policy()
 
 
-def test_live_needs_one_variant(machine):
+def test_live_needs_one_variant():
     with pytest.raises(InputError, match="--live"):
-        SpinTask(SpinOptions(compare_gasket=True, live=True), machine)
+        wm.run_study("spin", "reference", compare_gasket=True, live=True, quiet=True)
 
 
 def test_the_profile_of_a_command_is_that_of_its_page(monkeypatch, reference):

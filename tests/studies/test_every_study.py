@@ -89,7 +89,7 @@ def test_interrupted_at_the_end_it_keeps_its_runs_and_writes_what_it_promises(
     assert made["command"] == STUDIES[name].folder_owner
     assert {"report.html", *made["files"], "run.json"} == files() - {LEDGER}
     assert any(file.endswith(".csv") for file in made["files"])
-    options = STUDIES[name].options(**made["options"])
+    options = STUDIES[name].all_options(**made["options"])
     assert options.model_dump(mode="json") == made["options"]
     page = Path("out/report.html").read_text(encoding="utf-8")
     assert "<code>wm-drake " in page

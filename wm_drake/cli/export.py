@@ -8,9 +8,9 @@ import typer
 from wm_drake.cli.common import MachineOption, OverwriteOption, SetOption
 from wm_drake.cli.options import with_options
 from wm_drake.export.options import FmuOptions
-from wm_drake.parameters.written_files import check_new
 from wm_drake.report.terminal import say
 from wm_drake.studies.inputs import load_parameters, located_in, machine_warnings
+from wm_drake.written_files import check_new
 
 app = typer.Typer(no_args_is_help=True)
 DEFAULT_PAGE = Path("machine.html")

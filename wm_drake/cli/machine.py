@@ -14,10 +14,10 @@ from wm_drake.cli.common import JsonOption, OverwriteOption, SetOption
 from wm_drake.cli.new_machine import NewOptions, machine_new
 from wm_drake.cli.options import with_options
 from wm_drake.errors import InputError, WmDrakeError, input_error, shortened
-from wm_drake.parameters.written_files import check_new, write_files
 from wm_drake.report.provenance import command_line
 from wm_drake.report.terminal import say
 from wm_drake.studies.inputs import built_with_problems, load_parameters, located_in
+from wm_drake.written_files import check_new, write_files
 
 app = typer.Typer(no_args_is_help=True)
 

@@ -10,10 +10,10 @@ from typing import Annotated, Any
 import typer
 
 from wm_drake.errors import InputError, input_error
-from wm_drake.parameters.written_files import OTHER_NAME, check_new, write_files
 from wm_drake.report.terminal import say
 from wm_drake.studies.inputs import existing_file
 from wm_drake.studies.study import OptionModel, option
+from wm_drake.written_files import OTHER_NAME, check_new, write_files
 
 
 class NewOptions(OptionModel):

@@ -8,7 +8,7 @@ every operation; a law that calls other laws calls their generic forms then.
 Rules for the source: choose between values with ``where``, and take functions from
 `wm_drake.compiler.elementary`; the condition of an ``if`` must be the same in all lanes, such as a
 `whole_number`. ``np.sign`` drops derivatives, a square root of zero has none. Numbers of other
-modules become constants of the compiled code: they must be in files that `_cache_folder` hashes.
+modules become constants of the compiled code: they must be in files that `_cache_folders` hashes.
 """
 
 import atexit

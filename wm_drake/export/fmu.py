@@ -39,8 +39,8 @@ from wm_drake.export.object_code import (
 )
 from wm_drake.export.options import FmuOptions
 from wm_drake.parameters import MachineParameters
-from wm_drake.parameters.written_files import check_new, temporary_folder, write_files
 from wm_drake.simulation.outputs import variables_of
+from wm_drake.written_files import check_new, temporary_folder, write_files
 
 WRAPPER = Path(__file__).parent / "c" / "fmu.c"
 VERSIONS = (2, 3)

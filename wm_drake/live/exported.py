@@ -17,8 +17,8 @@ from typing import Any
 from wm_drake.errors import check_known, input_error
 from wm_drake.live.page_data import page_data
 from wm_drake.parameters import MachineParameters
-from wm_drake.parameters.written_files import check_new, write_files
 from wm_drake.simulation.cases import Case, is_as_measured, notice_jumping_friction
+from wm_drake.written_files import check_new, write_files
 
 STATIC = Path(__file__).parent / "static"
 POLICY = (

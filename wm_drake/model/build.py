@@ -162,8 +162,7 @@ def build_machine(
         >>> import wm_drake as wm
         >>> from pydrake.systems.analysis import Simulator
         >>> machine = wm.build_machine("reference", load="counter")
-        >>> simulator = Simulator(machine.diagram)
-        >>> simulator.Initialize()
+        >>> status = Simulator(machine.diagram).AdvanceTo(0.1)
         >>> sorted(machine.springs)
         ['left', 'rear', 'right']
     """

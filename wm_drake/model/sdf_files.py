@@ -16,7 +16,7 @@ from wm_drake.model.sdf_elements import element_problems, problem_at
 from wm_drake.model.sdf_text import Node, SdfTextError, read_sdf
 from wm_drake.parameters.inertia import fault_of_mass_properties, inertia_matrix
 from wm_drake.parameters.text_files import read_text
-from wm_drake.parameters.written_files import temporary_folder
+from wm_drake.written_files import temporary_folder
 
 MOST_FILES = 50
 """Largest number of files that an SDF consists of."""

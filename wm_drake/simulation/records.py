@@ -18,11 +18,11 @@ from wm_drake.model.machine import Setup
 from wm_drake.parameters import Load, SpinProfile
 from wm_drake.parameters.cabinet import Cabinet
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.written_files import write_files
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.mounts import mount_names
 from wm_drake.simulation.netcdf import netcdf_bytes
 from wm_drake.simulation.outputs import branch_names, masses_of, others_by_kind, variables_of
+from wm_drake.written_files import write_files
 
 Record: TypeAlias = xr.Dataset
 """Outputs of one run over time, in SI units.

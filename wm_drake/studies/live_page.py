@@ -5,12 +5,12 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from wm_drake.errors import input_error
-from wm_drake.parameters import MachineParameters
-from wm_drake.simulation.cases import Case
 from wm_drake.studies.blocks import Extend, PageBlock
 from wm_drake.studies.study import option
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # --help does not wait for them
+    from wm_drake.parameters import MachineParameters
+    from wm_drake.simulation.cases import Case
     from wm_drake.studies.spin.task import SpinTask
     from wm_drake.studies.verdict.task import VerdictTask
 
@@ -43,7 +43,7 @@ def _of_verdict(task: "VerdictTask") -> Extend | None:
 
 
 def _with_page(
-    parameters: MachineParameters, cases: Sequence[Case], given: str, sets: Sequence[str]
+    parameters: "MachineParameters", cases: "Sequence[Case]", given: str, sets: Sequence[str]
 ) -> Extend:
     """Return the function that adds a page, which is made before any run."""
     from wm_drake.live.exported import page_of_cases  # most pages have none

@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import Any
 
 from wm_drake.errors import input_error, reason_of
-from wm_drake.parameters.written_files import try_folder, unwritable
 from wm_drake.report.provenance import command_line, now, source_revision, version
+from wm_drake.written_files import try_folder, unwritable
 
 RUN_FILE = "run.json"
 """Name of the file that describes the run that wrote a folder."""

@@ -20,12 +20,12 @@ from typing import Any
 from wm_drake.errors import WmDrakeError, input_error
 from wm_drake.live.machine import OpenMachine
 from wm_drake.live.state import PageState
-from wm_drake.parameters.written_files import unwritable, write_files
 from wm_drake.report.provenance import now
 from wm_drake.studies.study import STUDIES
 from wm_drake.studio.forms import arguments
 from wm_drake.studio.machines import Machines
 from wm_drake.studio.saving import chosen, write_machine
+from wm_drake.written_files import unwritable, write_files
 
 MOST_RUNNING = 4
 """Largest number of studies that run at a time."""

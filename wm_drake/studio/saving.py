@@ -10,9 +10,9 @@ from wm_drake.live.machine import OpenMachine
 from wm_drake.live.state import DESCRIBED, PageState
 from wm_drake.parameters import MachineParameters, load_machine, machine_path, shipped_machines
 from wm_drake.parameters.files import extended_files, machine_changes, yaml_text
-from wm_drake.parameters.written_files import unwritable, write_files
 from wm_drake.report.provenance import now
 from wm_drake.studio.machines import Machines
+from wm_drake.written_files import unwritable, write_files
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,63}")
 

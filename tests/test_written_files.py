@@ -16,7 +16,7 @@ import wm_drake
 from wm_drake.errors import InputError
 from wm_drake.export import fmu
 from wm_drake.live import exported
-from wm_drake.parameters.written_files import write_files
+from wm_drake.written_files import write_files
 
 PACKAGE = Path(wm_drake.__file__).parent
 
@@ -121,7 +121,7 @@ def test_a_file_that_appears_meanwhile_stays(tmp_path):
 REFUSED = """
 from pathlib import Path
 from wm_drake.errors import InputError
-from wm_drake.parameters.written_files import check_new
+from wm_drake.written_files import check_new
 from wm_drake.studies.result_folder import check_is_folder
 for check in (lambda: check_is_folder(Path("out")), lambda: check_new([Path("m")], replace=True)):
     try:
@@ -142,7 +142,7 @@ def test_a_read_only_file_system_is_named(tmp_path):
 INTO_TEMPORARY = {
     "compiler/cache_files", "compiler/kept", "simulation/first_call",  # compiled code
     "export/fmu", "model/sdf_files",  # a temporary folder
-    "parameters/written_files", "studies/result_folder",  # the two homes
+    "written_files", "studies/result_folder",  # the two homes
     "report/publication", "studies/answer", "studies/run", "studies/spin/study", "studies/study",
     "studio/jobs",  # the output of a process while it runs
 }  # fmt: skip
