@@ -35,6 +35,9 @@ TABLES = ("linear", "scaled")
 "scaled": the forces of the table are scaled, so that the curve keeps its shape.
 """
 
+PRINTED = 5e-3
+"""Relative error of a number that a page prints with three digits; an end may be given so."""
+
 
 @dataclass(frozen=True)
 class Varied:
@@ -113,7 +116,7 @@ class Varied:
         number = self.numbers[0] if self.numbers else Number(self.name, None, self.unit)
         value, levels = number.resolved(text), self.first_levels
         low, _, high = levels
-        slack = 1e-9 * (high - low)
+        slack = PRINTED * max(abs(low), abs(high))
         if not low - slack <= value <= high + slack:
             ends = f"{number.unit.reading(low)} to {number.unit.reading(high)}"
             message = f"'{text}' is outside the range of factor {self.name}, {ends}"
