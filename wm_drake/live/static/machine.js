@@ -146,6 +146,7 @@ export class Machine {
     const {accuracy, mostHalvings, sliderSteps} = this.model;
     const stepping = steppingOf(profile, this.model, this.changes);
     for (let halvings = 0; ; halvings += 1) {
+      if (halvings) this.setUp(this.changes);   // a run ends where it ends: begin at rest again
       this.runWith(profile, stepping);
       const error = this.error();
       const next = 0.5 * stepping.step;
