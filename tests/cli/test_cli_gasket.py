@@ -84,9 +84,13 @@ def test_own_design_factor_file_and_one_worker_give_the_same(study_without_page,
     assert wm_drake(*own, "--out", "own").code == 0
     assert tables("own") == tables()
     Path("factors.yaml").write_text(
-        "K_Lx: {keys: [gasket.stiffness_x]}\n"
-        "C_L: {keys: [gasket.damping_x, gasket.damping_y, gasket.damping_z]}\n"
-        f"{FRICTION}: {{keys: [{FRICTION}], low: 20 N, high: 30 N}}\n"
+        "vary:\n"
+        "  K_Lx: {keys: [gasket.stiffness_x], low: 50 %, high: 150 %}\n"
+        "  C_L:\n"
+        "    keys: [gasket.damping_x, gasket.damping_y, gasket.damping_z]\n"
+        "    low: 50 %\n"
+        "    high: 150 %\n"
+        f"  {FRICTION}: {{low: 20 N, high: 30 N}}\n"
     )
     command = "study gasket --vary factors.yaml --design full --profile p.yaml --workers 1"
     assert wm_drake(command, "--out", "other").code == 0

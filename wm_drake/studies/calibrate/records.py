@@ -307,20 +307,28 @@ class RecordModel(BlockModel):
 
         def keep(number: int, record: Record) -> None:
             if not why_diverged(record):
-                self._runs[keys[number]] = self._signals(record)
+                pair = needed[keys[number]][1]
+                self._runs[keys[number]] = self._signals(record, pair.run.time.values)
 
         if cases:
             self.experiment.record(self.experiment.machine, list(cases.values()), keep, "records")
 
-    def _signals(self, record: Record) -> FloatArray:
-        """Return signals of a run and their derivatives by angles and places. (n, k, 3 or 6)"""
+    def _signals(self, record: Record, time: FloatArray) -> FloatArray:
+        """Return signals of a run and their derivatives by angles and places. (n, k, 3 or 6)
+
+        Args:
+            time: Times (n,). A run that was repeated with a shorter step has more samples. [s]
+        """
         signals = turned_signals(record, self.sensors, self.points)
         parts = [signals]
         for step in PLACE_STEP * np.eye(3) if self.has_places else ():
             moved = {name: point + step for name, point in self.points.items()}
             of_moved = turned_signals(record, self.sensors, moved)
             parts.append((of_moved[:, :, :1] - signals[:, :, :1]) / PLACE_STEP)
-        return np.concatenate(parts, axis=2)
+        values = np.concatenate(parts, axis=2)
+        if np.array_equal(record.time, time):
+            return values
+        return np.asarray(CubicSpline(record.time.values, values)(time))
 
 
 def _nuisance(name: str, expected: float, deviation: float, unit: Unit) -> Unknown:
