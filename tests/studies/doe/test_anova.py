@@ -40,11 +40,11 @@ def battery():
 
 def test_battery_table_of_the_textbook():
     data = battery()
-    table = anova(data[["material", "temperature"]], data[["hours"]])["hours"]
+    table = anova(data[["material", "temperature"]], data[["hours"]]).sel(response="hours")
     # the printed sums of squares as variances: 36 batteries; the mean square of the error is 675.21
     total = (10683.72 + 39118.72 + 9613.78) / 36.0 + 18230.75 / 27.0
-    for term in table.terms:
-        sum_sq, df, f = BATTERY_TABLE[term.name]
+    for name, (sum_sq, df, f) in BATTERY_TABLE.items():
+        term = table.sel(term=name)
         assert (term.sum_sq, term.df, term.f) == (
             pytest.approx(sum_sq, abs=0.006),
             df,
@@ -55,7 +55,7 @@ def test_battery_table_of_the_textbook():
     assert table.residual_sum_sq == pytest.approx(18230.75, abs=0.006)
     assert table.total_sum_sq == pytest.approx(77646.97, abs=0.006)
     assert table.residual_df == 27
-    assert table.terms[2].p == pytest.approx(0.0186, abs=5e-5)
+    assert table.p[2] == pytest.approx(0.0186, abs=5e-5)
     assert table.constant == pytest.approx(105.53, abs=0.005)
 
 
@@ -88,9 +88,10 @@ def test_reference_case_of_statsmodels(dropped):
     data = kidney().drop(index=dropped)
     assert len(kidney()) == 60
     expected = statsmodels_table(data, "log_days", ["Duration", "Weight"]).drop(index="Intercept")
-    table = anova(data[["Duration", "Weight"]], data[["log_days"]])["log_days"]
-    for (_, row), term in zip(expected.iloc[:3].iterrows(), table.terms, strict=True):
-        assert (term.sum_sq, term.df, term.f, term.p) == pytest.approx(
+    table = anova(data[["Duration", "Weight"]], data[["log_days"]]).sel(response="log_days")
+    for (_, row), term in zip(expected.iloc[:3].iterrows(), table.term, strict=True):
+        found = table.sel(term=term)
+        assert (found.sum_sq, found.df, found.f, found.p) == pytest.approx(
             (row["sum_sq"], row["df"], row["F"], row["PR(>F)"])
         )
     assert table.residual_sum_sq == pytest.approx(expected.loc["Residual", "sum_sq"])
@@ -99,11 +100,9 @@ def test_reference_case_of_statsmodels(dropped):
 def test_balanced_reference_case_as_r_prints_it():
     """Compare with R: anova(lm(log(Days+1) ~ Duration*Weight)), as in statsmodels' test file."""
     data = kidney()
-    table = anova(data[["Duration", "Weight"]], data[["log_days"]])["log_days"]
-    assert [term.sum_sq for term in table.terms] == pytest.approx(
-        [2.3397, 16.9713, 0.6357], abs=5e-5
-    )
-    assert [term.f for term in table.terms] == pytest.approx([4.3583, 15.8064, 0.5920], abs=5e-4)
+    table = anova(data[["Duration", "Weight"]], data[["log_days"]]).sel(response="log_days")
+    assert table.sum_sq.values == pytest.approx([2.3397, 16.9713, 0.6357], abs=5e-5)
+    assert table.f.values == pytest.approx([4.3583, 15.8064, 0.5920], abs=5e-4)
 
 
 NAMES = list("abcdefgh")
@@ -135,24 +134,18 @@ def test_known_effects_are_recovered_exactly_by_any_design(seed, kind):
     cross = rng.normal(size=(3, 3))
     cross -= cross.mean(axis=0, keepdims=True)
     cross -= cross.mean(axis=1, keepdims=True)
-    table = anova(design_of(levels), pd.DataFrame({"y": planted(levels, main, cross)}))["y"]
+    table = anova(design_of(levels), pd.DataFrame({"y": planted(levels, main, cross)})).sel(
+        response="y"
+    )
     assert table.constant == pytest.approx(7.0)
-    variances = {(NAMES[f],): np.mean(effects**2) for f, effects in enumerate(main)} | {
-        ("a", "b"): np.mean(cross**2)
-    }
-    total = sum(variances.values())
-    for term in table.terms:
-        assert 100.0 * term.share == pytest.approx(
-            100.0 * variances.get(term.factors, 0.0) / total, abs=1e-8
-        )
-        for combination, effect in term.effects.items():
-            places = tuple(level + 1 for level in combination)
-            expected = 0.0
-            if len(places) == 1:
-                expected = main[NAMES.index(term.name), places[0]]
-            elif term.factors == ("a", "b"):
-                expected = cross[places]
-            assert effect == pytest.approx(expected, abs=1e-9)
+    effects = {NAMES[f]: of_factor for f, of_factor in enumerate(main)} | {"a:b": cross}
+    total = sum(np.mean(of_term**2) for of_term in effects.values())
+    for name in table.term.values.tolist():
+        term, expected = table.sel(term=name), effects.get(name, np.zeros((3, 3)))
+        share = np.mean(expected**2) / total
+        assert 100.0 * term.share == pytest.approx(100.0 * share, abs=1e-8)
+        found = term.effect.values[:, 1:] if ":" in name else term.effect.values[:, 0]
+        assert found == pytest.approx(expected, abs=1e-9)
     assert 100.0 * table.unexplained == pytest.approx(0.0, abs=1e-12)
     assert table.main + table.interaction == pytest.approx(1.0)
 
@@ -168,7 +161,7 @@ def test_contributions_of_an_orthogonal_design_are_those_of_statsmodels(levels):
         + 2.0 * levels[:, 0] * levels[:, 1]
     )
     data = design_of(levels).assign(y=response)
-    table = anova(data.drop(columns="y"), data[["y"]])["y"]
+    table = anova(data.drop(columns="y"), data[["y"]]).sel(response="y")
     formula = f"y ~ ({' + '.join(f'C({name}, Sum)' for name in data.columns[:-1])})**2"
     expected = anova_lm(ols(formula, data).fit(), typ=3).drop(index="Intercept")
     # sums of squares as variances over the grid: the residual with its degrees of freedom, and with
@@ -178,16 +171,16 @@ def test_contributions_of_an_orthogonal_design_are_those_of_statsmodels(levels):
     variances = expected["sum_sq"] / trials
     variances["Residual"] *= trials / table.residual_df * (1.0 - coefficients / grid)
     percents = 100.0 * variances / variances.sum()
-    found = [*(100.0 * term.share for term in table.terms), 100.0 * table.unexplained]
+    found = [*(100.0 * table.share.values), 100.0 * table.unexplained]
     assert found == pytest.approx(list(percents))
     assert sum(found) == pytest.approx(100.0)
 
 
 def test_response_that_does_not_vary_has_no_contributions():
     levels = level_matrix(3)
-    table = anova(design_of(levels), pd.DataFrame({"y": np.full(27, 0.3)}))["y"]
+    table = anova(design_of(levels), pd.DataFrame({"y": np.full(27, 0.3)})).sel(response="y")
     assert table.constant == pytest.approx(0.3)
-    assert all(np.isnan(100.0 * term.share) for term in table.terms)
+    assert table.share.isnull().all()
     assert np.isnan(100.0 * table.unexplained)
 
 
@@ -195,7 +188,7 @@ def test_predicted_r2_is_that_of_fits_without_each_trial():
     rng = np.random.default_rng(3)
     levels = d_optimal_levels(4, 60, "main+2fi", 0)
     response = 4.0 * levels[:, 0] + np.prod(levels[:, :3], axis=1) + rng.normal(size=60)
-    table = anova(design_of(levels), pd.DataFrame({"y": response}))["y"]
+    table = anova(design_of(levels), pd.DataFrame({"y": response})).sel(response="y")
     matrix = SumCoding(design_of(levels), interactions=True).matrix
     press = 0.0
     for out in range(60):
@@ -214,14 +207,14 @@ def test_residual_share_is_that_of_the_grid_for_any_number_of_trials():
     full = level_matrix(5)
     response = 2.0 * full[:, 0] + full[:, 1] * full[:, 2] + rng.normal(size=len(full))
     frame = pd.DataFrame({"y": response})
-    truth = anova(design_of(full), frame)["y"].unexplained
+    truth = anova(design_of(full), frame).unexplained.item()
     plain, corrected = [], []
     for _ in range(150):
         rows = rng.choice(len(full), 75, replace=False)
-        table = anova(design_of(full[rows]), frame.iloc[rows])["y"]
+        table = anova(design_of(full[rows]), frame.iloc[rows]).sel(response="y")
         plain.append(table.residual_sum_sq / 75.0)
         corrected.append(SumCoding(design_of(full[rows]), True).residual_variance(75.0 * plain[-1]))
-    over_grid = anova(design_of(full), frame)["y"].residual_sum_sq / len(full)
+    over_grid = anova(design_of(full), frame).residual_sum_sq.item() / len(full)
     assert truth == pytest.approx(over_grid / np.var(response))
     assert np.mean(corrected) == pytest.approx(over_grid, rel=0.05)
     assert np.mean(plain) < 0.5 * over_grid
@@ -229,7 +222,7 @@ def test_residual_share_is_that_of_the_grid_for_any_number_of_trials():
 
 def test_saturated_design_has_no_residual_and_no_predicted_r2():
     levels = level_matrix(2)
-    table = anova(design_of(levels), pd.DataFrame({"y": np.arange(9.0) ** 2}))["y"]
+    table = anova(design_of(levels), pd.DataFrame({"y": np.arange(9.0) ** 2})).sel(response="y")
     assert table.residual_df == 0
     assert all(np.isnan([100.0 * table.unexplained, table.adjusted_r2, table.predicted_r2]))
     assert table.main + table.interaction == pytest.approx(1.0)

@@ -27,10 +27,11 @@ squares), by the leverages h of the hat matrix:
 import functools
 import itertools
 import math
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 from scipy.special import fdtrc
 
 from wm_drake.parameters.types import FloatArray
@@ -39,73 +40,15 @@ from wm_drake.studies.threads import on_one_thread
 LARGEST_LEVERAGE = 1.0 - 1e-9
 """Leverage above which a trial cannot be left out: the others do not determine the model."""
 
-Combination = tuple[int, ...]
-"""One level for each factor of a term."""
-
-
-@dataclass(frozen=True)
-class Term:
-    """Contribution, test and effects of one term of the model.
-
-    Attributes:
-        factors: Names of the factors; one for a main effect, two for an interaction.
-        share: Contribution: mean square of the effects over all level combinations, as a part of
-            the total variance there.
-        sum_sq: Sum of squares of type III over the trials. [unit of the response, squared]
-        df: Degrees of freedom.
-        f, p: F statistic against the residual and its p-value. They are meaningful only if the
-            residual is noise.
-        effects: By level combination: deviation from the prediction by all terms of lower order.
-            [unit of the response]
-    """
-
-    factors: tuple[str, ...]
-    share: float
-    sum_sq: float
-    df: int
-    f: float
-    p: float
-    effects: dict[Combination, float]
-
-    @property
-    def name(self) -> str:
-        """Names of the factors, joined by a colon."""
-        return ":".join(self.factors)
-
-
-@dataclass(frozen=True)
-class AnovaTable:
-    """Analysis of variance of one response.
-
-    Attributes:
-        constant: Mean over all level combinations. [unit of the response]
-        terms: Main effects, then interactions, in the order of the factors.
-        main, interaction, unexplained: Contributions of all main effects, all interactions and the
-            residual; they sum to 1. If there are as many coefficients as trials, the residual is
-            unknown: NaN, and the other two sum to 1.
-        total_sum_sq, residual_sum_sq: Sums of squares over the trials, about the mean and about the
-            fit. [unit of the response, squared]
-        residual_df: Degrees of freedom of the residual.
-        adjusted_r2: Explained part of the variance, adjusted for the degrees of freedom; NaN
-            without any. At most 1.
-        predicted_r2: Part of the variance that the model predicts of trials that are left out, one
-            at a time; NaN without degrees of freedom. At most 1; negative if the mean predicts
-            better than the model.
-        fitted, residual: (trials,) fitted value and residual. [unit of the response]
-    """
-
-    constant: float
-    terms: tuple[Term, ...]
-    main: float
-    interaction: float
-    unexplained: float
-    total_sum_sq: float
-    residual_sum_sq: float
-    residual_df: int
-    adjusted_r2: float
-    predicted_r2: float
-    fitted: FloatArray
-    residual: FloatArray
+DIMENSIONS = {
+    **dict.fromkeys(("constant", "main", "interaction", "unexplained"), ()),
+    **dict.fromkeys(("total_sum_sq", "residual_sum_sq", "residual_df"), ()),
+    **dict.fromkeys(("adjusted_r2", "predicted_r2"), ()),
+    **dict.fromkeys(("share", "sum_sq", "df", "f", "p"), ("term",)),
+    "effect": ("term", "level", "other_level"),
+    **dict.fromkeys(("fitted", "residual"), ("trial",)),
+}
+"""Dimensions of the variables of an analysis, beside `response`."""
 
 
 class SumCoding:
@@ -178,13 +121,25 @@ class SumCoding:
         unseen = 0.0 if self._is_repeated else self.matrix.shape[1] / self._grid_size
         return sum_sq / self.residual_df * (1.0 - unseen)
 
-    def effects(self, term: tuple[str, ...], coefficients: FloatArray) -> dict[Combination, float]:
-        """Return the effects of a term at all its level combinations, from its coefficients."""
+    def effects(self, term: tuple[str, ...], coefficients: FloatArray) -> FloatArray:
+        """Return the effects of a term at its level combinations. (levels, 1 + levels)
+
+        Those of a main effect are in the first column, those of an interaction in the others; NaN
+        elsewhere.
+
+        Args:
+            coefficients: Those of the term.
+        """
         table = coefficients.reshape([self.codes[name].shape[1] for name in term])
         for axis, name in enumerate(term):
             table = np.moveaxis(np.tensordot(self.codes[name], table, axes=(1, axis)), 0, axis)
-        combinations = itertools.product(*(self.levels[name] for name in term))
-        return dict(zip(combinations, map(float, table.ravel()), strict=True))
+        most = max(map(len, self.levels.values()))
+        effects = np.full((most, 1 + most), np.nan)
+        if table.ndim == 1:
+            effects[: len(table), 0] = table
+        else:
+            effects[: len(table), 1 : 1 + table.shape[1]] = table
+        return effects
 
 
 def _sum_code(levels: int) -> FloatArray:
@@ -196,10 +151,8 @@ def _sum_code(levels: int) -> FloatArray:
 
 
 @on_one_thread
-def anova(
-    levels: pd.DataFrame, responses: pd.DataFrame, interactions: bool = True
-) -> dict[str, AnovaTable]:
-    """Return the analysis of variance of each response.
+def anova(levels: pd.DataFrame, responses: pd.DataFrame, interactions: bool = True) -> xr.Dataset:
+    """Return the analysis of variance of responses.
 
     Args:
         levels: One row per trial, one column per factor.
@@ -207,59 +160,79 @@ def anova(
         interactions: Whether the model has two-factor interactions.
 
     Returns:
-        Tables by name of the response. If a response is constant, all its contributions are NaN.
+        Over `response`, in its unit or the square of it: `constant`, the mean over all level
+        combinations; the contributions of all `main` effects, all interactions (`interaction`) and
+        the residual (`unexplained`), which sum to 1, NaN if the response is constant; if there are
+        as many coefficients as trials, the residual is NaN and the other two sum to 1;
+        `total_sum_sq` and `residual_sum_sq` over the trials, about the mean and about the fit;
+        `residual_df`, degrees of freedom; `adjusted_r2`, the explained part of the variance,
+        adjusted for these, and `predicted_r2`, the part that the model predicts of trials that are
+        left out, one at a time: both at most 1, NaN without degrees of freedom; the second is
+        negative if the mean predicts better than the model.
+        Over `term` too, main effects, then interactions with names such as a:b: `share`, its
+        contribution; `sum_sq` of type III over the trials; `df`; `f` and `p`, F statistic against
+        the residual and its p-value, meaningful only if the residual is noise.
+        `effect` of each term at the `level` of its first factor and `other_level`, 0 for a main
+        effect, else 1 and more for the levels of its second factor in rising order: the deviation
+        from the prediction by all terms of lower order.
+        `fitted` and `residual` of each `trial`.
     """
     coding = SumCoding(levels, interactions)
-    return {
-        str(name): _analysed(coding, responses[name].to_numpy(dtype=float))
-        for name in responses.columns
-    }
+    analysed = [_analysed(coding, column.to_numpy(dtype=float)) for _, column in responses.items()]
+    return xr.Dataset(
+        {
+            name: (("response", *dims), np.array([numbers[name] for numbers in analysed]))
+            for name, dims in DIMENSIONS.items()
+        },
+        {"response": list(responses.columns), "term": [":".join(term) for term in coding.terms]},
+    )
 
 
-def _analysed(coding: SumCoding, response: FloatArray) -> AnovaTable:
+def _analysed(coding: SumCoding, response: FloatArray) -> dict[str, Any]:
+    """Return the numbers of `DIMENSIONS` of one response."""
     params = coding.inverse @ response
     fitted = coding.matrix @ params
     residual = response - fitted
     df_resid, ssr = len(response) - coding.rank, float(residual @ residual)
     total = float(np.sum((response - response.mean()) ** 2))
     noise = ssr / df_resid if df_resid > 0 else np.nan
-    effects = {
-        term: coding.effects(term, params[columns]) for term, columns in coding.columns.items()
-    }
-    variances = {
-        term: float(np.mean(np.square(list(values.values())))) for term, values in effects.items()
-    }
+    parts = {term: params[columns] for term, columns in coding.columns.items()}
+    effects = [coding.effects(term, part) for term, part in parts.items()]
+    variances = [float(np.mean(np.square(of[np.isfinite(of)]))) for of in effects]
     unexplained = coding.residual_variance(ssr)
-    variance = sum(variances.values()) + (0.0 if math.isnan(unexplained) else unexplained)
+    variance = sum(variances) + (0.0 if math.isnan(unexplained) else unexplained)
     # the variance of a constant response is not 0 but about 1e-32 of its square, by rounding
     scale = 1.0 / variance if variance > 1e-20 * float(np.mean(response**2)) else np.nan
-    terms = []
-    for term, columns in coding.columns.items():
-        df, coefficients = columns.stop - columns.start, params[columns]
-        sum_sq = float(
-            coefficients @ np.linalg.solve(coding.covariance[columns, columns], coefficients)
-        )
-        with np.errstate(divide="ignore", invalid="ignore"):
-            f = float(np.divide(sum_sq / df, noise))
-        p = float(fdtrc(df, df_resid, f)) if df_resid > 0 else np.nan
-        terms.append(Term(term, scale * variances[term], sum_sq, df, f, p, effects[term]))
+    sums = [
+        float(part @ np.linalg.solve(coding.covariance[columns, columns], part))
+        for columns, part in zip(coding.columns.values(), parts.values(), strict=True)
+    ]
+    df, shares = np.array([len(part) for part in parts.values()]), scale * np.array(variances)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        f = np.divide(np.array(sums) / df, noise)
     adjusted_r2 = predicted_r2 = math.nan
     if math.isfinite(scale) and df_resid:
         adjusted_r2 = 1.0 - (len(response) - 1) / df_resid * (ssr / total)
         if np.max(coding.leverages) <= LARGEST_LEVERAGE:  # else a trial alone determines a term
             press = np.sum((residual / (1.0 - coding.leverages)) ** 2)
             predicted_r2 = 1.0 - float(press) / total
-    return AnovaTable(
-        constant=float(params[0]),
-        terms=tuple(terms),
-        main=sum(term.share for term in terms if len(term.factors) == 1),
-        interaction=sum(term.share for term in terms if len(term.factors) > 1),
-        unexplained=scale * unexplained,
-        total_sum_sq=total,
-        residual_sum_sq=ssr,
-        residual_df=df_resid,
-        adjusted_r2=adjusted_r2,
-        predicted_r2=predicted_r2,
-        fitted=fitted,
-        residual=residual,
-    )
+    is_main = np.array([len(term) == 1 for term in parts], dtype=bool)
+    return {
+        "constant": params[0],
+        "main": sum(shares[is_main].tolist()),
+        "interaction": sum(shares[~is_main].tolist()),
+        "unexplained": scale * unexplained,
+        "total_sum_sq": total,
+        "residual_sum_sq": ssr,
+        "residual_df": df_resid,
+        "adjusted_r2": adjusted_r2,
+        "predicted_r2": predicted_r2,
+        "share": shares,
+        "sum_sq": sums,
+        "df": df,
+        "f": f,
+        "p": fdtrc(df, df_resid, f) if df_resid > 0 else np.full(len(df), np.nan),
+        "effect": effects,
+        "fitted": fitted,
+        "residual": residual,
+    }

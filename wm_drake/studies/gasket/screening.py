@@ -16,8 +16,7 @@ there are `kind`, `about` and `better`. The attribute `design` has the `Design`.
 """
 
 import itertools
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
@@ -32,7 +31,7 @@ from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import number, three_digits
 from wm_drake.report.quantity import SHARE, Quantity, each_of
 from wm_drake.simulation.measures.kind import Better
-from wm_drake.studies.doe.anova import AnovaTable, Term, anova
+from wm_drake.studies.doe.anova import anova
 from wm_drake.studies.doe.coding import LEVELS, efficiency
 from wm_drake.studies.doe.design import Design
 
@@ -73,6 +72,27 @@ ADJUSTED_R2 = Quantity("adjusted R²", form=r2_text)
 OVERLAP = Quantity("gap", Unit("m", "mm"), form=three_digits)
 EFFECT = Quantity("effect", form=three_digits)
 COUNT = Quantity("degrees of freedom", decimals=0)
+
+OF_ANALYSIS = {
+    "mean": MEAN,
+    "main": CONTRIBUTION.named("main effects"),
+    "interaction": CONTRIBUTION.named("interactions"),
+    "unexplained": CONTRIBUTION.named("residual"),
+    "residual_deviation": MEAN.named("residual standard deviation"),
+    "residual_df": COUNT,
+    "adjusted_r2": ADJUSTED_R2,
+    "predicted_r2": PREDICTED_R2,
+    "share": CONTRIBUTION,
+    "sum_sq_share": CONTRIBUTION.named("sum of squares"),
+    "df": COUNT,
+    "f": Quantity("F"),
+    "p": Quantity("p"),
+    "effect": EFFECT,
+}
+"""Quantities of what an analysis of variance finds."""
+
+IN_UNIT_OF_RESPONSE = ("mean", "residual_deviation", "effect")
+"""Those of them that have the unit of the response."""
 
 OTHER_LEVELS = ("", *map(str, LEVELS))
 """Labels of the level of the second factor of a term; "" if it has none."""
@@ -153,7 +173,7 @@ def analyse(design: Design, runs: xr.Dataset) -> xr.Dataset:
         InputError: so many runs failed that the others do not determine the effects.
     """
     levels = pd.DataFrame(design.levels, columns=list(design.factors))
-    names, tables, trials = runs.response.values.tolist(), [], []
+    names, analysed = runs.response.values.tolist(), []
     for load in runs["load"].values.tolist():
         values = runs.value.sel(load=load)
         good = good_trials(values)
@@ -164,17 +184,15 @@ def analyse(design: Design, runs: xr.Dataset) -> xr.Dataset:
                 where=f"load {load}",
             )
         frame = pd.DataFrame(values.values[good], columns=names)
-        by_response = anova(levels[good], frame, interactions=design.model != "main")
-        tables.append([by_response[name] for name in names])
-        trials.append(good)
-    screening = runs.assign(_of_runs(runs.value) | _of_tables(tables, each_of(runs.value)))
+        of_load = anova(levels[good], frame, interactions=design.model != "main")
+        analysed.append(of_load.assign_coords(trial=runs.trial.values[good]))
+    loads = xr.Variable("load", runs["load"].values)
+    joined = xr.concat(analysed, loads, join="outer").reindex(trial=runs.trial)
+    screening = runs.assign(_of_runs(runs.value) | _of_analysis(joined, each_of(runs.value)))
     for name in ("fitted", "residual"):
-        array = np.full(runs.value.shape, np.nan)
-        for of_load, good, rows in zip(tables, trials, array, strict=True):
-            rows[good] = np.column_stack([getattr(table, name) for table in of_load])
-        screening[name] = runs.value.copy(deep=False, data=array)
-    terms = [term.name for term in tables[0][0].terms]
-    labels = {"term": terms, "level": list(LEVELS), "other_level": list(OTHER_LEVELS)}
+        array = joined[name].transpose(*runs.value.dims)
+        screening[name] = runs.value.copy(deep=False, data=array.values)
+    labels = {"term": joined.term, "level": list(LEVELS), "other_level": list(OTHER_LEVELS)}
     return screening.assign_coords(labels).assign_attrs(design=design)
 
 
@@ -198,63 +216,27 @@ def _of_runs(values: xr.DataArray) -> dict[str, xr.DataArray]:
     return {name: VALUE.named(words.get(name, name)).on(array) for name, array in numbers.items()}
 
 
-def _of_tables(
-    tables: Sequence[Sequence[AnovaTable]], each: Mapping[str, Quantity]
-) -> dict[str, xr.Variable]:
-    """Return the variables of analyses of variance.
+def _of_analysis(analysed: xr.Dataset, each: Mapping[str, Quantity]) -> dict[str, xr.Variable]:
+    """Return the variables of analyses of variance, with their quantities.
 
     Args:
-        tables: By load and response.
+        analysed: As of `anova`, over `load` too.
         each: Quantities of the responses.
     """
-
-    def of(
-        quantity: Quantity, pick: Callable[[AnovaTable], Any], *dims: str, is_response: bool = False
-    ) -> xr.Variable:
-        values = np.array([[pick(table) for table in of_load] for of_load in tables], dtype=float)
-        named = ("load", "response", *dims)
-        if is_response:
-            return quantity.of_each("response", each, named, values)
-        return quantity.variable(named, values)
-
-    def of_terms(quantity: Quantity, pick: Callable[[AnovaTable, Term], float]) -> xr.Variable:
-        return of(quantity, lambda table: [pick(table, term) for term in table.terms], "term")
-
-    return {
-        "mean": of(MEAN, lambda t: t.constant, is_response=True),
-        "main": of(CONTRIBUTION.named("main effects"), lambda t: t.main),
-        "interaction": of(CONTRIBUTION.named("interactions"), lambda t: t.interaction),
-        "unexplained": of(CONTRIBUTION.named("residual"), lambda t: t.unexplained),
-        "residual_deviation": of(
-            MEAN.named("residual standard deviation"), _residual_deviation, is_response=True
-        ),
-        "residual_df": of(COUNT, lambda t: t.residual_df),
-        "adjusted_r2": of(ADJUSTED_R2, lambda t: t.adjusted_r2),
-        "predicted_r2": of(PREDICTED_R2, lambda t: t.predicted_r2),
-        "share": of_terms(CONTRIBUTION, lambda _, term: term.share),
-        "sum_sq_share": of_terms(
-            CONTRIBUTION.named("sum of squares"),
-            lambda t, term: term.sum_sq / (t.total_sum_sq or np.nan),
-        ),
-        "df": of_terms(COUNT, lambda _, term: term.df),
-        "f": of_terms(Quantity("F"), lambda _, term: term.f),
-        "p": of_terms(Quantity("p"), lambda _, term: term.p),
-        "effect": of(EFFECT, _effects, "term", "level", "other_level", is_response=True),
-    }
-
-
-def _residual_deviation(table: AnovaTable) -> float:
-    return math.sqrt(table.residual_sum_sq / table.residual_df) if table.residual_df else math.nan
-
-
-def _effects(table: AnovaTable) -> FloatArray:
-    """Return the effects of all terms. (terms, levels, other levels) NaN where a term has none."""
-    effects = np.full((len(table.terms), len(LEVELS), len(OTHER_LEVELS)), np.nan)
-    for number_of_term, term in enumerate(table.terms):
-        for (first, *second), effect in term.effects.items():
-            place = OTHER_LEVELS.index(str(second[0]) if second else "")
-            effects[number_of_term, LEVELS.index(first), place] = effect
-    return effects
+    freedom, total = analysed.residual_df, analysed.total_sum_sq
+    full = analysed.assign(
+        mean=analysed.constant,
+        residual_deviation=np.sqrt(analysed.residual_sum_sq / freedom.where(freedom != 0)),
+        sum_sq_share=analysed.sum_sq / total.where(total != 0.0),
+    ).transpose("load", "response", ...)
+    variables = {}
+    for name, quantity in OF_ANALYSIS.items():
+        dims, values = [str(dim) for dim in full[name].dims], full[name].values
+        if name in IN_UNIT_OF_RESPONSE:
+            variables[name] = quantity.of_each("response", each, dims, values)
+        else:
+            variables[name] = quantity.variable(dims, values)
+    return variables
 
 
 Labelled = TypeVar("Labelled", xr.Dataset, xr.DataArray)
