@@ -33,7 +33,7 @@ from wm_drake.studies.calibrate.records import GAIN_SD, TILT_SD, RecordModel
 from wm_drake.studies.compare.pairs import paired, predicted_signals
 from wm_drake.studies.compare.recordings import TestRecording
 from wm_drake.studies.experiment import Experiment, record_here
-from wm_drake.studies.fitting.sought import SoughtNumbers, sought_in
+from wm_drake.studies.fitting.free_numbers import free_numbers_of_texts
 from wm_drake.studies.tolerance.shares import share_of
 
 UNKNOWNS = ("damper_types.friction.friction_force", "loads.middle.unbalances.0.mass")
@@ -90,8 +90,8 @@ def _line(name: str, rows: pd.DataFrame) -> str:
 def _found(machine: Machine, seed: int, by: Any) -> FloatArray:
     """Return for each unknown whether its interval holds the planted value, error, half-width."""
     parameters, generator = machine.parameters, np.random.default_rng(seed)
-    sought = sought_in(parameters, UNKNOWNS)
-    truth = np.array([s.guess for s in sought]) * np.exp(generator.uniform(-SPAN, SPAN, 2))
+    free = free_numbers_of_texts(parameters, UNKNOWNS, "calibrated")
+    truth = free.guesses * np.exp(generator.uniform(-SPAN, SPAN, 2))
     planted = with_values(parameters, dict(zip(UNKNOWNS, truth.tolist(), strict=True)))
     sensors = {name: recorded_test_of(parameters).sensors[name] for name in SENSORS}
     points = machine.set_up().accelerometer_points
@@ -101,7 +101,6 @@ def _found(machine: Machine, seed: int, by: Any) -> FloatArray:
     predicted = predicted_signals(run, sensors, places)
     pairs = tuple(without_edges(paired(r, run, predicted)) for r in recordings)
     load = RecordedLoad("middle", lambda changed: changed.loads["middle"], pairs)
-    free = SoughtNumbers(parameters, sought, "calibrated")
     model = RecordModel(Experiment(machine, ()), free, sensors, (load,), places, by)
     fit, _ = calibrated(model, seed, starts=1)
     return np.array(

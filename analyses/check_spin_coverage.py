@@ -55,7 +55,9 @@ def main() -> None:
     with open_ledger(arguments.ledger, identity, resume=True) as ledger:
         for seed in range(1 if arguments.quick else arguments.seeds):
             key = key_of(
-                seed=seed, unknowns=[s.keys for s in model.free.sought], profile=model.profile
+                seed=seed,
+                unknowns=[one.keys for one in model.free.varying.every],
+                profile=model.profile,
             )
             if key not in ledger:
                 ledger.put_all({key: LedgerEntry({"row": _identified(model, seed)})})
@@ -71,15 +73,15 @@ def _model(faster: float, *, quick: bool) -> SpinModel:
     parameters = machine.parameters
     names = DEFAULT_CASES[:1] if quick else DEFAULT_CASES
     cases = tuple(case for case in load_unbalance_cases() if case.name in names)
-    sought = unknowns_of(parameters, QUICK if quick else ())
+    free = unknowns_of(parameters, QUICK if quick else ())
     experiment = Experiment(machine, ("regions",))
     profile = faster_profile(load_profile("spin_cycle"), faster)
-    return spin_model(experiment, sought, profile, cases)
+    return spin_model(experiment, free, profile, cases)
 
 
 def _identified(model: SpinModel, seed: int) -> FloatArray:
     """Return planted value, estimate, and ends of its interval, NaN without one. (unknown, 4)"""
-    planted = planted_values(model.free.sought, seed)
+    planted = planted_values(model.free, seed)
     noise = SpinIdentifyOptions.model_fields["noise"].default
     fit, _ = calibrated(with_virtual_experiment(model, planted, noise, seed), seed, starts=1)
     rows = zip(planted, fit.estimates, strict=True)

@@ -22,7 +22,7 @@ from wm_drake.simulation.recorded_signal import recorded_signal
 from wm_drake.simulation.runs import simulate
 from wm_drake.studies.calibrate.blocks import calibrated
 from wm_drake.studies.calibrate.fit_page import FitWords, summary, warnings_of
-from wm_drake.studies.fitting.sought import at_point, sought_of
+from wm_drake.studies.fitting.free_numbers import free_numbers
 from wm_drake.studies.spin_identify.study import (
     planted_values,
     spin_model,
@@ -47,8 +47,8 @@ LINEAR = (
 )
 
 
-def unknown(machine, keys):
-    return sought_of(machine, "+".join(keys), Entry(keys=keys))
+def unknowns(machine, *every):
+    return free_numbers(machine, {"+".join(k): Entry(keys=k) for k in every}, "identified")
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +61,6 @@ def reference(tmp_path_factory):
 
 def model_of(reference, seen):
     """Return a model with a known answer: the last number changes the displacements only if `seen`."""
-    sought = tuple(unknown(reference, keys) for keys in KEYS)
     waves = np.sin(np.arange(3 * 2 * 5 * 9).reshape(3, 2, 5, 3, 3) ** 1.3)
 
     def regions(cases):
@@ -79,12 +78,12 @@ def model_of(reference, seen):
         dims = ("run", "region", "accelerometer", "axis")
         return xr.Dataset({"region_displacement": (dims, 1e-3 * np.abs(rows))})
 
-    return spin_model(made_up(regions, reference), sought, PROFILE, CASES)
+    return spin_model(made_up(regions, reference), unknowns(reference, *KEYS), PROFILE, CASES)
 
 
 def planted_in(model, seed, noise=0.0):
     """Return planted values, and the model of their virtual experiment."""
-    planted = planted_values(model.free.sought, seed)
+    planted = planted_values(model.free, seed)
     return planted, with_virtual_experiment(model, planted, noise, seed)
 
 
@@ -143,8 +142,8 @@ def test_noise_widens_intervals(reference):
 
 
 def test_numbers_that_are_one_unknown_change_together(reference):
-    sought = (unknown(reference, ("gasket.stiffness_x", "gasket.stiffness_z")),)
-    changed = at_point(reference, sought, np.array([5e3]))
+    free = unknowns(reference, ("gasket.stiffness_x", "gasket.stiffness_z"))
+    changed = free.parameters_at(np.array([5e3]))
     assert (changed.gasket.stiffness_x, changed.gasket.stiffness_z) == (5e3, 5e3)
     assert changed == with_value(
         with_value(reference, "gasket.stiffness_x", 5e3), "gasket.stiffness_z", 5e3
@@ -161,7 +160,7 @@ def test_numbers_that_are_one_unknown_change_together(reference):
 )  # fmt: skip
 def test_bad_unknowns_are_refused(reference, keys, message):
     with pytest.raises(InputError, match=message):
-        unknown(reference, keys)
+        unknowns(reference, keys)
 
 
 @pytest.fixture

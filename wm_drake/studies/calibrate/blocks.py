@@ -9,17 +9,17 @@ from abc import ABC, abstractmethod
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 import numpy as np
 import xarray as xr
 
 from wm_drake.errors import input_error
-from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report.quantity import Quantity
 from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.fitting.fit import Fit
+from wm_drake.studies.fitting.free_numbers import FreeNumbers
 from wm_drake.studies.fitting.methods import identify
 from wm_drake.studies.fitting.problem import (
     SMOOTH,
@@ -32,23 +32,6 @@ from wm_drake.studies.fitting.problem import (
     Unknown,
 )
 from wm_drake.studies.fitting.search import silent
-
-
-class FreeNumbers(Protocol):
-    """Unknown numbers of a machine: keys with ranges, or the numbers of a vary file."""
-
-    @property
-    def unknowns(self) -> tuple[Unknown, ...]:
-        """Return the unknowns."""
-
-    def parameters_at(self, point: FloatArray) -> MachineParameters:
-        """Return the machine at a point. [SI]"""
-
-    def known(self, points: FloatArray) -> FloatArray:
-        """Return the residuals of what else is known at points (k, p). (k, m)"""
-
-    def solved(self, fit: Fit, source: str) -> MachineParameters:
-        """Return the machine with the values of a fit; `source` says where they come from."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,11 +85,11 @@ class BlockModel(ABC):
     @property
     @abstractmethod
     def blocks(self) -> Sequence[Block]:
-        """The data."""
+        """Return the data."""
 
     @property
     def errors(self) -> Errors:
-        """What the errors of the values of a sensor are like."""
+        """Return what the errors of the values of a sensor are like."""
         return "correlated"
 
     @abstractmethod

@@ -17,6 +17,7 @@ from wm_drake.parameters.variation import range_of
 from wm_drake.parameters.vary_file import Relation, VaryFile
 from wm_drake.parameters.varying import Varied, Varying, each
 from wm_drake.studies.fitting.fit import Fit
+from wm_drake.studies.fitting.free_numbers import FreeNumbers
 from wm_drake.studies.fitting.problem import Unknown
 from wm_drake.studies.vary import in_vary_file, varying_of
 
@@ -50,15 +51,12 @@ class KnownRatio:
 
 
 @dataclass(frozen=True)
-class ParameterMap:
-    """The numbers of a machine that vary, and what is known of them.
+class ParameterMap(FreeNumbers):
+    """The numbers of a vary file, each with a prior, and what is known of them together.
 
     Arrays have one entry for each number, in SI units.
 
     Attributes:
-        varying: The machine, with explicit values for all that may change, and the numbers.
-        unknowns: The numbers, each with the unit in which it is written, bounds, prior and the
-            point where searches start.
         preload: Expected preload of each spring and its standard deviation; None without a prior.
             [N]
         elongation: Smallest elongation of the springs and its standard deviation; None if any is
@@ -66,31 +64,9 @@ class ParameterMap:
         relations: What is known of ratios of quantities.
     """
 
-    varying: Varying
-    unknowns: tuple[Unknown, ...]
-    preload: tuple[float, float] | None
-    elongation: tuple[float, float] | None
-    relations: tuple[KnownRatio, ...]
-
-    @property
-    def base(self) -> MachineParameters:
-        """The machine."""
-        return self.varying.machine
-
-    @property
-    def names(self) -> list[str]:
-        """Names of the numbers."""
-        return list(self.varying.names)
-
-    @property
-    def lower(self) -> FloatArray:
-        """Lower bounds."""
-        return np.array([unknown.lower for unknown in self.unknowns])
-
-    @property
-    def upper(self) -> FloatArray:
-        """Upper bounds."""
-        return np.array([unknown.upper for unknown in self.unknowns])
+    preload: tuple[float, float] | None = None
+    elongation: tuple[float, float] | None = None
+    relations: tuple[KnownRatio, ...] = ()
 
     @property
     def start(self) -> FloatArray:
@@ -145,17 +121,9 @@ class ParameterMap:
         parts = [relation.residuals(points)[:, None] for relation in self.relations]
         return np.hstack([np.empty((len(points), 0)), *parts])
 
-    def parameters_at(self, point: FloatArray) -> MachineParameters:
-        """Return the machine at a point. [SI]
-
-        Raises:
-            InputError: a value of the machine is not allowed.
-        """
-        return self.varying.machine_at(point)
-
     def solved(self, fit: Fit, source: str) -> MachineParameters:
         """Return the machine with the numbers of a fit; `source` says where they come from."""
-        machine = self.machine_of(fit, "_calibrated")
+        machine = self.machine_of(fit, f"_{self.ending}")
         about = f"{machine.about} Calibrated: {source}.".strip()
         return machine.model_copy(update={"about": about})
 
@@ -232,9 +200,9 @@ def parameter_map_of(machine: Machine, file: VaryFile) -> ParameterMap:
     return ParameterMap(
         varying,
         tuple(unknowns),
-        _pair(preload.prior, "N", "spring_preload") if preload else None,
-        _pair(elongation.at_least, "mm", "spring_elongation") if elongation else None,
-        tuple(_known_ratios(varying, file.relations)),
+        preload=_pair(preload.prior, "N", "spring_preload") if preload else None,
+        elongation=_pair(elongation.at_least, "mm", "spring_elongation") if elongation else None,
+        relations=tuple(_known_ratios(varying, file.relations)),
     )
 
 

@@ -172,7 +172,7 @@ class RecordModel(BlockModel):
 
     @property
     def errors(self) -> Errors:
-        """What the errors are like: those of RMS of regions do not depend on each other."""
+        """Return what the errors are like: those of RMS of regions do not depend on each other."""
         return "alike" if self.by == "rms" else "correlated"
 
     def apart(self, rmse: float) -> str:

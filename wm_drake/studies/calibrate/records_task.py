@@ -11,7 +11,7 @@ from wm_drake.model.machine import Machine
 from wm_drake.parameters.vary_file import VARY_FILES, load_vary
 from wm_drake.simulation.cases import load_of
 from wm_drake.studies.answer import Answer
-from wm_drake.studies.calibrate.blocks import FreeNumbers, calibrated
+from wm_drake.studies.calibrate.blocks import calibrated
 from wm_drake.studies.calibrate.fit_page import FitWords, compared, fit_answer
 from wm_drake.studies.calibrate.options import CalibrateOptions
 from wm_drake.studies.calibrate.parameter_map import read_parameter_map
@@ -23,7 +23,7 @@ from wm_drake.studies.compare.recordings import check_distinct
 from wm_drake.studies.compare.task import CompareTask
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.experiment import Experiment, record_here
-from wm_drake.studies.fitting.sought import SoughtNumbers, sought_in
+from wm_drake.studies.fitting.free_numbers import FreeNumbers, free_numbers_of_texts
 from wm_drake.studies.health import health_part
 from wm_drake.studies.study import Task
 
@@ -185,8 +185,7 @@ def _free_numbers(options: CalibrateOptions, machine: Machine) -> FreeNumbers:
             "records need either --unknown NAME[=VALUES] or --vary FILE", where="--unknown"
         )
     if options.vary is None:
-        sought = sought_in(machine.parameters, options.unknown)
-        return SoughtNumbers(machine.parameters, sought, "calibrated")
+        return free_numbers_of_texts(machine.parameters, options.unknown, "calibrated")
     path, file = VARY_FILES.path(options.vary), load_vary(options.vary)
     if file.spring_preload is not None or file.spring_elongation is not None:
         raise input_error(

@@ -173,7 +173,7 @@ class MachineDesigns:
 
     @cached_property
     def dimensions(self) -> tuple[Range | OptionVariable, ...]:
-        """What the search may change: numbers, then choices."""
+        """Return what the search may change: numbers, then choices."""
         return (*map(Range, self.varying.every), *self.choices)
 
     @property

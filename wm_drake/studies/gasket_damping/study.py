@@ -21,7 +21,7 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.parameters.variation import Change, number_at
 from wm_drake.parameters.vary_file import gasket_entries
-from wm_drake.parameters.varying import Varied
+from wm_drake.parameters.varying import Varied, Varying
 from wm_drake.report.quantity import TIME, Quantity
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.displacements import smooth_envelope
@@ -29,9 +29,9 @@ from wm_drake.simulation.records import read_measured
 from wm_drake.simulation.runs import simulate
 from wm_drake.studies.calibrate.blocks import Block, BlockModel
 from wm_drake.studies.experiment import Experiment
+from wm_drake.studies.fitting.free_numbers import FreeNumbers
 from wm_drake.studies.fitting.grid import grid_search
 from wm_drake.studies.fitting.problem import FAILED, FitProblem, Unknown
-from wm_drake.studies.fitting.sought import Sought, SoughtNumbers
 from wm_drake.studies.inputs import existing_file
 
 UNKNOWNS = ("C_L", "C_T")
@@ -130,15 +130,15 @@ def planted_damping(parameters: MachineParameters, linear: str, torsional: str) 
     return np.array([changed.gasket.damping_x, changed.gasket.rotational_damping_x])
 
 
-def damping_numbers(parameters: MachineParameters) -> SoughtNumbers:
+def damping_numbers(parameters: MachineParameters) -> FreeNumbers:
     """Return C_L and C_T, each that of all axes of the gasket, as the unknowns of a fit."""
-    entries, sought = gasket_entries(), []
+    entries, every, unknowns = gasket_entries(), [], []
     for name, upper, unit in zip(UNKNOWNS, UPPER.tolist(), UNITS, strict=True):
         numbers = tuple(number_at(parameters, key) for key in entries[name].keys)
         ends = {"low": 0.0, "high": upper}
-        varied = Varied(name, entries[name], numbers, Change.VALUE, unit, ends)
-        sought.append(Sought(varied, Unknown(name, 0.0, upper, unit)))
-    return SoughtNumbers(parameters, tuple(sought), "identified")
+        every.append(Varied(name, entries[name], numbers, Change.VALUE, unit, ends))
+        unknowns.append(Unknown(name, 0.0, upper, unit))
+    return FreeNumbers(Varying(parameters, tuple(every)), tuple(unknowns), "identified")
 
 
 @dataclass(frozen=True, eq=False)

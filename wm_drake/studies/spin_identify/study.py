@@ -20,8 +20,12 @@ from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.calibrate.blocks import Block, BlockModel
 from wm_drake.studies.experiment import Experiment
+from wm_drake.studies.fitting.free_numbers import (
+    FreeNumbers,
+    free_numbers,
+    free_numbers_of_texts,
+)
 from wm_drake.studies.fitting.problem import Errors
-from wm_drake.studies.fitting.sought import Sought, SoughtNumbers, sought_in, sought_of
 from wm_drake.studies.spin_cycle.measured import DIMS
 from wm_drake.studies.spin_cycle.study import RECORDED, labels_of, runs_of
 
@@ -44,32 +48,32 @@ They are the friction about the axis of its bushings and all rotational numbers 
 """
 
 
-def unknowns_of(parameters: MachineParameters, texts: Sequence[str]) -> tuple[Sought, ...]:
+def unknowns_of(parameters: MachineParameters, texts: Sequence[str]) -> FreeNumbers:
     """Return the unknowns of KEYS[=RANGE] texts, or those of [A] Table 8 if there are none.
 
     Raises:
         InputError: a key or a range is wrong, or the machine does not have the numbers of Table 8.
     """
     if texts:
-        return sought_in(parameters, texts)
+        return free_numbers_of_texts(parameters, texts, "identified")
     if not parameters.bushing_types or parameters.gasket is None:
         raise input_error(
             f"machine '{parameters.name}' does not have the numbers of [A] Table 8; give keys "
             "of this machine",
             where="--unknown",
         )
-    return tuple(sought_of(parameters, "+".join(keys), Entry(keys=keys)) for keys in TABLE_8)
+    entries = {"+".join(keys): Entry(keys=keys) for keys in TABLE_8}
+    return free_numbers(parameters, entries, "identified")
 
 
-def planted_values(sought: Sequence[Sought], seed: int) -> FloatArray:
+def planted_values(free: FreeNumbers, seed: int) -> FloatArray:
     """Draw true numbers of a virtual experiment; all differ from the machine's. In SI units."""
     low, high = np.log(PLANTED)
-    drawn = np.random.default_rng(seed).uniform(0.3, 1.0, len(sought)) * np.where(
-        np.arange(len(sought)) % 2, low, high
+    count = len(free.unknowns)
+    drawn = np.random.default_rng(seed).uniform(0.3, 1.0, count) * np.where(
+        np.arange(count) % 2, low, high
     )
-    guesses = np.array([s.guess for s in sought])
-    lower, upper = np.array([(s.unknown.lower, s.unknown.upper) for s in sought]).T
-    return np.clip(guesses * np.exp(drawn), 1.02 * lower, 0.98 * upper)
+    return np.clip(free.guesses * np.exp(drawn), 1.02 * free.lower, 0.98 * free.upper)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +89,6 @@ class SpinModel(BlockModel):
             measured. [m]
     """
 
-    free: SoughtNumbers
     profile: SpinProfile
     cases: tuple[UnbalanceCase, ...]
     measured: xr.DataArray
@@ -94,7 +97,7 @@ class SpinModel(BlockModel):
 
     @property
     def errors(self) -> Errors:
-        """What the errors are like: each is a part of the value."""
+        """Return what the errors are like: each is a part of the value."""
         return "each"
 
     @cached_property
@@ -153,7 +156,7 @@ class SpinModel(BlockModel):
 
 def spin_model(
     experiment: Experiment,
-    sought: Sequence[Sought],
+    free: FreeNumbers,
     profile: SpinProfile,
     cases: Sequence[UnbalanceCase],
     measured: xr.DataArray | None = None,
@@ -164,7 +167,6 @@ def spin_model(
     sensors = [f"{name} {axis}" for name in labels["accelerometer"] for axis in labels["axis"]]
     if measured is None:
         measured = xr.DataArray(np.full([*map(len, labels.values())], np.nan), labels, DIMS)
-    free = SoughtNumbers(parameters, tuple(sought), "identified")
     return SpinModel(experiment, free, sensors, profile, tuple(cases), measured)
 
 

@@ -16,7 +16,6 @@ from wm_drake.studies.compare.options import CompareOptions
 from wm_drake.studies.compare.task import CompareTask
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.experiment import Experiment
-from wm_drake.studies.fitting.sought import SoughtNumbers
 from wm_drake.studies.inputs import pairs_of, runnable_profile
 from wm_drake.studies.spin_cycle.study import cases_of_table, measured_displacements, runs_of
 from wm_drake.studies.spin_identify.options import SpinIdentifyOptions
@@ -42,7 +41,7 @@ class SpinIdentifyTask(Task):
         self.profile = runnable_profile(options.profile, machine.parameters)
         names = options.case or (() if options.cases else DEFAULT_CASES)
         self.cases = cases_of_table(options.cases, names)
-        self.sought = unknowns_of(machine.parameters, options.unknown)
+        self.free = unknowns_of(machine.parameters, options.unknown)
         self.measured, self.tests = None, dict[str, CompareTask]()
         self.measures = ("recorded regions" if options.accelerations else "regions",)
         if options.record:
@@ -84,7 +83,10 @@ class SpinIdentifyTask(Task):
             "cases": self.cases,
             "profile": self.profile,
             "measurements": measured,
-            "unknowns": [{"keys": s.keys, "unknown": s.unknown} for s in self.sought],
+            "unknowns": [
+                {"keys": varied.keys, "unknown": unknown}
+                for varied, unknown in zip(self.free.varying.every, self.free.unknowns, strict=True)
+            ],
             "noise": f"{self.options.noise:g}, seed {self.options.seed}",
             "records": f"{self.options.by}, {', '.join(self.options.record)}",
         }
@@ -96,12 +98,10 @@ class SpinIdentifyTask(Task):
         seed, truth = self.options.seed, None
         with executor.fraction("search") as report:
             experiment = Experiment(self.machine, self.measures, executor.simulate)
-            model = spin_model(experiment, self.sought, self.profile, self.cases, self.measured)
+            model = spin_model(experiment, self.free, self.profile, self.cases, self.measured)
             if self.measured is None:
-                planted = planted_values(self.sought, seed)
-                truth = {
-                    s.unknown.name: v for s, v in zip(self.sought, planted.tolist(), strict=True)
-                }
+                planted = planted_values(self.free, seed)
+                truth = dict(zip(self.free.names, planted.tolist(), strict=True))
                 model = with_virtual_experiment(model, planted, self.options.noise, seed)
             fit, data = calibrated(model, seed, lambda fraction, least: report(fraction), starts=1)
         return spin_identify_answer(model, fit, data, truth)
@@ -112,13 +112,7 @@ class SpinIdentifyTask(Task):
         loads = [
             recorded_load(test, executor, cases[name].load) for name, test in self.tests.items()
         ]
-        model = record_model(
-            executor,
-            SoughtNumbers(parameters, self.sought, "identified"),
-            list(self.tests.values()),
-            loads,
-            self.options.by,
-        )
+        tests = list(self.tests.values())
+        model = record_model(executor, self.free, tests, loads, self.options.by)
         title = f"Parameters of machine {parameters.name} identified from records of a spin cycle"
-        words, tests = (title, "identified"), list(self.tests.values())
-        return fitted_answer(executor, model, self.options.seed, words, tests)
+        return fitted_answer(executor, model, self.options.seed, (title, "identified"), tests)
