@@ -7,7 +7,7 @@ import pytest
 
 from wm_drake.report.labelled import LabelledTable
 from wm_drake.studies.modes import data
-from wm_drake.studies.modes.campbell import Campbell, CriticalSpeed
+from wm_drake.studies.modes.campbell import critical_speeds, diagram_of
 from wm_drake.studies.modes.linearisation import AMPLITUDE, SLIDING, STUCK, Spectrum
 from wm_drake.studies.modes.page import natural_modes_table
 from wm_drake.studies.modes.shapes import Mode
@@ -21,16 +21,16 @@ def mode(name, hertz, damping=0.1):
     return Mode(name, hertz, damping, np.ones(6, complex), shares, np.ones(1), np.ones(1))
 
 
-def diagram(count):
+def diagram(count, names):
     """Return a diagram whose mode number k has k Hz and is undamped at all speeds."""
     values = 2j * np.pi * np.arange(1, count + 1)
     spectrum = Spectrum(values, np.eye(count), np.eye(count))
-    return Campbell(SPEED, (spectrum,) * len(SPEED), np.ones((len(SPEED), count)))
+    return diagram_of(SPEED, [spectrum] * len(SPEED), np.ones((len(SPEED), count)), names)
 
 
 @pytest.fixture
 def over_speed():
-    return data.over_speed({STUCK: diagram(2), SLIDING: diagram(1)}, NAMES)
+    return data.over_speed({STUCK: diagram(2, NAMES[STUCK]), SLIDING: diagram(1, NAMES[SLIDING])})
 
 
 def test_campbell_diagram_has_a_row_for_each_curve_that_there_is(over_speed):
@@ -42,15 +42,17 @@ def test_campbell_diagram_has_a_row_for_each_curve_that_there_is(over_speed):
     assert second.frequency_Hz.tolist() == pytest.approx([2.0] * 3)
 
 
-def test_critical_speed_has_the_name_of_the_shape_there(over_speed):
-    critical = {
-        SLIDING: [],
-        STUCK: [CriticalSpeed(1.0, 1, 6.0, 0.2), CriticalSpeed(2.0, 1, 3.0, 0)],
-    }
-    frame = LabelledTable("critical", data.critical_speeds_of(critical, over_speed)).frame()
-    assert frame["mode"].tolist() == ["yaw", "roll"]
-    assert frame.order.tolist() == [1.0, 2.0]
-    none = data.critical_speeds_of({SLIDING: [], STUCK: []}, over_speed)
+def test_critical_speed_has_the_name_of_the_shape_there():
+    """Let 1 Hz be met by order 1 at 60 rpm and by order 2 at 30 rpm."""
+    speeds = np.pi * np.arange(4.0)
+    spectra = [Spectrum(np.array([2j * np.pi]), np.eye(1), np.eye(1))] * 4
+    names = [["sway"], ["sway"], ["yaw"], ["yaw"]]
+    of_sway = diagram_of(speeds, spectra, np.ones((4, 1)), names)
+    frame = LabelledTable("critical", critical_speeds({STUCK: of_sway})).frame()
+    assert frame["mode"].tolist() == ["sway", "yaw"]
+    assert frame.order.tolist() == [2.0, 1.0]
+    assert frame.speed_rpm.tolist() == pytest.approx([30.0, 60.0])
+    none = critical_speeds({STUCK: of_sway}, ())
     assert LabelledTable("critical", none).records() == []
 
 

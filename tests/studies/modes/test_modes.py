@@ -10,7 +10,8 @@ from wm_drake.model.build import build_machine
 from wm_drake.parameters import with_values
 from wm_drake.parameters.machine import BodyOverride, InertiaMatrix
 from wm_drake.studies.modes.amplitude import amplitude_modes
-from wm_drake.studies.modes.campbell import campbell, critical_speeds, mac
+from wm_drake.studies.modes.campbell import campbell, critical_speeds, diagram_of, mac
+from wm_drake.studies.modes.data import at_amplitude
 from wm_drake.studies.modes.linearisation import (
     SLIDING,
     STUCK,
@@ -76,10 +77,9 @@ def test_modes_are_joined_by_shape_where_frequencies_cross():
             matrix[at : at + 2, at : at + 2] = [[0.0, 1.0], [-stiffness, -0.1]]
         return spectrum_of(matrix)
 
-    diagram = campbell(spectrum_at, np.linspace(0.0, 5.0, 6), 2)
-    np.testing.assert_allclose(
-        np.abs(diagram.value), [[10.0 + s, 15.0 - s] for s in range(6)], rtol=1e-9
-    )
+    spectra, _ = campbell(spectrum_at, np.linspace(0.0, 5.0, 6), 2)
+    found = [np.abs(spectrum.values) for spectrum in spectra]
+    np.testing.assert_allclose(found, [[10.0 + s, 15.0 - s] for s in range(6)], rtol=1e-9)
 
 
 def test_coupled_modes_veer_and_are_joined_all_the_same():
@@ -91,9 +91,9 @@ def test_coupled_modes_veer_and_are_joined_all_the_same():
         matrix = np.block([[np.zeros((2, 2)), np.eye(2)], [-stiffness, -0.01 * np.eye(2)]])
         return spectrum_of(matrix)
 
-    diagram = campbell(spectrum_at, np.linspace(0.0, 5.0, 51), 2)
-    assert np.all(np.abs(diagram.value[:, 0]) < np.abs(diagram.value[:, 1]))
-    assert diagram.mac.min() > 0.9
+    spectra, macs = campbell(spectrum_at, np.linspace(0.0, 5.0, 51), 2)
+    assert all(np.abs(spectrum.values[0]) < np.abs(spectrum.values[1]) for spectrum in spectra)
+    assert macs.min() > 0.9
 
 
 def test_mac_of_a_spectrum_with_itself_is_the_unit_matrix(machine):
@@ -150,8 +150,9 @@ def test_overhung_disc_has_the_published_frequencies_and_critical_speed():
         assert np.min(np.abs(still - published)) < 0.01
         assert np.min(np.abs(still - exact)) < 1e-4
     # backward and forward whirl, and motions along and about the axis, which do not change
-    diagram = campbell(linear.spectrum, np.linspace(0.0, 2.6 * unit, 81), 6)
-    speeds = np.array([c.speed for c in critical_speeds(diagram, (1.0,))]) / unit
+    grid = np.linspace(0.0, 2.6 * unit, 81)
+    diagram = diagram_of(grid, *campbell(linear.spectrum, grid, 6), [[""] * 6] * 81)
+    speeds = critical_speeds({SLIDING: diagram}, (1.0,)).speed.values / unit
     for published in (np.sqrt(2.0), 0.5125, 2.2516):  # forward; backward, from 3 I_d for -I_d
         assert np.min(np.abs(speeds - published)) < 1e-3
 
@@ -265,9 +266,11 @@ def test_small_amplitude_mode_is_the_natural_mode(isotropic):
     linear = linearised(isotropic)
     spectrum = linear.spectrum().first(6)
     modes = modes_of(spectrum, linear.wrench_slopes())
-    found = amplitude_modes(isotropic.set_up(), spectrum, modes, np.array([1e-5, 1e-3]))
-    for mode, natural in zip(found, modes, strict=True):
-        assert mode.frequency_hz[0] == pytest.approx(natural.frequency_hz, rel=1e-5)
+    names = [mode.name for mode in modes]
+    found = amplitude_modes(isotropic.set_up(), spectrum, names, np.array([1e-5, 1e-3]))
+    for natural in modes:
+        mode = found.isel(row=(found.mode == natural.name).values)
+        assert mode.frequency[0] == pytest.approx(natural.frequency_hz, rel=1e-5)
         assert mode.damping_ratio[0] == pytest.approx(natural.damping_ratio, abs=1e-6)
 
 
@@ -306,8 +309,9 @@ def test_friction_damps_a_mode_as_the_energy_of_a_cycle_says():
     bounce = next(index for index, mode in enumerate(modes) if mode.name == "bounce")
     one = Spectrum(spectrum.values[[bounce]], spectrum.right[:, [bounce]], spectrum.left[[bounce]])
     amplitude = 0.02
-    (found,) = amplitude_modes(machine.set_up(), one, [modes[bounce]], np.array([amplitude]))
-    hertz, ratio = found.at(amplitude)
+    over = amplitude_modes(machine.set_up(), one, ["bounce"], np.array([amplitude]))
+    found = at_amplitude(over, ["bounce"], amplitude)
+    hertz, ratio = found.frequency.item(), found.damping_ratio.item()
     assert hertz == pytest.approx(np.sqrt(STIFFNESS / MASS) / (2.0 * np.pi), rel=1e-3)
     assert ratio == pytest.approx(2.0 * force / (np.pi * STIFFNESS * amplitude), rel=5e-3)
 

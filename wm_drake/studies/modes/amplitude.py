@@ -13,15 +13,17 @@ machine with damping in proportion to mass and stiffness it is the natural mode.
 """
 
 import warnings
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
+import xarray as xr
 from scipy.linalg import LinAlgWarning, lu_factor, lu_solve
 
 from wm_drake.model.machine import Setup
 from wm_drake.parameters.types import ComplexArray, FloatArray
+from wm_drake.studies.modes import quantities as q
+from wm_drake.studies.modes.data import labelled, oscillation
 from wm_drake.studies.modes.linearisation import Spectrum
-from wm_drake.studies.modes.shapes import Mode
 from wm_drake.studies.response.balance import HarmonicBalance
 from wm_drake.studies.response.series import Series
 from wm_drake.studies.threads import on_one_thread
@@ -39,53 +41,33 @@ FIRST_FACTOR, LEAST_FACTOR = 1.5, 1.05
 """First and smallest ratio of two amplitudes of a step."""
 
 
-@dataclass(frozen=True)
-class AmplitudeMode:
-    """A mode over its amplitude.
-
-    Attributes:
-        name: Name of the mode with stuck friction that it continues.
-        amplitude: Rising amplitudes: root of the sum of squares of the first harmonics of the
-            coordinates of To, with angles times 0.25 m. (a,) [m]
-        frequency_hz: (a,) [Hz]
-        damping_ratio: (a,)
-        shape: First harmonic of roll, pitch, yaw, x, y, z, per amplitude. (a, 6) complex
-    """
-
-    name: str
-    amplitude: FloatArray
-    frequency_hz: FloatArray
-    damping_ratio: FloatArray
-    shape: FloatArray
-
-    def at(self, amplitude: float) -> tuple[float, float] | None:
-        """Return frequency and damping ratio at an amplitude; None if it was not reached."""
-        if not len(self.amplitude) or not (
-            self.amplitude[0] <= amplitude <= self.amplitude[-1] * (1.0 + 1e-9)
-        ):
-            return None
-        at = np.log(amplitude), np.log(self.amplitude)
-        return (float(np.interp(*at, self.frequency_hz)), float(np.interp(*at, self.damping_ratio)))
-
-
 @on_one_thread
 def amplitude_modes(
-    setup: Setup, stuck: Spectrum, modes: list[Mode], amplitudes: FloatArray
-) -> list[AmplitudeMode]:
+    setup: Setup, stuck: Spectrum, names: Sequence[str], amplitudes: FloatArray
+) -> xr.Dataset:
     """Follow each stuck mode over its amplitude.
 
     Args:
+        names: Names of the modes.
         amplitudes: Rising amplitudes at which values are wanted; steps between them are as short as
             convergence needs. [m]
 
     Returns:
-        A mode each; it ends where it cannot be followed any further.
+        Over `row`, with the label `mode`: `amplitude`, root of the sum of squares of the first
+        harmonics of the coordinates of To, with angles times 0.25 m [m]; it rises and ends where
+        the mode cannot be followed any further. `frequency` [Hz] and `damping_ratio` there.
     """
     balance = HarmonicBalance(setup, Series(ORDER, SAMPLES))
-    return [
-        _follow(balance, stuck.values[index], stuck.right[:, index], mode.name, amplitudes)
-        for index, mode in enumerate(modes)
+    every = [
+        _follow(balance, value, vector, amplitudes)
+        for value, vector in zip(stuck.values, stuck.right.T, strict=True)
     ]
+    amplitude, omega, beta = np.concatenate([np.empty((0, 3)), *every]).T
+    return labelled(
+        {"mode": [name for name, points in zip(names, every, strict=True) for _ in points]},
+        amplitude=q.AMPLITUDE.variable("row", amplitude),
+        **oscillation("row", omega / (2.0 * np.pi), beta / omega),
+    )
 
 
 class _Free:
@@ -169,12 +151,9 @@ class _Free:
 
 
 def _follow(
-    balance: HarmonicBalance,
-    value: complex,
-    vector: ComplexArray,
-    name: str,
-    amplitudes: FloatArray,
-) -> AmplitudeMode:
+    balance: HarmonicBalance, value: complex, vector: ComplexArray, amplitudes: FloatArray
+) -> FloatArray:
+    """Return amplitude, angular frequency and negative damping along a mode. (points, 3)"""
     free = _Free(balance)
     amplitude = min(SMALLEST_AMPLITUDE, float(amplitudes[0]))
     motion = balance.rest()
@@ -182,10 +161,10 @@ def _follow(
     size = float(np.sqrt(np.sum(free.weights * motion**2)))
     motion[1:3] *= amplitude / size
     here = free.solve(motion, float(abs(value)), float(-value.real), amplitude)
-    points: list[tuple[float, FloatArray, float, float]] = []
+    points = list[tuple[float, float, float]]()
     factor, before = FIRST_FACTOR, None
     while here is not None:
-        points.append((amplitude, *here))
+        points.append((amplitude, *here[1:]))
         target = next((a for a in amplitudes if a > amplitude * (1.0 + 1e-9)), None)
         if target is None:
             break
@@ -199,17 +178,7 @@ def _follow(
             break
         before, here, amplitude = (amplitude, here), moved, ahead
         factor = min(factor * 1.3, 2.0)
-    shapes = [
-        (coefficients[1, :6] - 1j * coefficients[2, :6]) / amplitude
-        for amplitude, coefficients, _, _ in points
-    ]
-    return AmplitudeMode(
-        name,
-        np.array([entry[0] for entry in points]),
-        np.array([entry[2] for entry in points]) / (2.0 * np.pi),
-        np.array([entry[3] / entry[2] for entry in points]),
-        np.array(shapes).reshape(-1, 6),
-    )
+    return np.reshape(points, (-1, 3))
 
 
 def _guess(

@@ -11,12 +11,14 @@ first.
 """
 
 import itertools
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
+import xarray as xr
 
-from wm_drake.parameters.types import ComplexArray, FloatArray
+from wm_drake.parameters.types import FloatArray
+from wm_drake.studies.modes import quantities as q
+from wm_drake.studies.modes.data import labelled, oscillation
 from wm_drake.studies.modes.linearisation import Spectrum
 
 CLEAR_MAC = 0.8
@@ -26,57 +28,6 @@ MOST_HALVINGS = 8
 """Largest number of times that a step between two speeds is halved."""
 
 
-@dataclass(frozen=True)
-class Campbell:
-    """Modes over the speed of the drum, each a curve without jumps.
-
-    Where two curves come near each other and part again, the shapes change over from one to the
-    other: the shape of a curve at one speed says nothing about another speed.
-
-    Attributes:
-        speed: (s,) rising. [rad/s]
-        spectra: Modes at each speed; number k is on the same curve at all speeds. NaN behind the
-            end of a curve.
-        mac: MAC of each mode with the one of its curve at the speed before; 1 at the first. (s, m)
-    """
-
-    speed: FloatArray
-    spectra: tuple[Spectrum, ...]
-    mac: FloatArray
-
-    @property
-    def value(self) -> ComplexArray:
-        """Return the eigenvalues. (s, m) complex [1/s]"""
-        return np.array([spectrum.values for spectrum in self.spectra])
-
-    @property
-    def frequency_hz(self) -> FloatArray:
-        """Return the natural frequencies |lambda| / (2 pi). (s, m) [Hz]"""
-        return np.asarray(np.abs(self.value) / (2.0 * np.pi))
-
-    @property
-    def damping_ratio(self) -> FloatArray:
-        """Return the damping ratios. (s, m)"""
-        return np.asarray(-self.value.real / np.abs(self.value))
-
-
-@dataclass(frozen=True)
-class CriticalSpeed:
-    """Speed at which an order of the drum's speed equals a natural frequency.
-
-    Attributes:
-        order: Multiple of the drum's speed.
-        mode: Number of the curve.
-        speed: [rad/s]
-        damping_ratio: Of the mode there.
-    """
-
-    order: float
-    mode: int
-    speed: float
-    damping_ratio: float
-
-
 def mac(before: Spectrum, after: Spectrum) -> FloatArray:
     """Return the modal assurance criterion of each mode before with each mode after. (m, k)"""
     forth = np.abs(before.left @ after.right)
@@ -84,13 +35,23 @@ def mac(before: Spectrum, after: Spectrum) -> FloatArray:
     return np.asarray(forth * back.T)
 
 
-def campbell(spectrum_at: Callable[[float], Spectrum], speeds: FloatArray, count: int) -> Campbell:
-    """Follow modes over the speed.
+def campbell(
+    spectrum_at: Callable[[float], Spectrum], speeds: FloatArray, count: int
+) -> tuple[list[Spectrum], FloatArray]:
+    """Follow modes over the speed, each a curve without jumps.
+
+    Where two curves come near each other and part again, the shapes change over from one to the
+    other: the shape of a curve at one speed says nothing about another speed.
 
     Args:
         spectrum_at: Returns the eigenvalues at a speed. [rad/s]
         speeds: Rising. [rad/s]
         count: Number of modes to follow, the slowest at the first speed.
+
+    Returns:
+        Modes at each speed; number k is on the same curve at all speeds, NaN behind the end of a
+        curve. MAC of each mode with the one of its curve at the speed before; 1 at the first.
+        (speeds, modes)
     """
     here = spectrum_at(float(speeds[0])).first(count)
     spectra = [here]
@@ -99,7 +60,35 @@ def campbell(spectrum_at: Callable[[float], Spectrum], speeds: FloatArray, count
         here, least = _joined(spectrum_at, float(before), float(after), here, MOST_HALVINGS)
         spectra.append(here)
         macs.append(least)
-    return Campbell(np.asarray(speeds), tuple(spectra), np.array(macs))
+    return spectra, np.array(macs)
+
+
+def diagram_of(
+    speeds: FloatArray,
+    spectra: Sequence[Spectrum],
+    macs: FloatArray,
+    names: Sequence[Sequence[str]],
+) -> xr.Dataset:
+    """Return a Campbell diagram over `speed` [rad/s] and `curve` from 1 on.
+
+    Args:
+        spectra, macs: As of `campbell`.
+        names: Name of each curve at each speed, from its shape there.
+
+    Returns:
+        `mode`, the name; `frequency` [Hz], `damping_ratio` and `mac`.
+    """
+    dims = ("speed", "curve")
+    frequency = np.array([spectrum.frequency_hz for spectrum in spectra])
+    damping = np.array([spectrum.damping_ratio for spectrum in spectra])
+    return xr.Dataset(
+        {
+            "mode": (dims, np.array(names, dtype=object)),
+            **oscillation(dims, frequency, damping),
+            "mac": q.MAC.variable(dims, macs),
+        },
+        {"speed": speeds, "curve": np.arange(1, frequency.shape[1] + 1)},
+    )
 
 
 def _joined(
@@ -135,9 +124,35 @@ def _joined(
 
 
 def critical_speeds(
-    diagram: Campbell, orders: tuple[float, ...] = (1.0, 2.0)
-) -> list[CriticalSpeed]:
-    """Return the speeds at which orders cross modes, in rising order.
+    diagrams: Mapping[str, xr.Dataset], orders: Sequence[float] = (1.0, 2.0)
+) -> xr.Dataset:
+    """Return the speeds at which orders of the drum's speed equal natural frequencies.
+
+    Args:
+        diagrams: Diagrams as of `diagram_of`, by linearisation.
+
+    Returns:
+        Over `row`, with the labels `linearisation` and `mode`, the name at the nearest speed of the
+        diagram: `order`, `speed` [rad/s], rising for each linearisation, and `damping_ratio`.
+    """
+    rows = [
+        (name, *crossing)
+        for name, diagram in diagrams.items()
+        for crossing in _crossings(diagram, orders)
+    ]
+    names, modes, order, speed, damping = zip(*rows, strict=True) if rows else ((),) * 5
+    return labelled(
+        {"linearisation": names, "mode": modes},
+        order=q.ORDER.variable("row", order),
+        speed=q.CRITICAL_SPEED.variable("row", speed),
+        damping_ratio=q.DAMPING.variable("row", damping),
+    )
+
+
+def _crossings(
+    diagram: xr.Dataset, orders: Sequence[float]
+) -> list[tuple[str, float, float, float]]:
+    """Return mode, order, speed [rad/s] and damping ratio of crossings, in rising order of speed.
 
     Between two speeds of the diagram the frequency is interpolated by a cubic through four.
     """
@@ -145,17 +160,16 @@ def critical_speeds(
 
     crossings = []
     for order in orders:
-        for mode, values in enumerate(diagram.value.T):
-            excess = np.abs(values) - order * diagram.speed
+        for number in range(diagram.sizes["curve"]):
+            curve = diagram.isel(curve=number)
+            excess = 2.0 * np.pi * curve.frequency.values - order * diagram.speed.values
             good = np.isfinite(excess)
             if good.sum() < 4:
                 continue
-            speeds = diagram.speed[good]
-            curve = CubicSpline(speeds, excess[good])
-            ratio = CubicSpline(speeds, diagram.damping_ratio[good, mode])
-            crossings += [
-                CriticalSpeed(order, mode, float(speed), float(ratio(speed)))
-                for speed in curve.roots(extrapolate=False)
-                if speed > 0.0
-            ]
-    return sorted(crossings, key=lambda critical: critical.speed)
+            speeds = diagram.speed.values[good]
+            ratio = CubicSpline(speeds, curve.damping_ratio.values[good])
+            for root in CubicSpline(speeds, excess[good]).roots(extrapolate=False):
+                if root > 0.0:
+                    name = str(curve.mode.sel(speed=root, method="nearest").item())
+                    crossings.append((name, order, float(root), float(ratio(root))))
+    return sorted(crossings, key=lambda crossing: crossing[2])

@@ -10,8 +10,6 @@ from wm_drake.engines.trajectory import COORDINATES
 from wm_drake.parameters.units import Unit
 from wm_drake.report.quantity import SPEED, Quantity
 from wm_drake.studies.modes import quantities as q
-from wm_drake.studies.modes.amplitude import AmplitudeMode
-from wm_drake.studies.modes.campbell import Campbell, CriticalSpeed
 from wm_drake.studies.modes.linearisation import SLIDING, STUCK
 from wm_drake.studies.modes.sensitivity import Sensitivity
 from wm_drake.studies.modes.shapes import Mode, Nearness, parts
@@ -54,10 +52,21 @@ def of_modes(modes: Mapping[str, Sequence[Mode]], elements: Sequence[str]) -> xr
     return labelled(labels, **variables).assign_coords(element=list(elements))
 
 
-def at_amplitude(modes: Sequence[AmplitudeMode], amplitude: float) -> xr.Dataset:
-    """Return frequency and damping ratio over `mode` at an amplitude [m]; NaN if not reached."""
-    values = np.array([mode.at(amplitude) or (np.nan, np.nan) for mode in modes]).reshape(-1, 2)
-    return of_names([mode.name for mode in modes], values[:, 0], values[:, 1])
+def at_amplitude(over: xr.Dataset, names: Sequence[str], amplitude: float) -> xr.Dataset:
+    """Return frequency and damping ratio over `mode` at an amplitude [m]; NaN if not reached.
+
+    Args:
+        over: As of `amplitude_modes` in `wm_drake.studies.modes.amplitude`.
+        names: Names of the modes.
+    """
+    values = np.full((len(names), 2), np.nan)
+    for row, name in zip(values, names, strict=True):
+        one = over.isel(row=(over.mode == name).values)
+        known = one.amplitude.values
+        if known.size and known[0] <= amplitude <= known[-1] * (1.0 + 1e-9):
+            at = np.log(amplitude), np.log(known)
+            row[:] = [np.interp(*at, one[v].values) for v in ("frequency", "damping_ratio")]
+    return of_names(names, *values.T)
 
 
 def of_names(names: Sequence[str], frequency: Any, damping: Any) -> xr.Dataset:
@@ -73,64 +82,11 @@ def oscillation(dims: str | Sequence[str], frequency: Any, damping: Any) -> dict
     }
 
 
-def over_amplitude(modes: Sequence[AmplitudeMode]) -> xr.Dataset:
-    """Return frequency and damping ratio of modes over their amplitude, a row for each point."""
-    names = [mode.name for mode in modes for _ in mode.amplitude]
-    amplitude, frequency, damping = (
-        np.concatenate([np.zeros(0), *(getattr(mode, name) for mode in modes)])
-        for name in ("amplitude", "frequency_hz", "damping_ratio")
-    )
-    return labelled(
-        {"mode": names},
-        amplitude=q.AMPLITUDE.variable("row", amplitude),
-        **oscillation("row", frequency, damping),
-    )
-
-
-def over_speed(
-    diagrams: Mapping[str, Campbell], names: Mapping[str, list[list[str]]]
-) -> xr.Dataset:
-    """Return the Campbell diagrams over `linearisation`, `speed` [rad/s] and `curve` from 1 on.
-
-    Args:
-        names: Name of each curve at each speed, from its shape there.
-    """
-    dims, of = ("speed", "curve"), []
-    for name, diagram in diagrams.items():
-        each = {
-            "mode": (dims, np.array(names[name], dtype=object)),
-            **oscillation(dims, diagram.frequency_hz, diagram.damping_ratio),
-            "mac": q.MAC.variable(dims, diagram.mac),
-        }
-        curves = np.arange(1, diagram.value.shape[1] + 1)
-        of.append(xr.Dataset(each, {"speed": diagram.speed, "curve": curves}))
-    joined = xr.concat(of, xr.Variable("linearisation", list(diagrams)), join="outer")
+def over_speed(diagrams: Mapping[str, xr.Dataset]) -> xr.Dataset:
+    """Return Campbell diagrams over `linearisation`, `speed` [rad/s] and `curve` from 1 on."""
+    names = xr.Variable("linearisation", list(diagrams))
+    joined = xr.concat(list(diagrams.values()), names, join="outer")
     return joined.assign_coords(speed=SPEED.variable("speed", joined.speed))
-
-
-def critical_speeds_of(
-    critical: Mapping[str, Sequence[CriticalSpeed]], diagrams: xr.Dataset
-) -> xr.Dataset:
-    """Return order, speed [rad/s] and damping ratio of critical speeds.
-
-    Args:
-        diagrams: As of `over_speed`; a mode has the name of the nearest speed there.
-    """
-    rows = [(name, one) for name in (SLIDING, STUCK) for one in critical[name]]
-    every = [one for _, one in rows]
-    names = [name_at(diagrams, name, one.mode, one.speed) for name, one in rows]
-    return labelled(
-        {"linearisation": [name for name, _ in rows], "mode": names},
-        order=q.ORDER.variable("row", [one.order for one in every]),
-        speed=q.CRITICAL_SPEED.variable("row", [one.speed for one in every]),
-        damping_ratio=q.DAMPING.variable("row", [one.damping_ratio for one in every]),
-    )
-
-
-def name_at(diagrams: xr.Dataset, linearisation: str, mode: int, speed: float) -> str:
-    """Return the name of a mode at the nearest speed of its diagram. [rad/s]"""
-    curve = diagrams.mode.sel(linearisation=linearisation).isel(curve=mode)
-    return str(curve.sel(speed=speed, method="nearest").item())
 
 
 def of_numbers(

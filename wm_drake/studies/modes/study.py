@@ -1,6 +1,6 @@
 """Modes of a machine: three linearisations, Campbell diagram, critical speeds, sensitivities."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +17,7 @@ from wm_drake.report.labelled import LabelledTable
 from wm_drake.simulation.cases import case_of
 from wm_drake.studies.modes import data
 from wm_drake.studies.modes.amplitude import amplitude_modes
-from wm_drake.studies.modes.campbell import Campbell, campbell, critical_speeds
+from wm_drake.studies.modes.campbell import campbell, critical_speeds, diagram_of
 from wm_drake.studies.modes.linearisation import (
     MODES,
     SLIDING,
@@ -95,10 +95,6 @@ class MachineModes(NaturalModes):
     sensitivities: xr.Dataset
     run_up: xr.Dataset | None
 
-    def name_at(self, linearisation: str, mode: int, speed: float) -> str:
-        """Return the name of a mode at the nearest speed of its diagram. [rad/s]"""
-        return data.name_at(self.over_speed, linearisation, mode, speed)
-
     @property
     def critical_speeds(self) -> FloatArray:
         """Return the speeds at which the unbalance meets a mode with sliding friction. [rad/s]"""
@@ -171,9 +167,11 @@ def modes(
     progress(0.1)
     setup = machine.set_up(load, gasket=gasket)
     amplitudes = np.union1d(AMPLITUDES, amplitude)
-    over = amplitude_modes(setup, spectra[STUCK], natural[STUCK], amplitudes)
+    names = [mode.name for mode in natural[STUCK]]
+    over = amplitude_modes(setup, spectra[STUCK], names, amplitudes)
     progress(0.3)
-    diagrams = _diagrams(linear, spectra, parameters.profile.highest_speed)
+    last = LAST_SPEED * parameters.profile.highest_speed
+    diagrams = {name: _diagram(linear[name], natural[name], last) for name in (SLIDING, STUCK)}
     progress(0.4)
     bars = _sensitivities(machine, load, gasket, spectra, lambda part: progress(0.4 + 0.5 * part))
     peaks = None
@@ -181,24 +179,18 @@ def modes(
         cases = [case_of(parameters, name, gasket=gasket) for name in parameters.loads]
         peaks = simulate_many(machine, cases, measures=["amplitudes"])
     progress(1.0)
-    names = {
-        name: [[mode.name for mode in natural[name]], *map(names_at_speed, diagram.spectra[1:])]
-        for name, diagram in diagrams.items()
-    }
-    over_speed = data.over_speed(diagrams, names)
-    critical = {name: critical_speeds(diagram, ORDERS) for name, diagram in diagrams.items()}
     return MachineModes(
         parameters,
         load if isinstance(load, str) else "" if load is None else "given",
         natural,
         amplitude,
-        data.at_amplitude(over, amplitude),
+        data.at_amplitude(over, names, amplitude),
         linear[STUCK].equilibrium[:6],
         gasket,
         linear[STUCK].names,
-        data.over_amplitude(over),
-        over_speed,
-        data.critical_speeds_of(critical, over_speed),
+        over,
+        data.over_speed({name: diagrams[name] for name in linear}),
+        critical_speeds(diagrams, ORDERS),
         data.of_numbers(bars, natural),
         peaks,
     )
@@ -213,15 +205,12 @@ def _check_amplitude(amplitude: float) -> None:
         )
 
 
-def _diagrams(
-    linear: Mapping[str, Linearisation], spectra: Mapping[str, Spectrum], highest: float
-) -> dict[str, Campbell]:
-    """Return the Campbell diagrams up to beyond the highest speed of the profile. [rad/s]"""
-    speeds = np.linspace(0.0, LAST_SPEED * highest, SPEEDS)
-    return {
-        name: campbell(one.spectrum, speeds, len(spectra[name].values))
-        for name, one in linear.items()
-    }
+def _diagram(linear: Linearisation, modes: Sequence[Mode], last: float) -> xr.Dataset:
+    """Return the Campbell diagram of modes at standstill, up to a last speed. [rad/s]"""
+    speeds = np.linspace(0.0, last, SPEEDS)
+    spectra, macs = campbell(linear.spectrum, speeds, len(modes))
+    names = [[mode.name for mode in modes], *map(names_at_speed, spectra[1:])]
+    return diagram_of(speeds, spectra, macs, names)
 
 
 @on_one_thread
@@ -246,13 +235,14 @@ def three_linearisations(
         linear = Linearisation(setup, loaded=True)
         spectrum = linear.spectrum().first(MODES)
         natural[name] = modes_of(spectrum, linear.wrench_slopes())
+    names = [mode.name for mode in natural[STUCK]]
     # the last setup is the one with friction
     if numbers.telescopic_dampers:
         missing = np.full(len(natural[STUCK]), np.nan)
-        values = data.of_names([mode.name for mode in natural[STUCK]], missing, missing)
+        values = data.of_names(names, missing, missing)
     else:
-        over = amplitude_modes(setup, spectrum, natural[STUCK], np.array([amplitude]))
-        values = data.at_amplitude(over, amplitude)
+        over = amplitude_modes(setup, spectrum, names, np.array([amplitude]))
+        values = data.at_amplitude(over, names, amplitude)
     return NaturalModes(
         numbers, load if isinstance(load, str) else "given", natural, amplitude, values
     )
