@@ -135,6 +135,7 @@ KINDS = {
     ),
     "design": _one("sections.html", "study", "design", "gasket", "--evaluations", "48", "--population", "16", "--profile", "short_cycle.yaml"),
     "balancer": _one("sections.html", "study", "balancer", "--quick"),
+    "detect": _one("sections.html", "study", "detect", "--quick"),
     "cycle": _one("sections.html", "study", "cycle", "--profile", "short_cycle.yaml"),
     "drive": _one("sections.html", "study", "drive", "--load", "middle", "--torques", "3", "--unbalances", "2", "--loads", "4"),
 }  # fmt: skip

@@ -129,6 +129,7 @@ export page --load middle --out machine.html
 study balancer --quick --place '0 mm' --damping '100 %' --release '80 rpm' --to '110 rpm' --rate '80 rpm/s' --out balancer
 study cycle --profile short_cycle.yaml --out cycle
 study design gasket --quick --profile short_cycle.yaml --out design
+study detect --quick --out detect
 study drive --quick --load middle --out drive
 study gasket --quick --response D --profile short_cycle.yaml --out gasket
 study gasket-damping --mesh 20 --record middle=spin/record_middle.nc --out gasket_damping

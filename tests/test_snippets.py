@@ -52,7 +52,7 @@ NOT_RUN = {  # beginning of a command, and why this test does not run it
 HOURS = (  # commands of more than some five seconds of processor time; the marker `hours` runs them
     "wm-drake verdict", "wm-drake gasket curves folded",
     "wm-drake study cycle", "wm-drake study tolerance", "wm-drake study spin-cycle", "wm-drake study spin-identify",
-    "wm-drake study gasket", "wm-drake study drive", "wm-drake study balancer", "wm-drake study design",
+    "wm-drake study gasket", "wm-drake study drive", "wm-drake study balancer", "wm-drake study design", "wm-drake study detect",
     "wm-drake study next",
     "wm-drake study modes", "wm-drake study response", "wm-drake calibrate",
     "wm-drake spin --engine drake",

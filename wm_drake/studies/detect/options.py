@@ -33,8 +33,9 @@ class DetectOptions(Options):
         "NAME",
     )
     features: str = option(
-        "amplitude,phase",
-        "Features of the estimate: amplitude, phase (against the first signal) and order2.",
+        "amplitude,phase,products",
+        "Features of the estimate: amplitude of order one, phase (against the first signal), "
+        "order2, and products, of all these with each other.",
         "NAMES",
     )
     estimator: str = option("linear", "Estimator: linear, or one of yours.", "NAME")

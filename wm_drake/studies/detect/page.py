@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
@@ -119,10 +120,10 @@ def answer_text(question: Question, draws: Draws, chosen: float, verdict: Verdic
     if not verdict.touches:
         return f"{least}none of {spins.samples} loads spins at once."
     of = verdict.touches
-    share = _of_round(of.estimate) if of.count else f"none of {of.samples} that spin"
+    share = _of_round(of.estimate) if of.count else f"none of {of.samples}"
     return (
-        f"{least}{round(100.0 * spins.estimate)} of 100 loads spin at once, {share} "
-        f"{does.replace('touch', 'touches').replace('keep', 'keeps')} (95 % interval "
+        f"{least}{round(100.0 * spins.estimate)} of 100 loads spin at once, and {share} of these "
+        f"{does} (95 % interval "
         f"{OF_LOADS.text(of.lower)} to {OF_LOADS.text(of.upper)})."
     )
 
@@ -153,8 +154,8 @@ def _short(question: Question, draws: Draws, verdict: Verdict, ranking: xr.Datas
         rows.append(
             (
                 "By the estimated gap",
-                f"at best {best['choice'].item()}: {OF_LOADS.text(best.spins.item())} of the loads "
-                f"spin at once",
+                f"{best['choice'].item()} would be best: {OF_LOADS.text(best.spins.item())} of the "
+                "loads spin at once",
             )
         )
     return Part("In short", facts=rows)
@@ -252,7 +253,7 @@ def c_array(limits: xr.Dataset, quantity: Quantity) -> str:
     ).replace("\u00a0", " ")
 
 
-def truth_plot(errors: xr.Dataset, touches: FloatArray) -> Plot:
+def truth_plot(errors: xr.Dataset, touches: NDArray[np.bool_]) -> Plot:
     """Return true over estimated mass and gap."""
     panels = []
     for column, name in enumerate(("mass", "gap")):

@@ -11,6 +11,7 @@ each (docs/theory/detect.md), drawn from the seed by the name of the signal, so 
 of a study have the same luck.
 """
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -96,7 +97,8 @@ class Signal:
             turns: Length of the window.
         """
         parts = np.stack([data[f"window_{self.kind}_{order}"].values for order in ORDERS], axis=2)
-        exact = parts[(..., *self.place, slice(None))] @ np.array([1.0, -1.0j])
+        at_sensor = np.moveaxis(parts, -1, 3)[(slice(None),) * 4 + self.place]
+        exact = at_sensor @ np.array([1.0, -1.0j])
         weights = hold.weights(turns)
         mean = np.tensordot(weights, exact, (0, 1))
         rng = np.random.default_rng([seed, turns, *self.name.encode()])
@@ -164,10 +166,11 @@ def _signal(text: str, known: Mapping[str, Signal]) -> Signal:
     return replace(signal, **changes)
 
 
-AMPLITUDE, PHASE, SECOND = "amplitude", "phase", "order2"
-FEATURES = (AMPLITUDE, PHASE, SECOND)
+AMPLITUDE, PHASE, SECOND, PRODUCTS = "amplitude", "phase", "order2", "products"
+FEATURES = (AMPLITUDE, PHASE, SECOND, PRODUCTS)
 """Families of features: amplitudes of order one; parts of the other signals in phase with the first
-one and a quarter of a turn before it; amplitudes of order two."""
+one and a quarter of a turn before it; amplitudes of order two; squares and products of all these.
+"""
 
 
 def features_of(
@@ -192,6 +195,9 @@ def features_of(
             columns[f"{signal.name} before"] = relative.imag
         if SECOND in families:
             columns[f"{signal.name} order 2"] = np.abs(values[:, 1])
+    if PRODUCTS in families:
+        pairs = itertools.combinations_with_replacement(list(columns), 2)
+        columns |= {f"{a} × {b}": columns[a] * columns[b] for a, b in pairs}
     return xr.DataArray(
         np.column_stack(list(columns.values())), {"feature": list(columns)}, ("draw", "feature")
     )

@@ -29,7 +29,7 @@ from wm_drake.studies.detect.decision import (
 from wm_drake.studies.detect.estimators import Estimator, Predict, estimated
 from wm_drake.studies.detect.holds import Hold, in_ranges
 from wm_drake.studies.detect.measures import ACCELERATIONS_OF_HOLD, GAPS, SIGNALS_OF_HOLD
-from wm_drake.studies.detect.signals import KINDS, Signal, features_of
+from wm_drake.studies.detect.signals import Signal, features_of
 from wm_drake.studies.experiment import Experiment
 
 HELD = 0.05
@@ -239,7 +239,7 @@ def choices_of(
     exact = tuple(replace(s, noise=0.0, resolution=0.0) for s in plan.signals)
     choices = {base: plan, f"{base} without noise": replace(plan, signals=exact)}
     for signal in more:
-        words = f"and {KINDS[signal.kind].quantity.words.format(signal.name)}"
+        words = f"{base} and {signal.quantity.words}"
         choices[words] = replace(plan, signals=(*plan.signals, signal))
     choices |= {f"{base}, {n} turns": replace(plan, turns=n) for n in turns if n != plan.turns}
     for number, hold in enumerate(draws.holds):
@@ -283,7 +283,7 @@ def ranked(choices: dict[str, Plan], draws: Draws, risk: float, retry: float) ->
 
 def _both_ways(plan: Plan, draws: Draws, risk: float) -> tuple[float, float, float, float]:
     """Return RMS error of the gap, share that spins and its interval, from both halves."""
-    errors, spins = list[FloatArray](), list[FloatArray]()
+    errors, spins = list[FloatArray](), list[NDArray[np.bool_]]()
     features, gap, touches = plan.features(draws), draws.truths["gap"], draws.touches
     try:
         for fitted in (draws.is_fitted, ~draws.is_fitted):

@@ -64,8 +64,8 @@ class DetectTask(Task):
 
     @property
     def identity(self) -> dict[str, Any]:
-        """Return what determines the runs beside the machine."""
-        return {**self.laundry.identity, "holds": tuple(hold.profile for hold in self.holds)}
+        """Return what determines the spins beside the machine."""
+        return self.laundry.identity  # without holds: another speed reuses the spins
 
     def run(self, executor: Executor) -> Answer:
         """Run holds and spins, and judge thresholds and estimates."""
