@@ -123,8 +123,8 @@ def first_hold(profile: SpinProfile) -> int | None:
     """Return the number of the point at which the first hold below the top begins, or None."""
     time, speed = np.array(profile.time), np.array(profile.speed)
     is_hold = (np.diff(speed) == 0.0) & (np.diff(time) >= SHORTEST)
-    found = np.flatnonzero(is_hold & (speed[:-1] > 0.0) & (speed[:-1] < profile.highest_speed))
-    return int(found[0]) if len(found) else None
+    places = np.flatnonzero(is_hold & (speed[:-1] > 0.0) & (speed[:-1] < profile.highest_speed))
+    return int(places[0]) if len(places) else None
 
 
 def until(profile: SpinProfile, point: int) -> SpinProfile:
@@ -135,13 +135,13 @@ def until(profile: SpinProfile, point: int) -> SpinProfile:
 
 def ramp_to(speed: float, profile: SpinProfile, duration: float) -> SpinProfile:
     """Return a ramp as steep as the first one of a profile, and a hold. [rad/s, s]"""
-    time, wanted = np.array(profile.time), np.array(profile.speed)
-    rising = np.flatnonzero(np.diff(wanted) > 0.0)
-    rate = np.diff(wanted)[rising[0]] / np.diff(time)[rising[0]] if len(rising) else speed / 10.0
-    top = (speed - wanted[0]) / rate if wanted[0] < speed else 0.0
-    points = [(0.0, float(wanted[0])), (top, speed), (top + duration, speed)]
-    times, speeds = zip(*(points if top else [(0.0, speed), (duration, speed)]), strict=True)
-    return profile.model_copy(update={"time": times, "speed": speeds, "regions": ()})
+    time, speeds = np.array(profile.time), np.array(profile.speed)
+    rising = np.flatnonzero(np.diff(speeds) > 0.0)
+    rate = np.diff(speeds)[rising[0]] / np.diff(time)[rising[0]] if len(rising) else speed / 10.0
+    top = (speed - speeds[0]) / rate if speeds[0] < speed else 0.0
+    points = [(0.0, float(speeds[0])), (top, speed), (top + duration, speed)]
+    times, held = zip(*(points if top else [(0.0, speed), (duration, speed)]), strict=True)
+    return profile.model_copy(update={"time": times, "speed": held, "regions": ()})
 
 
 def in_ranges(profile: SpinProfile) -> tuple[SpinProfile, FloatArray]:

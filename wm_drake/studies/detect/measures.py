@@ -57,8 +57,8 @@ def _in_windows(run: Run, signals: FloatArray) -> FloatArray:
 
 
 def _orders(run: Run) -> Sequence[FloatArray]:
-    own = np.column_stack([run.motor_torque, run.drum_speed])
-    values = _in_windows(run, np.hstack([own, run.displacement]))
+    of_drive = np.column_stack([run.motor_torque, run.drum_speed])
+    values = _in_windows(run, np.hstack([of_drive, run.displacement]))
     parts = region_samples(run.profile, run.period, len(run.time))
     mean = [run.drum_speed[p].mean() if p.stop > p.start else np.nan for p in parts]
     each = (values[:, :, 0], values[:, :, 1], values[:, :, 2:])

@@ -25,7 +25,7 @@ from wm_drake.studies.detect.decision import (
     verdict_of,
 )
 from wm_drake.studies.detect.estimators import LinearFit
-from wm_drake.studies.detect.signals import Signal
+from wm_drake.studies.detect.signals import ControllerSignal
 from wm_drake.studies.detect.study import (
     GAP,
     TRUTHS,
@@ -39,7 +39,7 @@ from wm_drake.studies.detect.study import (
 
 
 @dataclass(frozen=True)
-class Question:
+class RiskQuestion:
     """What is asked of the draws.
 
     Attributes:
@@ -57,7 +57,7 @@ class Question:
     risk_text: str
 
 
-def detect_answer(question: Question, draws: Draws, more: Sequence[Signal]) -> Answer:
+def detect_answer(question: RiskQuestion, draws: Draws, more: Sequence[ControllerSignal]) -> Answer:
     """Return the answer.
 
     Args:
@@ -105,7 +105,7 @@ def detect_answer(question: Question, draws: Draws, more: Sequence[Signal]) -> A
     )
 
 
-def answer_text(question: Question, draws: Draws, chosen: float, verdict: Verdict) -> str:
+def answer_text(question: RiskQuestion, draws: Draws, chosen: float, verdict: Verdict) -> str:
     """Return the answer in a few sentences."""
     plan = question.plan
     signal, speed = plan.signals[0].quantity, draws.holds[plan.hold].speed
@@ -134,7 +134,7 @@ def _of_round(share: float) -> str:
     return f"{round(whole * share)} of {whole:,}"
 
 
-def _short(question: Question, draws: Draws, verdict: Verdict, ranking: xr.Dataset) -> Part:
+def _short(question: RiskQuestion, draws: Draws, verdict: Verdict, ranking: xr.Dataset) -> Part:
     """Return the part in short."""
     distributions = verdict.distributions()
     without = draws.touches[~draws.is_fitted].mean()
@@ -172,7 +172,7 @@ ABOUT_RANKING = (
 )
 
 
-def signal_text(signal: Signal) -> str:
+def signal_text(signal: ControllerSignal) -> str:
     """Return the errors of a signal in words."""
     quantity = signal.quantity.named("", form="{:.3g}".format)
     noise, step = (quantity.text(value) for value in (signal.noise, signal.resolution))

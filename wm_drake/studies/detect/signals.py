@@ -32,7 +32,7 @@ SAMPLE = Unit("s", "ms")
 
 
 @dataclass(frozen=True)
-class Kind:
+class SignalKind:
     """What signals of one kind are, and the errors of a usual sensor.
 
     Attributes:
@@ -48,19 +48,21 @@ class Kind:
 
 KINDS = {
     # assumption: 1 % of the largest torque of the machine 'motor' at the drum, from its current
-    "torque": Kind(Quantity("torque ripple", Unit("N*m", "N*m"), 2), 0.2, 0.05),
+    "torque": SignalKind(Quantity("torque ripple", Unit("N*m", "N*m"), 2), 0.2, 0.05),
     # assumption: a tacho of some ten pulses a turn of a motor that turns ten times as fast
-    "speed": Kind(Quantity("speed ripple", Unit("rad/s", "rpm"), 2), 0.02, 0.01),
+    "speed": SignalKind(Quantity("speed ripple", Unit("rad/s", "rpm"), 2), 0.02, 0.01),
     # assumption: a magnet and a Hall sensor over 30 mm, 12 bit with noise
-    "displacement": Kind(Quantity("amplitude at {}", Unit("m", "mm"), 2), 2e-4, 5e-5),
+    "displacement": SignalKind(Quantity("amplitude at {}", Unit("m", "mm"), 2), 2e-4, 5e-5),
     # assumption: a MEMS sensor of 2 g, 12 bit, 5 mg of noise
-    "acceleration": Kind(Quantity("acceleration at {}", Unit("m/s^2", "m/s^2"), 3), 0.05, 0.01),
+    "acceleration": SignalKind(
+        Quantity("acceleration at {}", Unit("m/s^2", "m/s^2"), 3), 0.05, 0.01
+    ),
 }
 """Kinds of signals by the names of their measures."""
 
 
 @dataclass(frozen=True)
-class Signal:
+class ControllerSignal:
     """A signal with its errors.
 
     Attributes:
@@ -106,7 +108,7 @@ class Signal:
         return np.asarray(mean + self.deviation(turns * hold.turn) * errors)
 
 
-def known_signals(parameters: MachineParameters) -> dict[str, Signal]:
+def known_signals(parameters: MachineParameters) -> dict[str, ControllerSignal]:
     """Return the signals of a machine by name, with the errors of usual sensors."""
     places: dict[str, tuple[str, tuple[int, ...]]] = {}
     if motor_of(parameters.drive) is not None:
@@ -118,14 +120,16 @@ def known_signals(parameters: MachineParameters) -> dict[str, Signal]:
         for a, axis in enumerate("xyz")
     }
     return {
-        name: Signal(
+        name: ControllerSignal(
             name, kind, place, KINDS[kind].noise, KINDS[kind].resolution, KINDS[kind].sample
         )
         for name, (kind, place) in places.items()
     }
 
 
-def chosen_signals(parameters: MachineParameters, texts: Sequence[str]) -> tuple[Signal, ...]:
+def chosen_signals(
+    parameters: MachineParameters, texts: Sequence[str]
+) -> tuple[ControllerSignal, ...]:
     """Return the signals of `--signal`; by default torque and speed, or the first sensor.
 
     Args:
@@ -148,7 +152,7 @@ def chosen_signals(parameters: MachineParameters, texts: Sequence[str]) -> tuple
     return tuple(_signal(text, known) for text in texts)
 
 
-def _signal(text: str, known: Mapping[str, Signal]) -> Signal:
+def _signal(text: str, known: Mapping[str, ControllerSignal]) -> ControllerSignal:
     name, *settings = (part.strip() for part in text.split(","))
     check_known(name, known, f"no signal '{name}' in this machine", where="--signal")
     signal, changes = known[name], dict[str, Any]()
@@ -174,14 +178,14 @@ one and a quarter of a turn before it; amplitudes of order two; squares and prod
 
 
 def features_of(
-    signals: Sequence[Signal], families: Sequence[str], amplitudes: Sequence[FloatArray]
+    signals: Sequence[ControllerSignal], families: Sequence[str], amplitudes: Sequence[FloatArray]
 ) -> xr.DataArray:
     """Return the features of draws over `draw` and `feature`. [SI]
 
     The phase is that against the first signal, so that the drum needs no mark: the mass turns both.
 
     Args:
-        amplitudes: As of `Signal.amplitudes`, of each signal.
+        amplitudes: As of `ControllerSignal.amplitudes`, of each signal.
     """
     first = amplitudes[0][:, 0]
     turned = np.conj(first) / np.abs(first)

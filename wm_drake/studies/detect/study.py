@@ -29,7 +29,7 @@ from wm_drake.studies.detect.decision import (
 from wm_drake.studies.detect.estimators import Estimator, Predict, estimated
 from wm_drake.studies.detect.holds import Hold, in_ranges
 from wm_drake.studies.detect.measures import ACCELERATIONS_OF_HOLD, GAPS, SIGNALS_OF_HOLD
-from wm_drake.studies.detect.signals import Signal, features_of
+from wm_drake.studies.detect.signals import ControllerSignal, features_of
 from wm_drake.studies.experiment import Experiment
 
 HELD = 0.05
@@ -121,8 +121,8 @@ def draws_of(
     highest = np.full(len(cases), limits[-1])
     if touching:
         again = (replace(cases[k], profile=ranges) for k in touching)
-        found = run([GAPS.name], again, touching, "speeds of contact").region_gap.values
-        first = np.argmax(~(found > clearance), axis=1)
+        by_range = run([GAPS.name], again, touching, "speeds of contact").region_gap.values
+        first = np.argmax(~(by_range > clearance), axis=1)
         highest[touching] = np.append(0.0, limits)[first]
     mass, moment = np.array([truths_of(case.load) for case in cases]).T
     truths = {"mass": mass, "moment": moment, "gap": gaps}
@@ -146,7 +146,7 @@ class Plan:
     """
 
     hold: int
-    signals: tuple[Signal, ...]
+    signals: tuple[ControllerSignal, ...]
     families: tuple[str, ...]
     turns: int
     estimator: Estimator
@@ -228,7 +228,7 @@ def summary_of(errors: xr.Dataset) -> xr.Dataset:
 
 
 def choices_of(
-    plan: Plan, draws: Draws, more: Sequence[Signal], turns: Sequence[int]
+    plan: Plan, draws: Draws, more: Sequence[ControllerSignal], turns: Sequence[int]
 ) -> dict[str, Plan]:
     """Return the estimate and what could be better, by words.
 

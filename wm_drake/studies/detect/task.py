@@ -13,7 +13,7 @@ from wm_drake.studies.detect.decision import NoThresholdError
 from wm_drake.studies.detect.estimators import ESTIMATORS
 from wm_drake.studies.detect.holds import hold_of
 from wm_drake.studies.detect.options import DetectOptions
-from wm_drake.studies.detect.page import Question, detect_answer
+from wm_drake.studies.detect.page import RiskQuestion, detect_answer
 from wm_drake.studies.detect.signals import FEATURES, chosen_signals, known_signals
 from wm_drake.studies.detect.study import Plan, draws_of
 from wm_drake.studies.executor import Executor
@@ -76,7 +76,7 @@ class DetectTask(Task):
             experiment, cases, self.holds, self.clearance, self.options.seed,
             has_accelerometers=any(s.kind == "acceleration" for s in self.plan.signals),
         )  # fmt: skip
-        question = Question(
+        question = RiskQuestion(
             self.laundry.uncertain.parameters, self.plan, self.risk, self.retry,
             self.laundry.file.about, self.options.risk,
         )  # fmt: skip
