@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 
 from pydantic import BaseModel
 
-from wm_drake.errors import Problem, input_error
+from wm_drake.errors import input_error
 from wm_drake.parameters.elements import CurveTable
 from wm_drake.parameters.keys import field_at, unit_of
 from wm_drake.parameters.machine import MachineParameters
@@ -175,22 +175,6 @@ def range_of(text: str) -> tuple[str, str] | None:
         return f"{bracket[1].strip()}{bracket[3]}", f"{bracket[2].strip()}{bracket[3]}"
     low, dots, high = (part.strip() for part in text.partition(".."))
     return (low, high) if dots and low and high else None
-
-
-def owned_twice(groups: Mapping[str, Sequence[str]], kind: str) -> list[Problem]:
-    """Return a problem for each key that two groups contain.
-
-    Args:
-        groups: Key paths by name of the group.
-        kind: What the groups are, for the message.
-    """
-    problems, owner = [], dict[str, str]()
-    for name, keys in groups.items():
-        for key in keys:
-            if owner.setdefault(key, name) != name:
-                message = f"belongs to {kind} {owner[key]} already; a key may be in one {kind} only"
-                problems.append(Problem(f"{kind} {name}", key, message))
-    return problems
 
 
 def number_at(parameters: MachineParameters, key: str) -> Number:

@@ -12,12 +12,7 @@ from wm_drake.errors import InputError, Problem, input_error
 from wm_drake.parameters.keys import with_values
 from wm_drake.parameters.machine import MachineParameters
 from wm_drake.parameters.sums import Sum, Summand, measured, sums_of
-from wm_drake.parameters.units import (
-    Share,
-    Unit,
-    dimension,
-    with_base,
-)
+from wm_drake.parameters.units import Share, Unit, dimension, with_base
 from wm_drake.parameters.variation import Change, Number, change_of, common_form, number_at
 from wm_drake.parameters.vary import LAUNDRY, Entry
 from wm_drake.parameters.vary_file import Known
@@ -35,8 +30,8 @@ TABLES = ("linear", "scaled")
 "scaled": the forces of the table are scaled, so that the curve keeps its shape.
 """
 
-PRINTED = 5e-3
-"""Relative error of a number that a page prints with three digits; an end may be given so."""
+ROUNDING = 1e-9
+"""Part of a range by which a value may be beyond an end, since its unit was converted."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +111,7 @@ class Varied:
         number = self.numbers[0] if self.numbers else Number(self.name, None, self.unit)
         value, levels = number.resolved(text), self.first_levels
         low, _, high = levels
-        slack = PRINTED * max(abs(low), abs(high))
+        slack = ROUNDING * (high - low)
         if not low - slack <= value <= high + slack:
             ends = f"{number.unit.reading(low)} to {number.unit.reading(high)}"
             message = f"'{text}' is outside the range of factor {self.name}, {ends}"
