@@ -1,7 +1,7 @@
 """Declaration of a table: columns with name, unit and format, and rows of values.
 
 A table is declared once. The template of a page reads its texts; `terminal` gives it for the
-terminal, `frame` for a CSV file and `records` for JSON, with the values themselves.
+terminal. Files and JSON have the numbers of `wm_drake.report.labelled`.
 """
 
 import itertools
@@ -122,34 +122,6 @@ class Table:
             Group(first.text(group.heading), tuple(Row(texts(row), row.kind) for row in group.rows))
             for group in self.groups
         )
-
-    def frame(self) -> pd.DataFrame:
-        """Return the values, with the heading of its group in each row, as for a CSV file."""
-        rows = [(group.heading, *row.cells) for group in self.groups for row in group.rows]
-        return pd.DataFrame(rows, columns=list(self.header))
-
-    def records(self) -> list[dict[str, CellValue]]:
-        """Return the rows as objects for JSON; a missing number is None."""
-        return [
-            {
-                head: None if isinstance(value, float) and math.isnan(value) else value
-                for head, value in zip(self.header, (group.heading, *row.cells), strict=True)
-            }
-            for group in self.groups
-            for row in group.rows
-        ]
-
-    def without(self, name: str) -> "Table":
-        """Return the table without a column, which is not the first one."""
-        names = [column.name for column in self._declared()]
-        at = names.index(name)
-
-        def kept(row: Row) -> Row:
-            return Row((*row.cells[: at - 1], *row.cells[at:]), row.kind)
-
-        groups = tuple(Group(group.heading, tuple(map(kept, group.rows))) for group in self.groups)
-        columns = (*self.columns[:at], *self.columns[at + 1 :])
-        return Table(self.caption, columns, groups, self.text_columns - (at < self.text_columns))
 
     def terminal(self, title: str) -> "rich.table.Table":
         """Return the table for the terminal: words at the left, numbers at the right."""
