@@ -5,6 +5,7 @@ are computed once, at export. A number on which a packed number depends in anoth
 with a second number, is left out.
 """
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -15,7 +16,7 @@ from wm_drake.engines.compiled.packing import pack_elements
 from wm_drake.errors import InputError
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import Load, MachineParameters, with_values
-from wm_drake.parameters.keys import field_at, quantities
+from wm_drake.parameters.keys import AllowedRange, allowed_range, quantities
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 
@@ -38,7 +39,7 @@ CHANGES = (0.02, 0.05)
 CHANGE_OF_ZERO = 1e-3
 """Change of a number that is zero, in its SI unit."""
 LEAST = 1e-9
-"""Smallest value of a number that must be above zero, in its SI unit."""
+"""Distance from an end that a number must not reach, in its SI unit."""
 
 
 @dataclass(frozen=True)
@@ -111,29 +112,15 @@ def _tunable(
     is_straight = np.all(deviation <= TOLERANCE * (np.abs(base[rows]) + np.abs(far[rows])))
     if not len(rows) or not is_straight or np.count_nonzero(far) != len(rows):
         return None
-    lower, upper = _bounds(start, key)
+    ends = ends_of(allowed_range(start, key))
+    lower, upper = (end if math.isfinite(end) else None for end in ends)
     return Tunable(key, value, unit, lower, upper, rows, far[rows] / steps[1])
 
 
-def _bounds(parameters: MachineParameters, key: str) -> tuple[float | None, float | None]:
-    """Return the bounds of a number in the machine file."""
-    field = field_at(parameters, key)[1]
-    lower, upper = None, None
-    for limit in _limits(field.metadata if field else ()):
-        if getattr(limit, "ge", None) is not None:
-            lower = float(limit.ge)
-        if getattr(limit, "gt", None) is not None:
-            lower = float(limit.gt) + LEAST
-        if getattr(limit, "le", None) is not None:
-            upper = float(limit.le)
-    return lower, upper
-
-
-def _limits(metadata: Any) -> Iterator[Any]:
-    """Yield the entries of a field's metadata, those of a nested `Field` one by one."""
-    for entry in metadata:
-        yield entry
-        yield from getattr(entry, "metadata", ())
+def ends_of(allowed: AllowedRange) -> tuple[float, float]:
+    """Return the ends of an allowed range; one that is excluded is `LEAST` inside. [SI]"""
+    low = allowed.low if allowed.low_is_in else allowed.low + LEAST
+    return low, allowed.high if allowed.high_is_in else allowed.high - LEAST
 
 
 def _independent(candidates: list[Tunable], base: FloatArray, packed: Any) -> list[Tunable]:

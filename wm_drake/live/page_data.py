@@ -24,11 +24,10 @@ from wm_drake.export.page_model import (
 )
 from wm_drake.export.page_second import SecondProcess
 from wm_drake.export.page_steps import FARTHEST, other_steps
-from wm_drake.export.tunable import LEAST
+from wm_drake.export.tunable import ends_of
 from wm_drake.export.wasm import wasm_module
 from wm_drake.live.machine import MOST_STEPS, SLIDER_STEPS, OpenMachine, drum_of
 from wm_drake.live.measures import foot_title, heads_of, mount_title, shown_measures
-from wm_drake.live.sliders import Slider
 from wm_drake.live.state import PageState
 from wm_drake.model.build import build_machine
 from wm_drake.model.scene import REPLAY_RATE, Scene
@@ -260,7 +259,7 @@ def _machine(
         number["kind"] = (
             "table" if slider.number.is_table else "entry" if slider.is_entry else "number"
         )
-        number["least"], number["most"] = _limits(slider)
+        number["least"], number["most"] = _finite([*ends_of(slider.allowed)])
         _put_limits(number, limits.get(key, (-FARTHEST, FARTHEST)), slider.unit)
         runs = key in places or re.fullmatch(
             r"loads\..*\.unbalances\.\d+\.\w+|profile\.(time|speed)\.\d+", key
@@ -281,14 +280,6 @@ def _put_limits(number: dict[str, Any], limits: Sequence[float], unit: Unit) -> 
             shown = unit.from_si(limit)
             number[end] += 1.01 * (shown - number[end])
             number["allowed"] = f"{number['allowed']} (on this page {sign} {shown:.4g})".strip()
-
-
-def _limits(slider: Slider) -> tuple[float, float]:
-    """Return the ends of the allowed range of a number; one that is excluded is near. [SI]"""
-    allowed = slider.allowed
-    low = allowed.low if allowed.low_is_in else allowed.low + LEAST
-    high = allowed.high if allowed.high_is_in else allowed.high - LEAST
-    return max(low, -FARTHEST), min(high, FARTHEST)
 
 
 def _finite(values: list[float]) -> list[float]:
