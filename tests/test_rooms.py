@@ -80,8 +80,8 @@ def _reason(name, target):
             return "not a room before it"
     if top in ("analyses", "tests", "conftest"):
         return "no part of the package"
-    if top == "jinja2" and room != "report":
-        return "only report may"
+    if top == "jinja2" and room not in ("report", "written_files"):
+        return "only report and written files may"
     if top == "matplotlib" and not _draws(room, places):
         return "only report and pages of studies may"
     if top == "pydrake" and room in WITHOUT_DRAKE:

@@ -11,6 +11,7 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from wm_drake.errors import InputError, input_error, reason_of
 
@@ -113,6 +114,27 @@ def temporary_folder() -> Iterator[Path]:
             if error.filename is not None:  # such as a program that cannot be started
                 raise
             raise unwritable(Path(name), error) from None
+
+
+def filled(template: Path, filters: Mapping[str, Callable[[Any], str]], **values: object) -> str:
+    """Return the text of a file from its template; in HTML no value is markup.
+
+    Args:
+        filters: Functions by the names by which the template calls them.
+        values: What the template reads.
+    """
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined, select_autoescape
+
+    environment = Environment(
+        loader=FileSystemLoader(template.parent),
+        autoescape=select_autoescape(["html"]),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.filters |= dict(filters)
+    return environment.get_template(template.name).render(values)
 
 
 def _real(path: Path) -> Path:

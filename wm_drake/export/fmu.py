@@ -6,7 +6,6 @@ where it runs; headers of the standard come from the installed FMPy.
 
 import csv
 import hashlib
-import html
 import importlib.metadata
 import importlib.util
 import io
@@ -29,7 +28,7 @@ from wm_drake.engines.trajectory import LARGEST_ANGLE, LARGEST_DISPLACEMENT, LAR
 from wm_drake.errors import check_known, input_error, shortened
 from wm_drake.export.description import IDENTIFIER, Identity, model_description
 from wm_drake.export.kernel import kernel_code
-from wm_drake.export.model import ExportedModel, FmuVariable, exported_model
+from wm_drake.export.model import ExportedModel, exported_model
 from wm_drake.export.object_code import (
     PLATFORMS,
     Platform,
@@ -40,9 +39,10 @@ from wm_drake.export.object_code import (
 from wm_drake.export.options import FmuOptions
 from wm_drake.parameters import MachineParameters
 from wm_drake.simulation.outputs import variables_of
-from wm_drake.written_files import check_new, temporary_folder, write_files
+from wm_drake.written_files import check_new, filled, temporary_folder, write_files
 
 WRAPPER = Path(__file__).parent / "c" / "fmu.c"
+DOCUMENTATION = Path(__file__).parent / "documentation.html"
 VERSIONS = (2, 3)
 READABLE, SETTABLE = 1, 2
 """Bits of a variable in the table of the C functions."""
@@ -332,38 +332,8 @@ def _reference(model: ExportedModel) -> bytes:
 
 def _documentation(model: ExportedModel, fmi: int) -> bytes:
     """Return the page that describes the FMU."""
-    parameters = model.setup.parameters
-    rows = "\n".join(_row(v) for v in model.variables if v.causality != "local")
-    about = html.escape(parameters.about)
-    text = f"""<!DOCTYPE html>
-<html lang="en"><head><meta charset="utf-8"><title>{html.escape(parameters.name)}</title>
-<style>body {{ font-family: sans-serif; max-width: 60em; margin: 2em auto; }}
-td, th {{ text-align: left; padding: 0.1em 0.8em; border-bottom: 1px solid #ddd; }}
-td.number {{ text-align: right; }}</style></head><body>
-<h1>Washing machine {html.escape(parameters.name)}, load {html.escape(model.load)}</h1>
-<p>{about} Written by {_program()}; FMI {fmi}.0, co-simulation and model exchange.</p>
-<p>Frame W: origin on the drum axis at mid-depth, x to the right of a person who faces the door, y
-from the front to the rear, z up. A run begins at rest. Co-simulation takes steps of the classical
-Runge-Kutta scheme of at most {1e3 * model.step:g} ms, and divides longer communication steps. Set
-drum_speed and drum_acceleration together: the drum then follows exactly. With drum_speed alone it
-reaches the value one communication step later. A parameter acts from the next step on; the run
-begins at the rest pose of the exported numbers.</p>
-<p>reference.csv in this folder, if there is one: displacements of the compiled engine over the
-spin profile of the machine.</p>
-<table><tr><th>Variable</th><th>Kind</th><th>Start</th><th>Unit</th><th>Meaning</th></tr>
-{rows}
-</table></body></html>
-"""
-    return text.encode()
-
-
-def _row(variable: FmuVariable) -> str:
-    start = "" if variable.start is None else f"{variable.start:.6g}"
-    return (
-        f"<tr><td>{html.escape(variable.name)}</td><td>{variable.causality}</td>"
-        f'<td class="number">{start}</td><td>{variable.unit.replace("*", " ")}</td>'
-        f"<td>{html.escape(variable.words)}</td></tr>"
-    )
+    about = {"parameters": model.setup.parameters, "program": _program()}
+    return filled(DOCUMENTATION, {}, model=model, fmi=fmi, **about).encode()
 
 
 def _zipped(files: Mapping[str, bytes]) -> bytes:

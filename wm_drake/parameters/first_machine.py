@@ -7,12 +7,10 @@ assumptions, which the files say; they are meant to be replaced.
 
 import math
 import warnings
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from string import Template
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
@@ -28,6 +26,7 @@ from wm_drake.parameters.inertia import (
     unlikely_reference,
 )
 from wm_drake.parameters.types import FloatArray
+from wm_drake.written_files import filled
 
 TEMPLATES = Path(__file__).parents[1] / "data" / "first_machine"
 """Folder of the templates of the two files."""
@@ -358,35 +357,19 @@ class FirstMachine:
             walls.append((f"wall_{name}", centre, size))
         return walls
 
+    @property
+    def rpm(self) -> float:
+        """Highest drum speed. [rpm]"""
+        return self.numbers.speed * 30.0 / np.pi
+
+    @property
+    def hold(self) -> int:
+        """Time until which the profile holds the highest speed: for 10 s. [s]"""
+        return math.ceil(25.0 + abs(self.rpm - 90.0) / 15.0)
+
     def sdf(self) -> str:
         """Return the text of the SDF file."""
-        n, tub, drum = self.numbers, self.bodies["tub"], self.bodies["drum"]
-        walls = (
-            _shape(name, f"{_row(c)} 0 0 0", f"<box><size>{_row(size)}</size></box>", GLASS)
-            for name, c, size in self.walls()
-        )
-        frames = (
-            f'    <frame name="{name}" attached_to="{link}">'
-            f"<pose>{_row(place)} 0 0 0</pose></frame>"
-            for name, link, place in self.frames()
-        )
-        return _filled(
-            "bodies.sdf",
-            name=self.name,
-            gap=f"{_text(1e3 * n.gap)} mm beside the tub: {self.source('gap')}",
-            drum_size=(
-                f"radius {_text(1e3 * n.drum_radius)} mm: {self.source('drum_radius')}; depth "
-                f"{_text(1e3 * n.drum_depth)} mm: {self.source('drum_depth')}"
-            ),
-            walls="\n".join(walls),
-            frames="\n".join(frames),
-            about_tub=tub.about,
-            about_drum=drum.about,
-            tub=_inertial(tub),
-            drum=_inertial(drum),
-            tub_shell=_cylinder("tub_shell", self.tub_radius, self.tub_depth),
-            drum_shell=_cylinder("drum_shell", n.drum_radius, n.drum_depth),
-        )
+        return self._filled("bodies.sdf")
 
     def yaml(self, file: str, model: str) -> str:
         """Return the text of the machine file.
@@ -395,39 +378,15 @@ class FirstMachine:
             file: Its path, for the commands in its comments.
             model: Path of the SDF from its folder.
         """
-        n, whole, source = self.numbers, self.whole, self.source
-        return _filled(
-            "machine.yaml",
-            name=self.name,
-            file=file,
-            model=model,
-            n_springs=n.springs,
-            n_dampers=n.dampers,
-            tub_kg=_text(self.bodies["tub"].mass),
-            drum_kg=_text(self.bodies["drum"].mass),
-            springs=_elements("spring", "suspension", SPRING_PLACES[n.springs]),
-            dampers=_elements("damper", "friction", DAMPER_PLACES[n.dampers]),
-            spring_rate=f"{_text(1e-3 * self.spring_rate)} N/mm",
-            spring_source=source(
-                "spring_rate", f"{VERTICAL_HZ:g} Hz vertically with {_text(whole.mass)} kg"
-            ),
-            friction=f"{_text(self.friction)} N",
-            friction_source=source("friction", f"{FRICTION_N:g} N in all dampers"),
-            gasket=f"{_text(1e-3 * n.gasket_stiffness)} N/mm",
-            gasket_source=source("gasket_stiffness", "usual are 1 to 4 N/mm"),
-            unbalance=f"{_text(n.unbalance)} kg",
-            unbalance_source=source("unbalance", "usual limit before a spin"),
-            radius_mm=_text(1e3 * n.drum_radius - 5.0),
-            front_mm=_text(-350.0 * n.drum_depth),
-            rear_mm=_text(350.0 * n.drum_depth),
-            speed=f"{_text(n.speed * 30.0 / np.pi)} rpm",
-            speed_source=source("speed"),
-            hold=f"{math.ceil(25.0 + abs(n.speed * 30.0 / np.pi - 90.0) / 15.0)} s",
-        )
+        return self._filled("machine.yaml", file=file, model=model)
 
+    def _filled(self, template: str, **values: str) -> str:
+        """Return the text of a file; numbers and vectors pass the filters `digits` and `row`."""
+        filters: dict[str, Any] = {"digits": _text, "row": _row}
+        path = TEMPLATES / f"{template}.template"
+        usual = {"VERTICAL_HZ": VERTICAL_HZ, "FRICTION_N": FRICTION_N}
+        return filled(path, filters, machine=self, **usual, **values)
 
-GLASS, METAL = "0.8 0.8 0.85 0.15", "0.75 0.85 0.9 0.35"
-"""Colours of shapes: red, green, blue, opacity."""
 
 SPRING_PLACES = {
     2: {"left": (-1.0, 0.0), "right": (1.0, 0.0)},
@@ -455,44 +414,3 @@ def _text(value: float) -> str:
 
 def _row(vector: FloatArray) -> str:
     return " ".join(f"{value + 0.0:.6g}" for value in vector)
-
-
-def _shape(name: str, pose: str, geometry: str, colour: str) -> str:
-    """Return a visual and a collision shape with the same name."""
-    inside = f"<pose>{pose}</pose>\n        <geometry>{geometry}</geometry>"
-    material = f"<material><diffuse>{colour}</diffuse></material>"
-    return (
-        f'      <visual name="{name}">\n        {inside}\n        {material}\n      </visual>\n'
-        f'      <collision name="{name}">\n        {inside}\n      </collision>'
-    )
-
-
-def _inertial(body: Mass) -> str:
-    i = body.inertia
-    names = (("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("xz", 0, 2), ("yz", 1, 2))
-    numbers = "".join(f"<i{name}>{i[a, b]:.6g}</i{name}>" for name, a, b in names)
-    return (
-        f"      <inertial>\n        <pose>{_row(body.centre)} 0 0 0</pose>\n"
-        f"        <mass>{body.mass:.6g}</mass>\n        <inertia>{numbers}</inertia>\n"
-        "      </inertial>"
-    )
-
-
-def _cylinder(name: str, radius: float, length: float) -> str:
-    """Return the shapes of a cylinder about y."""
-    size = f"<radius>{radius:.6g}</radius><length>{length:.6g}</length>"
-    return _shape(name, "0 0 0 1.5707963267948966 0 0", f"<cylinder>{size}</cylinder>", METAL)
-
-
-def _elements(kind: str, of: str, names: Iterable[str]) -> str:
-    """Return the lines of the springs or dampers of a type."""
-    return "\n".join(
-        f"  {name}: {{type: {of}, tub_frame: {kind}_{name}_tub, "
-        f"housing_frame: {kind}_{name}_housing}}"
-        for name in names
-    )
-
-
-def _filled(template: str, **values: object) -> str:
-    text = (TEMPLATES / f"{template}.template").read_text(encoding="utf-8")
-    return Template(text).substitute(values)
