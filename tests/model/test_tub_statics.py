@@ -22,19 +22,6 @@ def test_wrench_is_that_of_drake_at_any_pose(machine):
         np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-10)  # N and N m
 
 
-def test_slopes_are_those_of_the_wrench(machine):
-    """A central difference of the wrench is the other way to the slopes."""
-    setup = machine.set_up()
-    statics = TubStatics(setup.elements, weight_of(machine.plant, setup.plant_context))
-    pose, step = setup.rest_pose, 1e-5
-    _, slopes = statics.with_slopes(pose)
-    for k, move in enumerate(step * np.eye(6)):
-        column = (statics.wrench(pose + move) - statics.wrench(pose - move)) / (2.0 * step)
-        np.testing.assert_allclose(
-            slopes[:, k], column, rtol=1e-3, atol=1e-3 * np.abs(slopes).max()
-        )
-
-
 def test_rest_pose_is_one_of_drake(machine):
     """Drake's gravity and the elements one by one leave nothing at the rest pose."""
     for values in ({}, {"bodies.motor.mass": 7.0}, {"gasket.damping_x": 30.0}):

@@ -1,4 +1,4 @@
-"""Symmetric 3x3 matrices as six numbers (xx, yy, zz, xy, xz, yz), vectors from packed numbers."""
+"""Symmetric 3x3 matrices as six numbers (xx, yy, zz, xy, xz, yz), vectors, linear equations."""
 
 from wm_drake.compiler.compilation import law
 
@@ -76,3 +76,33 @@ def plus(a, b):
 def scaled(s, a):
     """Return a wrench times a number."""
     return (s * a[0], s * a[1], s * a[2], s * a[3], s * a[4], s * a[5])
+
+
+@law
+def solve(a, b, n):
+    """Solve n linear equations by elimination with pivots; return whether there is a solution.
+
+    Args:
+        a: Coefficients by rows, overwritten.
+        b: Right side; the solution is written into it.
+    """
+    for i in range(n):
+        pivot = i
+        for k in range(i + 1, n):
+            if abs(a[n * k + i]) > abs(a[n * pivot + i]):
+                pivot = k
+        if not abs(a[n * pivot + i]) > 0.0:
+            return False
+        for j in range(n):
+            a[n * i + j], a[n * pivot + j] = a[n * pivot + j], a[n * i + j]
+        b[i], b[pivot] = b[pivot], b[i]
+        for k in range(i + 1, n):
+            factor = a[n * k + i] / a[n * i + i]
+            for j in range(i, n):
+                a[n * k + j] = a[n * k + j] - factor * a[n * i + j]
+            b[k] = b[k] - factor * b[i]
+    for i in range(n - 1, -1, -1):
+        for j in range(i + 1, n):
+            b[i] = b[i] - a[n * i + j] * b[j]
+        b[i] = b[i] / a[n * i + i]
+    return True

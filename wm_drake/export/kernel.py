@@ -116,6 +116,12 @@ def pointer_at(typing_context, pointer, index):
     return POINTER(pointer, types.intp), _emit_address
 
 
+@njit(**OPTIONS)
+def part(v, begin, count):
+    """Return some of the numbers behind a pointer as an array."""
+    return carray(pointer_at(v, begin), (count,))
+
+
 @law
 def add_point_mass(p, mass, q, c, frame):
     """Add a point mass to sums: mass, first moment and inertia about O, in T.

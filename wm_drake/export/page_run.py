@@ -32,14 +32,13 @@ from wm_drake.engines.compiled.midpoint import (
     TUBES,
     MidpointWork,
     integrate_midpoint_lanes,
-    write_newton_matrix,
+    write_relaxation,
 )
 from wm_drake.engines.compiled.multistep import PAST_INPUTS, PAST_RATES
 from wm_drake.engines.compiled.stepping import ACROSS_JUMPS
 from wm_drake.engines.trajectory import LARGEST_ANGLE, LARGEST_DISPLACEMENT
-from wm_drake.export.kernel import OPTIONS, POINTER, numbers_at, pointer_at
+from wm_drake.export.kernel import OPTIONS, POINTER, numbers_at, part, pointer_at
 from wm_drake.export.page_plan import GAP_SIZE
-from wm_drake.export.page_statics import solve
 from wm_drake.laws.feet import normal_loads
 from wm_drake.simulation.histories import measure_samples_lanes
 from wm_drake.simulation.mount_histories import VECTOR_SIZE, VECTOR_SUMS, measure_mounts_lanes
@@ -63,12 +62,6 @@ def _derivative() -> Any:
 def _runge_kutta() -> Any:
     """Return the Runge-Kutta step as a function of its own."""
     return for_one_run(runge_kutta_step, state_derivative=_derivative())
-
-
-@njit(**OPTIONS)
-def part(v, begin, count):
-    """Return some of the numbers behind a pointer as an array."""
-    return carray(pointer_at(v, begin), (count,))
 
 
 @njit(**OPTIONS)
@@ -171,21 +164,15 @@ def _relaxer(plan: Any) -> Any:
         p, x, work = (
             part(v, at.packed, count), part(v, at.trial, size), part(v, at.rate, size + inputs)
         )  # fmt: skip
-        start, jacobian, newton, right, relaxation = (
-            numbers_at(c, of.slowest), numbers_at(v, at.jacobian), numbers_at(v, at.slopes),
-            numbers_at(v, at.step), numbers_at(v, at.relaxation + TUBES * TUBES * i)
-        )  # fmt: skip
+        start, relaxation = numbers_at(c, of.slowest), numbers_at(v, at.relaxation)
         for k in range(size):
             x[k] = start[k]
         whole, none = part(v, at.jacobian, n * n), part(v, at.jacobian, 0)
         write_jacobian(x, work, free[i], ACROSS_JUMPS, p, elements, whole, none)
-        for column in range(TUBES):
-            write_newton_matrix(jacobian, numbers_at(v, at.length)[0], newton)
-            for row in range(TUBES):
-                right[row] = 1.0 if row == column else 0.0
-            solve(newton, right, TUBES)
-            for row in range(TUBES):
-                relaxation[TUBES * row + column] = right[row]
+        write_relaxation(
+            numbers_at(v, at.jacobian), numbers_at(v, at.length)[0], numbers_at(v, at.slopes),
+            numbers_at(v, at.step), relaxation, TUBES * TUBES * i
+        )  # fmt: skip
 
     return relax_tubes
 

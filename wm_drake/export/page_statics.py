@@ -1,6 +1,7 @@
 """Compiled functions of a page that set a machine up: bodies, struts, preloads, rest pose, feet.
 
-They do what `wm_drake.model.equilibrium` and `wm_drake.model.cabinet` do with numpy and Drake.
+The rest pose is found by the function of the engine (`wm_drake.model.tub_statics`). The others do
+what `wm_drake.model.equilibrium` and `wm_drake.model.cabinet` do with numpy and Drake.
 """
 
 from typing import Any
@@ -8,58 +9,34 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from wm_drake.compiler.compilation import law
+from wm_drake.compiler.compilation import for_one_run, law
 from wm_drake.compiler.elementary import sqrt
-from wm_drake.compiler.matrices import plus, scaled, six
-from wm_drake.compiler.vectors import add, cross, dot, rotate, scale, subtract
+from wm_drake.compiler.matrices import solve
+from wm_drake.compiler.vectors import add, cross, dot, scale, subtract
 from wm_drake.elements.cabinet import FEET_COUNT, FOOT, FULL_DAMPING, PADS, read_pads
 from wm_drake.elements.feet import FEET, load_on_feet, read_feet
 from wm_drake.elements.friction_damper import FRICTION_DAMPER
-from wm_drake.elements.motion import tub_motion
-from wm_drake.elements.mount import WRENCH_SIZE, write_mount_wrenches
+from wm_drake.elements.mount import WRENCH_SIZE
 from wm_drake.elements.spring import SPRING, read_spring, taut_tension
 from wm_drake.engines.compiled.cabinet import FEET_BEGIN
 from wm_drake.engines.compiled.mechanics import BODIES, mass_properties, read_bodies
-from wm_drake.export.kernel import INVERSE_MASS, OPTIONS, add_point_mass, drum_adder, numbers_at
+from wm_drake.export.kernel import (
+    INVERSE_MASS,
+    OPTIONS,
+    add_point_mass,
+    drum_adder,
+    numbers_at,
+    part,
+)
 from wm_drake.export.page_plan import BODY_CONSTANTS, BODY_SIZE, FREE_LENGTH, PUSHES, SOLVED, SUMS
 from wm_drake.laws.feet import normal_loads
 from wm_drake.laws.table import stiffness_force
-from wm_drake.model.tub_statics import MOST_STEPS, POSE_STEP
+from wm_drake.model.tub_statics import balance_tub, weight_wrench, wrench_on_tub
 
 REMAINING = 1e-10
 """Largest force [N] or moment [N m] that remains on the tub at rest."""
 NOT_BALANCED, SLACK, FAR = -1.0, -2.0, -3.0
 """Why a machine has no equilibrium near its drawn pose."""
-
-
-@law
-def solve(a, b, n):
-    """Solve n linear equations by elimination with pivots; return whether there is a solution.
-
-    Args:
-        a: Coefficients by rows, overwritten.
-        b: Right side; the solution is written into it.
-    """
-    for i in range(n):
-        pivot = i
-        for k in range(i + 1, n):
-            if abs(a[n * k + i]) > abs(a[n * pivot + i]):
-                pivot = k
-        if not abs(a[n * pivot + i]) > 0.0:
-            return False
-        for j in range(n):
-            a[n * i + j], a[n * pivot + j] = a[n * pivot + j], a[n * i + j]
-        b[i], b[pivot] = b[pivot], b[i]
-        for k in range(i + 1, n):
-            factor = a[n * k + i] / a[n * i + i]
-            for j in range(i, n):
-                a[n * k + j] = a[n * k + j] - factor * a[n * i + j]
-            b[k] = b[k] - factor * b[i]
-    for i in range(n - 1, -1, -1):
-        for j in range(i + 1, n):
-            b[i] = b[i] - a[n * i + j] * b[j]
-        b[i] = b[i] / a[n * i + i]
-    return True
 
 
 def body_changer(plan: Any) -> Any:
@@ -167,29 +144,30 @@ def settler(plan: Any, set_taut: Any) -> Any:
     """Return the function (v) that finds preloads and rest pose of the empty machine.
 
     It does what `wm_drake.model.equilibrium` does: preloads that balance the tub as drawn as well
-    as they can, then the pose at which nothing remains, by Newton's method. It returns 0, or why
-    there is no such pose.
+    as they can, then the pose at which nothing remains. It returns 0, or why there is no such pose.
     """
-    at, size, limits, on_tub = plan.at, plan.elements.begins.size, plan.limits, _on_tub(plan)
-    preload_springs, newton_step = _preloads(plan, set_taut, on_tub), _newton_step(plan, on_tub)
+    at, size, limits, resting = plan.at, plan.elements.begins.size, plan.limits, plan.resting
+    numbers, wrenches = plan.count.numbers, WRENCH_SIZE * _resting_count(plan)
+    on_tub = for_one_run(wrench_on_tub)
+    balance = for_one_run(balance_tub, wrench_on_tub=on_tub)
+    preload_springs = _preloads(plan, set_taut)
 
     @njit(**OPTIONS)
     def settle(v):
-        rest, trial = numbers_at(v, at.rest), numbers_at(v, at.trial)
-        state = numbers_at(v, at.state)
+        rest, state, p = numbers_at(v, at.rest), numbers_at(v, at.state), numbers_at(v, at.packed)
+        trial, of_mounts = part(v, at.trial, size), part(v, at.wrenches, wrenches)
         for k in range(size):
-            trial[k] = state[k]
-        for k in range(6):
-            rest[k] = trial[k] = 0.0
-        status = preload_springs(v)
+            trial[k] = state[k] if k >= 6 else 0.0
+        packed, weight = part(v, at.packed, numbers), weight_of_bodies(p)
+        status = preload_springs(v, on_tub(trial, packed, resting, weight, of_mounts))
         if status < 0.0:
             return status
-        for _ in range(MOST_STEPS):
-            status = newton_step(v)
-            if status != 1.0:
-                break
-        if status != 0.0:
-            return NOT_BALANCED
+        slopes, step = part(v, at.slopes, 36), part(v, at.step, 6)
+        left = balance(trial, packed, resting, weight, REMAINING, of_mounts, slopes, step)
+        for k in range(6):
+            rest[k] = trial[k]
+            if not abs(left[k]) <= REMAINING:
+                return NOT_BALANCED
         for k in range(6):
             if not abs(rest[k]) <= limits[k // 3]:
                 return FAR
@@ -198,43 +176,17 @@ def settler(plan: Any, set_taut: Any) -> Any:
     return settle
 
 
-def _newton_step(plan: Any, on_tub: Any) -> Any:
-    """Return the function (v) that moves the rest pose by a step.
-
-    It returns 0 if the pose is one of rest, 1 after a step, -1 if there is none.
-    """
-    at = plan.at
-
-    @njit(**OPTIONS)
-    def newton_step(v):
-        rest, trial = numbers_at(v, at.rest), numbers_at(v, at.trial)
-        slopes, step = numbers_at(v, at.slopes), numbers_at(v, at.step)
-        for k in range(6):
-            trial[k] = rest[k]
-        now, largest = on_tub(v), 0.0
-        for k in range(6):
-            step[k], largest = now[k], max(largest, abs(now[k]))
-        if largest <= REMAINING:
-            return 0.0
-        for k in range(6):
-            trial[k] = rest[k] + POSE_STEP
-            moved = on_tub(v)
-            trial[k] = rest[k]
-            for i in range(6):
-                slopes[6 * i + k] = (moved[i] - now[i]) / POSE_STEP
-        if not solve(slopes, step, 6):
-            return -1.0
-        for k in range(6):
-            rest[k] = rest[k] - step[k]
-        return 1.0
-
-    return newton_step
+def _resting_count(plan: Any) -> int:
+    """Return the number of mounts that act at rest."""
+    others = len(plan.resting.others.on_cabinet) if plan.resting.others else 0
+    return sum(len(mounts) for mounts in plan.resting[:3]) + others
 
 
-def _preloads(plan: Any, set_taut: Any, on_tub: Any) -> Any:
-    """Return the function (v) that finds the preloads which balance the machine as drawn.
+def _preloads(plan: Any, set_taut: Any) -> Any:
+    """Return the function (v, wrench) that finds the preloads which balance the machine as drawn.
 
-    They solve the normal equations of the least squares of force and moment.
+    They solve the normal equations of the least squares of force and moment; wrench is that on the
+    tub without them.
     """
     at, preload = plan.at, SPRING.offsets["preload"]
     solved = [k for k, kind in enumerate(plan.springs) if kind % PUSHES == SOLVED]
@@ -243,13 +195,12 @@ def _preloads(plan: Any, set_taut: Any, on_tub: Any) -> Any:
     pushes = np.array([*(plan.springs[k] >= PUSHES for k in solved), False])
 
     @njit(**OPTIONS)
-    def preload_springs(v):
+    def preload_springs(v, wrench):
         p, normal = numbers_at(v, at.packed), numbers_at(v, at.slopes)
         right = numbers_at(v, at.step)
-        now = on_tub(v)
         for i in range(count):
             pull = pull_of(p, begins[i])
-            right[i] = -product(pull, now)
+            right[i] = -product(pull, wrench)
             for j in range(count):
                 normal[count * i + j] = product(pull, pull_of(p, begins[j]))
         if not solve(normal, right, count):
@@ -280,42 +231,16 @@ def pull_of(p, at):
     return (moment[0], moment[1], moment[2], pull[0], pull[1], pull[2])
 
 
-def _on_tub(plan: Any) -> Any:
-    """Return the function (v) of moment about the origin of W and force on the tub at rest.
-
-    They are those of gravity and all mounts at the state `at.trial`.
-    """
-    at, resting = plan.at, plan.resting
-    others = len(resting.others.on_cabinet) if resting.others else 0
-    count = sum(len(part) for part in resting[:3]) + others
-
-    @njit(**OPTIONS)
-    def on_tub(v):
-        p, x = numbers_at(v, at.packed), numbers_at(v, at.trial)
-        wrenches = numbers_at(v, at.wrenches)
-        write_mount_wrenches(x, p, resting, wrenches)
-        total = weight_at(tub_motion(x), p)
-        for i in range(count):
-            total = plus(total, scaled(-1.0, six(wrenches, WRENCH_SIZE * i)))
-        return total
-
-    return on_tub
-
-
 @law
-def weight_at(motion, p):
-    """Return moment about the origin of W and force of the weight of tub and empty drum. [N m, N]
+def weight_of_bodies(p):
+    """Return the weight of tub and empty drum: force in W, and centre of mass in T. [N, m]
 
     Args:
-        motion: `TubMotion`.
-        p: Packed numbers of the bodies, the drum at angle 0.
+        p: Packed numbers of the bodies; the drum is at angle 0.
     """
     bodies, masses = read_bodies(p, 0), mass_properties(p, 1.0, 0.0)
-    mass = 1.0 / bodies.inverse_mass
-    about_To = add(masses.moment, scale(mass, bodies.origin))
-    about_Wo = add(rotate(motion.rotation, about_To), scale(mass, motion.position))
-    m, f = cross(about_Wo, bodies.gravity), scale(mass, bodies.gravity)
-    return (m[0], m[1], m[2], f[0], f[1], f[2])
+    centre = add(bodies.origin, scale(bodies.inverse_mass, masses.moment))
+    return scale(1.0 / bodies.inverse_mass, bodies.gravity), centre
 
 
 def foot_loader(plan: Any) -> Any:
@@ -332,7 +257,7 @@ def foot_loader(plan: Any) -> Any:
     def load_feet(v, motion):
         p = numbers_at(v, at.packed)
         feet, pads = read_feet(p, numbers), read_pads(p, first)
-        load = load_on_feet(weight_at(motion, p), feet)
+        load = load_on_feet(weight_wrench(motion, weight_of_bodies(p)), feet)
         normal = normal_loads(load[0], load[3], load[4], feet.x, feet.y)
         mean = 0.25 * (normal[0] + normal[1] + normal[2] + normal[3])
         p[first + growth] = pads.vertical_stiffness / (FULL_DAMPING * mean)

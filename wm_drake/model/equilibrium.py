@@ -136,7 +136,7 @@ def rest_pose(elements: PlacedElements, weight: Weight) -> tuple[FloatArray, Flo
             there.
     """
     statics = TubStatics(elements, weight)
-    pose, wrench = statics.balance(np.zeros(6), 0.1 * EQUILIBRIUM_TOLERANCE)
+    pose, wrench = statics.balance(0.1 * EQUILIBRIUM_TOLERANCE)
     remaining = about_tub(wrench, pose)
     if not _is_at_rest(elements, pose, remaining, EQUILIBRIUM_TOLERANCE):
         pose, remaining = _search(statics, elements)

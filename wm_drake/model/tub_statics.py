@@ -1,19 +1,20 @@
 """Forces of gravity and massless elements on a tub at rest, and the pose at which they balance.
 
-The elements are evaluated by the compiled laws of the mounts, for eight poses side by side: a pose
-and six that are moved a little along each coordinate give the force and its slopes.
+Engine and exported page find the pose by the same compiled function, `balance_tub`.
 """
 
-import functools
 from dataclasses import dataclass
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context
 
-from wm_drake.compiler.lanes import WIDTH
-from wm_drake.compiler.vectors import rotation_from_rpy
-from wm_drake.elements.mount import WRENCH_SIZE, mount_wrench_history
+from wm_drake.compiler.compilation import law, long_running
+from wm_drake.compiler.lanes import number_array
+from wm_drake.compiler.matrices import plus, scaled, six, solve
+from wm_drake.compiler.vectors import add, cross, rotate
+from wm_drake.elements.motion import tub_motion
+from wm_drake.elements.mount import WRENCH_SIZE, write_mount_wrenches
 from wm_drake.elements.state_map import ELEMENT
 from wm_drake.model.bodies import drawn_frame
 from wm_drake.model.placed_elements import PlacedElements
@@ -25,9 +26,6 @@ POSE_STEP = 1e-6
 
 MOST_STEPS = 20
 """Steps of Newton's method; springs are nearly linear, and three or four suffice."""
-
-_MOVED = np.zeros((WIDTH, 6))
-_MOVED[1:7] = POSE_STEP * np.eye(6)
 
 
 @dataclass(frozen=True)
@@ -41,23 +39,6 @@ class Weight:
 
     force: FloatArray
     centre: FloatArray
-
-    @functools.cached_property
-    def slopes(self) -> FloatArray:
-        """Slopes of its wrench about the origin of W by roll, pitch, yaw, x, y, z, near T = W.
-
-        (6, 6) moment and force by rows. [N m, N by rad, m]
-        """
-        moved = np.vstack([np.cross(np.eye(3), self.centre), np.eye(3)])
-        return np.vstack([np.cross(moved, self.force).T, np.zeros((3, 6))])
-
-    def wrench(self, pose: FloatArray) -> FloatArray:
-        """Return moment about the origin of W and force at a pose of the tub. (6,) [N m, N]"""
-        roll, pitch, yaw, *position = pose.tolist()
-        rotation = np.reshape(rotation_from_rpy(roll, pitch, yaw), (3, 3))
-        x, y, z = (rotation @ self.centre + position).tolist()
-        f_x, f_y, f_z = self.force.tolist()
-        return np.array([y * f_z - z * f_y, z * f_x - x * f_z, x * f_y - y * f_x, f_x, f_y, f_z])
 
 
 def weight_of(plant: MultibodyPlant, context: Context) -> Weight:
@@ -78,56 +59,100 @@ def weight_of(plant: MultibodyPlant, context: Context) -> Weight:
     return Weight(inertia.get_mass() * gravity, np.array(inertia.get_com()))
 
 
+@law
+def weight_wrench(motion, weight):
+    """Return moment about the origin of W and force of a weight, six numbers. [N m, N]
+
+    Args:
+        motion: `TubMotion`.
+        weight: Force in W and centre of mass in T, as of `Weight`. [N, m]
+    """
+    force, centre = weight
+    m = cross(add(motion.position, rotate(motion.rotation, centre)), force)
+    return (m[0], m[1], m[2], force[0], force[1], force[2])
+
+
+@long_running
+def wrench_on_tub(x, p, mounts, weight, wrenches):
+    """Return moment about the origin of W and force on a tub at rest, six numbers. [N m, N]
+
+    Args:
+        x: State at rest: pose of the tub, and what the mounts read beside it.
+        p, mounts: Packed numbers, and the `Mounts` that act at rest.
+        weight: As for `weight_wrench`.
+        wrenches: Array to work in: `WRENCH_SIZE` numbers for each mount.
+    """
+    state, of_mounts = number_array(x), number_array(wrenches)
+    write_mount_wrenches(state, number_array(p), mounts, of_mounts)
+    total = weight_wrench(tub_motion(state), weight)
+    for at in range(0, len(wrenches), WRENCH_SIZE):
+        total = plus(total, scaled(-1.0, six(of_mounts, at)))
+    return total
+
+
+@long_running
+def balance_tub(x, p, mounts, weight, tolerance, wrenches, slopes, step):
+    """Look for the pose at which gravity and mounts balance, by Newton's method.
+
+    Args:
+        x: State at rest, of which the pose of the tub is moved from where it begins.
+        p, mounts, weight, wrenches: As for `wrench_on_tub`.
+        tolerance: Largest force or moment that may remain. [N, N m]
+        slopes, step: Arrays to work in. (36,), (6,)
+
+    Returns:
+        Moment and force at the last pose; they are larger if there is no such pose near.
+    """
+    now = wrench_on_tub(x, p, mounts, weight, wrenches)
+    for _ in range(MOST_STEPS):
+        largest = 0.0
+        for i in range(6):
+            step[i], largest = now[i], max(largest, abs(now[i]))
+        if not tolerance < largest < np.inf:
+            break
+        for k in range(6):
+            at = x[k]
+            x[k] = at + POSE_STEP
+            moved = wrench_on_tub(x, p, mounts, weight, wrenches)
+            x[k] = at
+            for i in range(6):
+                slopes[6 * i + k] = (moved[i] - now[i]) / POSE_STEP
+        if not solve(slopes, step, 6):
+            break
+        for k in range(6):
+            x[k] = x[k] - step[k]
+        now = wrench_on_tub(x, p, mounts, weight, wrenches)
+    return now
+
+
 class TubStatics:
-    """Wrench of gravity and of the elements on the tub, all at rest, with relaxed sponges.
+    """Gravity and the elements on the tub, all at rest, with relaxed sponges.
 
     Moments are about the origin of W.
     """
 
     def __init__(self, elements: PlacedElements, weight: Weight) -> None:
         """Pack the elements, none of which has bodies of its own."""
-        self._weight = weight
-        self._packed, begins = elements.packed_on_tub()
+        packed, begins = elements.packed_on_tub()
         states = elements.states()
-        self._mounts = elements.mounts(begins, states)
-        self._states = np.zeros((WIDTH, states.size))
+        self._states = np.zeros(states.size)
         if elements.others:
-            self._states[:, states.span(ELEMENT)] = elements.initial_of_others()
-        count = sum(map(len, begins.values()))
-        self._wrenches = np.empty((WIDTH, count * WRENCH_SIZE), order="F")
+            self._states[states.span(ELEMENT)] = elements.initial_of_others()
+        numbers = tuple(weight.force.tolist()), tuple(weight.centre.tolist())
+        self._numbers = packed, elements.mounts(begins, states), numbers
+        self._wrenches = np.zeros(sum(map(len, begins.values())) * WRENCH_SIZE)
 
     def wrench(self, pose: FloatArray) -> FloatArray:
         """Return moment and force at a pose: roll, pitch, yaw, x, y, z. (6,) [N m, N]"""
-        return self.with_slopes(pose)[0]
+        self._states[:6] = pose
+        return np.array(wrench_on_tub(self._states, *self._numbers, self._wrenches))
 
-    def with_slopes(self, pose: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return moment and force (6,) at a pose, and their slopes by its coordinates (6, 6)."""
-        self._states[:, :6] = pose + _MOVED
-        mount_wrench_history(self._states, self._packed, self._mounts, self._wrenches)
-        on_tub = -self._wrenches.T.reshape(-1, WRENCH_SIZE, WIDTH).sum(axis=0)
-        slopes = (on_tub[:, 1:7] - on_tub[:, :1]) / POSE_STEP
-        return on_tub[:, 0] + self._weight.wrench(pose), slopes + self._weight.slopes
-
-    def balance(self, pose: FloatArray, tolerance: float) -> tuple[FloatArray, FloatArray]:
-        """Look for the pose at which the wrench vanishes, by Newton's method.
-
-        Args:
-            pose: Where it begins.
-            tolerance: Largest force or moment that may remain. [N, N m]
-
-        Returns:
-            The last pose and the wrench there, which is larger if there is no such pose near.
-        """
-        wrench, slopes = self.with_slopes(pose)
-        for _ in range(MOST_STEPS):
-            if not tolerance < np.abs(wrench).max() < np.inf:
-                break
-            try:
-                pose = pose - np.linalg.solve(slopes, wrench)
-            except np.linalg.LinAlgError:
-                break
-            wrench, slopes = self.with_slopes(pose)
-        return pose, wrench
+    def balance(self, tolerance: float) -> tuple[FloatArray, FloatArray]:
+        """Return the pose at rest near the drawn one, and the wrench there; see `balance_tub`."""
+        self._states[:6] = 0.0
+        work = self._wrenches, np.empty(36), np.empty(6)
+        wrench = balance_tub(self._states, *self._numbers, tolerance, *work)
+        return self._states[:6].copy(), np.array(wrench)
 
 
 def about_tub(wrench: FloatArray, pose: FloatArray) -> FloatArray:

@@ -27,6 +27,7 @@ from wm_drake.compiler.compilation import law, long_running
 from wm_drake.compiler.elementary import sine_cosine
 from wm_drake.compiler.lane_memory import aligned
 from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
+from wm_drake.compiler.matrices import solve
 from wm_drake.elements.motion import BODY_STATE, TREE_STATE, rpy_rates
 from wm_drake.elements.telescopic_damper import DEFORMATION, TUBES_STATE_SIZE
 from wm_drake.engines.compiled.local_error import (
@@ -129,6 +130,24 @@ def write_newton_matrix(jacobian, h, newton):
                 e = jacobian[2 * TUBES * k + TUBES + column]
                 total = total - 0.25 * h * h * jacobian[a + k] * e
             newton[TUBES * row + column] = total
+
+
+@law
+def write_relaxation(jacobian, h, newton, right, relaxation, at):
+    """Write R of a damper by rows: its columns solve linear equations.
+
+    Args:
+        jacobian, h: As for `write_newton_matrix`.
+        newton, right: Arrays to work in. (49,), (7,)
+        relaxation, at: Array that is written, and where R begins.
+    """
+    for column in range(TUBES):
+        write_newton_matrix(jacobian, h, newton)
+        for row in range(TUBES):
+            right[row] = 1.0 if row == column else 0.0
+        solve(newton, right, TUBES)
+        for row in range(TUBES):
+            relaxation[at + TUBES * row + column] = right[row]
 
 
 @law

@@ -16,7 +16,7 @@ from wm_drake.elements.state_map import (
     TUBES,
     VELOCITIES,
 )
-from wm_drake.engines.compiled.midpoint import BODY, MOVING, write_newton_matrix
+from wm_drake.engines.compiled.midpoint import BODY, MOVING, write_relaxation
 from wm_drake.engines.compiled.midpoint import TUBES as TUBES_FREEDOM
 from wm_drake.engines.compiled.packing import Layout
 from wm_drake.engines.compiled.step_check import free_states
@@ -49,11 +49,12 @@ def relaxation_matrices(tubes: FloatArray, step: float) -> FloatArray:
         tubes: From `tube_jacobians`.
         step: Step size. [s]
     """
-    newton, matrices = np.empty((TUBES_FREEDOM, TUBES_FREEDOM)), []
-    for jacobian in tubes:
-        write_newton_matrix(np.ascontiguousarray(jacobian).ravel(), step, newton.ravel())
-        matrices.append(np.linalg.inv(newton))
-    return np.array(matrices)
+    count = len(tubes) * TUBES_FREEDOM**2
+    matrices, newton, right = np.empty(count), np.empty(TUBES_FREEDOM**2), np.empty(TUBES_FREEDOM)
+    for number, jacobian in enumerate(tubes):
+        numbers, at = np.ascontiguousarray(jacobian).ravel(), number * len(newton)
+        write_relaxation(numbers, step, newton, right, matrices, at)
+    return matrices.reshape(-1, TUBES_FREEDOM, TUBES_FREEDOM)
 
 
 def midpoint_follows(setup: Setup, layout: Layout, jacobians: FloatArray, step: float) -> bool:
