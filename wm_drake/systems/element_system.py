@@ -66,12 +66,6 @@ class ElementSystem(Packed, System):
         if self.state_size:
             self.DeclareStateOutputPort("state", state)
 
-    def DoCalcTimeDerivatives(self, context: Any, derivatives: Any) -> None:
-        """Write the time derivative of the element's state."""
-        if self.state_size:
-            rates = self._evaluated(context, empty(self._force_size, self._scalar))[1]
-            derivatives.get_mutable_vector().SetFromVector(rates)
-
     def number(self, context: Any, name: str) -> Any:
         """Return a number in a root Context. [SI]
 
@@ -143,6 +137,20 @@ class ElementSystem(Packed, System):
         return written, rates
 
 
+class ElementSystemWithState(ElementSystem):
+    """An element with a state.
+
+    A class of its own: Drake would call the method of elements without a state at each step.
+    """
+
+    __slots__ = NO_SLOTS
+
+    def DoCalcTimeDerivatives(self, context: Any, derivatives: Any) -> None:
+        """Write the time derivative of the element's state."""
+        rates = self._evaluated(context, empty(self._force_size, self._scalar))[1]
+        derivatives.get_mutable_vector().SetFromVector(rates)
+
+
 def element_system(
     kind: ElementKind, packed: FloatArray, initial: Sequence[float] | FloatArray = ()
 ) -> Any:
@@ -153,15 +161,16 @@ def element_system(
         packed: Its packed numbers.
         initial: Its state in a default Context.
     """
-    return _class_of(kind)(packed, initial)
+    base = ElementSystemWithState if len(initial) else ElementSystem
+    return _class_of(kind, base)(packed, initial)
 
 
 @functools.cache
-def _class_of(kind: ElementKind) -> Any:
+def _class_of(kind: ElementKind, base: Any) -> Any:
     """Return the template of the classes of a kind, one for each scalar type."""
 
     def of_scalar(T: type) -> Any:
-        class Impl(ElementSystem, LeafSystem_[T]):
+        class Impl(base, LeafSystem_[T]):
             __slots__ = NO_SLOTS
             __doc__ = f"{kind.title}: {kind.words or kind.name}; see `ElementSystem`."
 
