@@ -20,7 +20,7 @@ INTEGRATION_SCHEME = "runge_kutta3"
 """Drake's explicit scheme of third order with error control: friction has kinks, across which a
 higher order gains nothing (docs/theory/integrator.md)."""
 
-ACCURACY = 1e-4
+ACCURACY = 3e-4
 """Target accuracy of a step, relative to unit coordinates. Peaks then differ from converged ones by
 less than 0.1 % (docs/theory/integrator.md)."""
 
