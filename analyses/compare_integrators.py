@@ -134,11 +134,11 @@ def figure(found: list[tuple[Setting, float, float]]) -> Figure:
     for name, color in zip(names, COLOURS, strict=False):
         rows = [(1e2 * wrong, spent) for setting, spent, wrong in found if setting.name == name]
         x, y = np.array(sorted(rows)).T
-        marks.append(Line(x, y, name=name, color=color, symbol="circle"))
+        marks.append(Line(x, y, key=name, color=color, symbol="circle"))
     for setting, name, color in ((USUAL, "engine drake", OURS), (CAREFUL, "drake-accurate", MARK)):
         rows = [(1e2 * wrong, spent) for each, spent, wrong in found if each == setting]
         x, y = np.array(rows).T
-        marks.append(Points(x, y, name=name, color=color, size=13.0, is_open=True))
+        marks.append(Points(x, y, key=name, color=color, size=13.0, is_open=True))
     panel = Panel(
         marks=tuple(marks),
         x=Axis(label="error of the largest displacements, %", is_log=True),

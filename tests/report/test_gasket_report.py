@@ -55,7 +55,7 @@ def planted(design):
         "Dy": 8.0 + x["C_T"] ** 2,
         "Fz": 30.0 + x["K_Lx"] * x["K_Ly"],
     }
-    one = {name: QUANTITIES[name].to_si(column) for name, column in values.items()}
+    one = {name: QUANTITIES[name].unit.to_si(column) for name, column in values.items()}
     more = {name: 1.5 * column for name, column in one.items()}
     return runs_of(
         {"middle": one, "towel & co": more}, QUANTITIES, kinds={n: KINDS[n[0]] for n in RESPONSES}

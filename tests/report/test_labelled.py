@@ -46,7 +46,7 @@ def dataset():
 def test_a_value_is_text_in_its_unit_for_reading(quantity, value, text, suffix):
     assert quantity.text(value) == text
     assert quantity.suffix == suffix
-    np.testing.assert_allclose(quantity.to_si(quantity.values(value)), value)
+    np.testing.assert_allclose(quantity.reading.to_si(quantity.values(value)), value)
 
 
 def test_a_variable_carries_its_quantity_through_selection_and_concatenation():

@@ -26,7 +26,7 @@ def test_a_quantity_is_read_in_either_units(quantity, value, si, us, suffix):
     with read_in(US):
         assert quantity.text(value) == us
         assert quantity.suffix == suffix
-        assert quantity.to_si(quantity.values(value)) == pytest.approx(value, rel=1e-12)
+        assert quantity.reading.to_si(quantity.values(value)) == pytest.approx(value, rel=1e-12)
     assert quantity.text(value) == si
 
 

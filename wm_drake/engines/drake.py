@@ -122,7 +122,7 @@ def run_drake(
 
 
 run_drake_accurately = functools.partial(run_drake, accuracy=ACCURATE, largest=1.0)
-"""`run_drake` with a tenth of the error, in twice the time."""
+"""`run_drake` with less than a tenth of the error, in twice the time."""
 
 
 def _simulator(setup: Setup, step: float, scheme: str, accuracy: float | None) -> Simulator:

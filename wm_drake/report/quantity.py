@@ -84,10 +84,6 @@ class Quantity:
         """Return SI values in the unit for reading."""
         return np.asarray(array, dtype=float) * self.reading.from_si(1.0)
 
-    def to_si(self, values: Any) -> FloatArray:
-        """Return values in the unit for reading as SI values."""
-        return np.asarray(values, dtype=float) / self.reading.from_si(1.0)
-
     def number(self, value: Any) -> str:
         """Return an SI value as text without its unit; NaN and infinity become a dash."""
         shown = float(self.values(value))

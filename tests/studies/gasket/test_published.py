@@ -9,6 +9,7 @@ from wm_drake.parameters import (
     PublishedTerm,
     varying,
 )
+from wm_drake.parameters.reading import SI, US, read_in
 from wm_drake.parameters.units import Unit
 from wm_drake.parameters.vary_file import gasket_entries
 from wm_drake.parameters.varying import TABLES
@@ -46,8 +47,9 @@ def screening():
     return run_screening(make_design("full", NAMES), planted)
 
 
-@pytest.fixture(scope="module")
-def published(screening):
+@pytest.fixture(scope="module", params=[SI, US])
+def published(screening, request):
+    """Return published numbers, which are in SI units of the trade whatever results are read in."""
     results = {
         ("middle", "Dx"): {
             "constant": PublishedTerm(None, (16.0,)),
@@ -63,7 +65,8 @@ def published(screening):
         ("middle", "Fx"): {"constant": PublishedTerm(None, (1.0,))},
         ("back", "Dx"): {"constant": PublishedTerm(None, (1.0,))},
     }
-    return published_for(results, screening, "table.csv")
+    with read_in(request.param):
+        return published_for(results, screening, "table.csv")
 
 
 def test_differences_from_the_published_results(screening, published):

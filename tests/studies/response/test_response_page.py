@@ -21,7 +21,7 @@ def case(gasket, amplitudes_mm, stable=(True,) * 5, gaps_mm=(20.0,) * 5):
     response = xr.Dataset(
         {
             "amplitude": AMPLITUDE.variable(
-                ("point", "sensor"), AMPLITUDE.to_si([amplitudes_mm]).T
+                ("point", "sensor"), AMPLITUDE.unit.to_si(np.array([amplitudes_mm])).T
             ),
             "first_harmonic": (("point", "coordinate", "part"), np.zeros((5, 6, 2))),
             "smallest_gap": ("point", 1e-3 * np.array(gaps_mm)),
@@ -60,7 +60,8 @@ def test_nothing_reachable_is_nan():
 
 
 def test_peak_of_the_run_is_beside_the_steady_one(cases):
-    lower = xr.DataArray(AMPLITUDE.to_si([[-3.0], [-9.45], [-2.0]]), dims=("time", "sensor"))
+    sizes = AMPLITUDE.unit.to_si(np.array([[-3.0], [-9.45], [-2.0]]))
+    lower = xr.DataArray(sizes, dims=("time", "sensor"))
     run = {
         "upper": -0.5 * lower,
         "lower": lower,

@@ -41,7 +41,7 @@ from wm_drake.studies.experiment import Experiment, Simulate
 MEASURES = ("amplitudes in regions",)
 """Measures of `simulate_many` that the study needs."""
 
-WINDOW = float(SPEED.to_si(25.0))
+WINDOW = SPEED.unit.to_si(25.0)
 """Width of the ranges of speed. [rad/s]"""
 
 HOLD = 10.0

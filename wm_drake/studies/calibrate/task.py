@@ -141,7 +141,7 @@ def _fractions(entries: Sequence[str], option: str) -> dict[str, float]:
     named = [entry for entry in entries if "=" in entry]
     named += [f"{AMPLITUDE}={entry}" for entry in plain]
     numbers = _numbers(named, option, zero=False)
-    return {name: float(DIFFERENCE.to_si(number)) for name, number in numbers.items()}
+    return {name: DIFFERENCE.unit.to_si(number) for name, number in numbers.items()}
 
 
 def _numbers(entries: Sequence[str], option: str, zero: bool = True) -> dict[str, float]:

@@ -50,7 +50,7 @@ class DriveTask(Task):
         options, parameters = self.options, self.machine.parameters
         loads = tuple(self.cases)
         experiment = Experiment(self.machine, MEASURES, executor.simulate, loads)
-        thresholds, speed = find_thresholds(experiment), SPEED.to_si(options.speed).item()
+        thresholds, speed = find_thresholds(experiment), SPEED.unit.to_si(options.speed)
         needs = thresholds.passes_from.fillna(motor_with_limit(parameters)[1].torque).values
         worst = int(np.argmax(np.where(thresholds.passes_from.isnull(), np.inf, needs)))
         top = needs[worst]

@@ -340,20 +340,20 @@ def _fill(published: xr.Dataset, label: Label, terms: Mapping[str, PublishedTerm
         ("largest", RANGE, 1),
     ):
         if term in terms:
-            write(variable, quantity.to_si(terms[term].effects[place_of_effect]))
+            write(variable, quantity.unit.to_si(terms[term].effects[place_of_effect]))
     for variable, term in (("main", MAIN), ("interaction", INTERACTIONS)):
         if term in terms:
-            write(variable, CONTRIBUTION.to_si(terms[term].percent))
+            write(variable, CONTRIBUTION.unit.to_si(terms[term].percent))
     for term in published.term.values.tolist():
         straight, turned = terms.get(term), terms.get(":".join(reversed(term.split(":"))))
         known = straight or turned
         if known is None:
             continue
         if known.percent is not None:
-            write("share", CONTRIBUTION.to_si(known.percent), term=term)
+            write("share", CONTRIBUTION.unit.to_si(known.percent), term=term)
         if known.effects:
             shape = (len(LEVELS),) * (term.count(":") + 1)
-            effects = quantity.to_si(known.effects).reshape(shape)
+            effects = quantity.unit.to_si(np.array(known.effects)).reshape(shape)
             effects = effects if straight else effects.T
             others = list(OTHER_LEVELS[1:]) if len(shape) > 1 else ""
             write("effect", effects, term=term, other_level=others)

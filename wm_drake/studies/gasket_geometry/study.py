@@ -152,7 +152,7 @@ def limits_of(entries: Sequence[str]) -> dict[str, float]:
             number = 0.0
         if not 0.0 < number < np.inf:
             raise input_error(f"'{option}={text}': allowed is a number above 0", where="--limit")
-        limits[name] = float(RESPONSES[name].to_si(number))
+        limits[name] = RESPONSES[name].reading.to_si(number)
     return limits
 
 

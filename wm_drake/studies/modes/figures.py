@@ -101,7 +101,7 @@ def _campbell(result: MachineModes, name: str, scale: fig.Scale, top: float) -> 
         peaks = SPEED.values(result.run_up.critical_speed.values.ravel())
         peaks = np.unique(np.round(peaks[np.isfinite(peaks)]))
         key = "largest amplitude of a sensor in a run-up"
-        y = _hertz(SPEED.to_si(peaks))
+        y = _hertz(SPEED.unit.to_si(peaks))
         marks.append(fig.Points(peaks, y, symbol="triangle-down", opacity=0.75, key=key))
     marks += _mode_names(diagram, last, top)
     rounds = fig.round_numbers(0.0, last, 6)

@@ -126,7 +126,7 @@ def _waterfall(maps: xr.Dataset) -> fig.Panel:
     frequency = maps.frequency.sel(frequency=slice(None, top)).values
     levels = np.linspace(speed.min(), speed.max(), min(WATERFALL_LINES, len(speed)))
     rows = np.unique([int(np.argmin(np.abs(speed - level))) for level in levels])
-    height = 5.0 * max(float(np.ptp(speed)), float(SPEED.to_si(1.0))) / max(len(rows), 1)
+    height = 5.0 * max(float(np.ptp(speed)), SPEED.unit.to_si(1.0)) / max(len(rows), 1)
     scale = height / max(_largest(spectra[rows]), 1e-300)
     marks: list[fig.Mark] = []
     for row in sorted(rows, key=lambda row: -speed[row]):

@@ -30,7 +30,7 @@ from wm_drake.studies.response.quantities import (
 )
 from wm_drake.studies.response.response import response_of
 
-RATES = tuple(RATE.to_si((1.0, 2.0, 5.0, 10.0, 20.0, 50.0)).tolist())
+RATES = tuple(map(RATE.unit.to_si, (1.0, 2.0, 5.0, 10.0, 20.0, 50.0)))
 """Default sweep rates. [rad/s^2]"""
 
 GASKET = {True: "yes", False: "no"}

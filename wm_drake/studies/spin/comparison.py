@@ -195,7 +195,7 @@ def _measured_changes(
     changes = measured_changes(with_gasket.parameters)
     of_load = changes[changes["source"] == EXPERIMENT].set_index("load")
     return {
-        (load, AMPLITUDE, sensor): float(CHANGE.to_si(of_load.loc[load, sensor]))
+        (load, AMPLITUDE, sensor): float(CHANGE.unit.to_si(of_load.loc[load, sensor]))
         for one, other in pairs
         if without.is_compared(one) and with_gasket.is_compared(other)
         if (load := other.case.name) in of_load.index
@@ -302,7 +302,7 @@ def _steady_sentences(data: xr.Dataset) -> Iterator[str]:
     """Yield how much steady amplitudes differ: large ones in percent, small ones in mm."""
     places = _places(data, STEADY)
     change = STEADY_CHANGE.variable("place", places.change)
-    value = of_measure("amplitude").to_si(places.value)
+    value = of_measure("amplitude").reading.to_si(places.value.values)
     reference = value / (1.0 + change.values)
     is_large = reference >= LARGE_STEADY
     for kind, sizes, quantity, words in (

@@ -88,7 +88,7 @@ def run_spin_cycle(
         if name in data:
             data[name] = RMS.on(data[name])
     published = [case.published_error_percent for case in cases]
-    errors = ERROR.to_si([np.nan if error is None else error for error in published])
+    errors = ERROR.unit.to_si(np.array(published, dtype=float))
     labels = {
         "front": GRAMS.named("front mass").variable("case", [case.front for case in cases]),
         "rear": GRAMS.named("rear mass").variable("case", [case.rear for case in cases]),

@@ -263,14 +263,15 @@ def gaps_plot(question: VerdictQuestion, states: xr.Dataset, laundry: xr.Dataset
     largest = clearance
     for state, color, key, shift in styles[: laundry.sizes["state"]]:
         of_loads, of_laundry = states.smallest_gap[state].values, laundry.smallest_gap[state].item()
-        gaps = SMALLEST_GAP.values([*of_loads, of_laundry])
+        sizes = np.array([*of_loads, of_laundry])
+        gaps = SMALLEST_GAP.values(sizes)
         at = np.arange(len(gaps), dtype=float)[::-1] + shift
         known = np.isfinite(gaps)
         ends = (np.zeros(known.sum()), at[known]), (gaps[known], at[known])
         marks.append(fig.segments(*ends, color=color, width=4.0))
         marks.append(fig.Points(gaps[known], at[known], color=color, size=9.0, key=key))
-        for gap, place in zip(gaps[known].tolist(), at[known].tolist(), strict=True):
-            end, text = max(gap, 0.0), SMALLEST_GAP.text(SMALLEST_GAP.to_si(gap))
+        for gap, place in zip(sizes[known].tolist(), at[known].tolist(), strict=True):
+            end, text = max(SMALLEST_GAP.values(gap).item(), 0.0), SMALLEST_GAP.text(gap)
             marks.append(fig.Text(end, place, text, across="left", shift=(10.0, 0.0)))
             largest = max(largest, end)
     y = fig.Axis(

@@ -86,7 +86,7 @@ class VerdictTask(Task):
 
     def run(self, executor: Executor) -> Answer:
         """Run the loads, the changes, and the laundry before and after the proposed change."""
-        parameters, change = self.machine.parameters, FACTOR.to_si(self.options.change).item()
+        parameters, change = self.machine.parameters, FACTOR.unit.to_si(self.options.change)
         experiment = Experiment(self.machine, self.measures, executor.simulate, tuple(self.cases))
         base = experiment.at(STATES[:1], [parameters], "loads").isel(point=0, drop=True)
         samples = [self.laundry.trials(executor).samples()]
