@@ -16,7 +16,7 @@ from wm_drake.report.quantity import SPEED
 OF_PROFILE = "profile"
 """Speed of detection that stands for the first hold of the spin profile."""
 
-DISTRIBUTION = float(SPEED.unit.to_si(90.0))
+DISTRIBUTION = SPEED.unit.to_si(90.0)
 """Speed of detection of a profile without a hold: laundry at 0.24 m lies at the wall with 2.2 g."""
 
 SHORTEST = 2.0
@@ -149,7 +149,8 @@ def in_ranges(profile: SpinProfile) -> tuple[SpinProfile, FloatArray]:
 
     A region begins when the wanted speed exceeds a limit for the first time.
     """
-    step = float(SPEED.unit.to_si(nice_step(float(SPEED.values(profile.highest_speed)), MOST_LIMITS)))
+    highest = SPEED.unit.from_si(profile.highest_speed)
+    step = SPEED.unit.to_si(nice_step(highest, MOST_LIMITS))
     count = int(np.ceil(profile.highest_speed / step * (1.0 - 1e-9)))
     limits = np.minimum(step * np.arange(1, count + 1), profile.highest_speed)
     time, speed = np.array(profile.time), np.maximum.accumulate(profile.speed)
