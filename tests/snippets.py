@@ -3,11 +3,13 @@
 import re
 import shutil
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import pandas as pd
 from documents import CHECKOUT, MANUAL, README, name_of, text_of
 
+from wm_drake.batch import simulate_many
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import load_machine, load_profile
 from wm_drake.parameters.components import load_component
@@ -17,7 +19,7 @@ from wm_drake.rigs import Harmonic, bushing_bench, damper_bench, force_loops
 from wm_drake.simulation.recorded_signal import recorded_signal
 from wm_drake.simulation.runs import simulate
 from wm_drake.studies.compare.task import sensor_points
-from wm_drake.studies.spin_cycle.study import compiled_runs, run_spin_cycle
+from wm_drake.studies.spin_cycle.study import measures_of, run_spin_cycle
 from wm_drake.studies.spin_cycle.tables import rms_table
 
 PAGES = [README, *(path for path in MANUAL if path.parent.name != "decisions")]
@@ -189,7 +191,7 @@ def write_spin_cycle(path):
     """Write RMS displacements of the case that both commands with `--measured rms.csv` have."""
     machine = load_machine("free_stroke")
     cases = [case for case in load_unbalance_cases() if case.name == "2"]
-    runs = compiled_runs(build_machine(machine))
+    runs = partial(simulate_many, build_machine(machine), measures=measures_of(machine))
     result = run_spin_cycle(machine, cases, load_profile("spin_cycle"), runs)
     rms_table("rms", result.rms).frame().to_csv(path, index=False)
 

@@ -151,3 +151,8 @@ def _in_reading_unit(array: xr.DataArray) -> xr.DataArray:
 def _name_in_files(name: str, array: xr.DataArray) -> str:
     suffix = quantity_of(array).suffix
     return name if name.endswith(suffix) else f"{name}{suffix}"
+
+
+def rows_of(labels: Mapping[str, Sequence[Any]], **variables: Any) -> xr.Dataset:
+    """Return a dataset over `row` with labels of its rows."""
+    return xr.Dataset(variables, {name: ("row", list(of)) for name, of in labels.items()})

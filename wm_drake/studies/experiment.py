@@ -17,7 +17,7 @@ labels of any dimensions; what needs the motion itself, such as an envelope, to
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -29,6 +29,7 @@ from wm_drake.errors import InputError
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters, with_values
 from wm_drake.parameters.types import FloatArray
+from wm_drake.report.formatting import three_digits
 from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.cases import Case, load_of
 from wm_drake.simulation.measures.responses import Response
@@ -252,6 +253,11 @@ def response_of(data: xr.Dataset, response: Response) -> xr.DataArray:
     variable = response.variable
     at = dict(zip(variable.dims, response.place, strict=True))
     return quantity_of(response).on(data[variable.name].isel(at, drop=True))
+
+
+def in_three_digits(chosen: Iterable[Response]) -> dict[str, Quantity]:
+    """Return words and unit of each response by its name, with three digits."""
+    return {response.name: replace(quantity_of(response), form=three_digits) for response in chosen}
 
 
 def quantity_of(response: Response) -> Quantity:

@@ -35,8 +35,9 @@ LEAST_GAIN = 0.02
 """Gain of the aim, as a share of its range over the runs, from which a candidate is proposed.
 Choice of the project."""
 
-SIGNS: Mapping[Better, float] = {"smaller": 1.0, "larger": -1.0}
-"""Sign of a response with which less is better, by which change is an improvement."""
+SIGNS: Mapping[Better, float] = {"smaller": 1.0, "larger": -1.0, "": 1.0}
+"""Sign of a response with which less is better, by which change is an improvement; of one without
+such a change, more is called worse."""
 
 
 def worst_of(values: FloatArray, goals: Mapping[str, Better]) -> FloatArray:

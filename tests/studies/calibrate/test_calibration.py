@@ -21,7 +21,7 @@ from wm_drake.studies.calibrate.parameter_map import parameter_map_of, read_para
 from wm_drake.studies.calibrate.prediction import predict
 from wm_drake.studies.calibrate.results import amplitudes_of, predictions_of, quantities_of
 from wm_drake.studies.calibrate.solutions import Solution, distinct, solved_machine
-from wm_drake.studies.calibrate.study import SearchPlan, calibrate, identity_of
+from wm_drake.studies.calibrate.study import SearchPlan, calibrate
 from wm_drake.studies.calibrate.targets import Targets, targets_of
 from wm_drake.studies.experiment import Experiment
 
@@ -345,6 +345,9 @@ def test_gasket_effect_is_the_relative_change():
     assert effects["a"] == pytest.approx([0.5, -0.5])
 
 
+IDENTITY = {"study": "calibration"}
+
+
 @pytest.fixture(scope="module")
 def recovered(short, tmp_path_factory):
     """Return a known machine and its calibration."""
@@ -356,7 +359,7 @@ def recovered(short, tmp_path_factory):
         planted(short, parameter_map, truth),
         SearchPlan(starts=2, seed=4, iterations=12, deviation=0.002, resolution=0.0),
     )
-    with open_ledger(folder / "ledger.sqlite", identity_of(short, free, targets, plan)) as ledger:
+    with open_ledger(folder / "ledger.sqlite", IDENTITY) as ledger:
         experiment = Experiment(short, (), kept_in(ledger))
         calibration = calibrate(experiment, free, targets, plan)
         predictions = predict(experiment, free, calibration, [["middle"]])
@@ -377,7 +380,7 @@ def test_known_machine_is_recovered_within_its_standard_deviations(recovered):
 
 
 def test_start_values_of_the_free_file_are_not_used_for_predictions(short, recovered, tmp_path):
-    truth, free, targets, plan, calibration, predictions, _ = recovered
+    truth, free, _, _, calibration, predictions, _ = recovered
     units = {"friction": "N", "lean": "m", "motor": "kg"}
     started = {
         name: entry.model_copy(update={"start": f"{value!r} {units[name]}"})
@@ -385,8 +388,7 @@ def test_start_values_of_the_free_file_are_not_used_for_predictions(short, recov
     }
     started = free.model_copy(update={"vary": started})
     assert np.array_equal(parameter_map_of(short, started).start, truth)
-    identity = identity_of(short, started, targets, plan)
-    with open_ledger(tmp_path / "ledger.sqlite", identity) as ledger:
+    with open_ledger(tmp_path / "ledger.sqlite", IDENTITY) as ledger:
         experiment = Experiment(short, (), kept_in(ledger))
         (again,) = predict(experiment, started, calibration, [["middle"]])
     assert np.array_equal(again.amplitude, predictions[0].amplitude)
@@ -405,8 +407,6 @@ def test_held_out_loads_are_predicted_from_the_others(recovered):
 
 def test_interrupted_calibration_continues_where_it_stopped(short, tmp_path, recovered):
     _, free, targets, plan, calibration, _, _ = recovered
-    identity = identity_of(short, free, targets, plan)
-
     steps = []
 
     def stop(_fraction, _least):
@@ -415,9 +415,9 @@ def test_interrupted_calibration_continues_where_it_stopped(short, tmp_path, rec
             raise KeyboardInterrupt
 
     path = tmp_path / "ledger.sqlite"
-    with pytest.raises(KeyboardInterrupt), open_ledger(path, identity) as ledger:
+    with pytest.raises(KeyboardInterrupt), open_ledger(path, IDENTITY) as ledger:
         calibrate(Experiment(short, (), kept_in(ledger)), free, targets, plan, stop)
-    with open_ledger(path, identity, resume=True) as ledger:
+    with open_ledger(path, IDENTITY, resume=True) as ledger:
         assert len(ledger) > 5
         resumed = calibrate(Experiment(short, (), kept_in(ledger, 1)), free, targets, plan)
     # also: any number of workers

@@ -124,11 +124,10 @@ def indices_of(function, marginal, size, count=2048):
 
 def test_ishigami_has_its_known_indices():
     _, _, found = indices_of(ishigami, uniform(-math.pi, math.pi), 3)
-    assert [i.first for i in found] == pytest.approx([0.3139, 0.4424, 0.0], abs=0.03)
-    assert [i.total for i in found] == pytest.approx([0.5576, 0.4424, 0.2437], abs=0.03)
-    for index, total in zip(found, [0.5576, 0.4424, 0.2437], strict=True):
-        assert index.total_lower < total < index.total_upper
-        assert index.total_upper - index.total_lower < 0.2
+    assert found["first"] == pytest.approx([0.3139, 0.4424, 0.0], abs=0.03)
+    assert found["total"] == pytest.approx([0.5576, 0.4424, 0.2437], abs=0.03)
+    total, low, high = [0.5576, 0.4424, 0.2437], found["total_lower"], found["total_upper"]
+    assert np.all((low < total) & (total < high) & (high - low < 0.2))
 
 
 def test_g_function_has_its_known_indices():
@@ -137,8 +136,8 @@ def test_g_function_has_its_known_indices():
     variance = np.prod(1.0 + parts) - 1.0
     total = parts * np.prod(1.0 + parts) / (1.0 + parts) / variance
     _, _, found = indices_of(g_function, uniform(0.0, 1.0), 4, 4096)
-    assert [i.first for i in found] == pytest.approx(parts / variance, abs=0.02)
-    assert [i.total for i in found] == pytest.approx(total, abs=0.02)
+    assert found["first"] == pytest.approx(parts / variance, abs=0.02)
+    assert found["total"] == pytest.approx(total, abs=0.02)
 
 
 def test_indices_agree_with_salib():
@@ -152,8 +151,8 @@ def test_indices_agree_with_salib():
     problem = {"num_vars": 3, "names": list("abc"), "bounds": [[0, 1]] * 3}
     theirs = sobol.analyze(problem, rows, calc_second_order=False, seed=1, num_resamples=2)
     # SALib divides by the variance of A and B, and shifts by the mean of all
-    assert [i.first for i in found] == pytest.approx(theirs["S1"], abs=0.02)
-    assert [i.total for i in found] == pytest.approx(theirs["ST"], abs=0.02)
+    assert found["first"] == pytest.approx(theirs["S1"], abs=0.02)
+    assert found["total"] == pytest.approx(theirs["ST"], abs=0.02)
 
 
 def test_indices_of_a_failed_run_or_a_constant_are_refused():
@@ -183,5 +182,5 @@ def test_a_single_quantity_that_hardly_varies_has_indices():
     at_a = np.zeros(8)
     at_a[0] = 1.0  # most resamples do not vary
     at_exchanged = np.concatenate([np.zeros(8), at_a[::-1]])
-    (index,) = sobol_indices(at_a, at_exchanged)
-    assert np.isfinite([index.first, index.total]).all()
+    found = sobol_indices(at_a, at_exchanged)
+    assert np.isfinite([found["first"], found["total"]]).all()

@@ -1,18 +1,19 @@
 """Show a fit to measured values of runs: values, residuals, how well the machine then agrees."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from wm_drake.parameters import machine_yaml
-from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Share
+from wm_drake.report import chart
 from wm_drake.report import figure as fig
 from wm_drake.report.formatting import listed
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import Quantity, quantity_of
+from wm_drake.report.quantity import Quantity
 from wm_drake.studies.answer import Answer, Part, Plot, pictures_first
 from wm_drake.studies.calibrate.blocks import BlockModel
 from wm_drake.studies.fitting.fit import Fit, verdict_of
@@ -159,25 +160,26 @@ def compared(data: xr.Dataset, quantity: Quantity, what: str, is_scattered: bool
         },
         {"place": data.place, "sensor": data.sensor, "block": data.block},
     )
-    drawn = _thinned(shown)
-    at, x = _axis(drawn)
+    drawn, x = _thinned(shown)
+    lines: dict[str, dict[str, Any]] = {
+        "measured": {"color": fig.MEASURED, "key": "recorded"},
+        "before": {"color": fig.QUIET, "dash": "dashed", "key": "before"},
+        "after": {"color": fig.OURS, "key": "after"},
+    }
     panels = []
     for name in data.sensor.values.tolist():
-        one = drawn.sel(sensor=name)
-        measured = quantity.values(one.measured)
-        marks: list[fig.Mark] = [fig.Line(at, measured, color=fig.MEASURED, key="recorded")]
+        one, below = drawn.sel(sensor=name), list[fig.Mark]()
         if is_scattered:
             low, high = (
                 quantity.values(one.measured + s * 2.0 * one.deviation) for s in (-1.0, 1.0)
             )
             known, key = np.isfinite(low), "recorded ± 2 s"
-            marks = [fig.band(at[known], low[known], high[known], color=fig.MEASURED, key=key)]
-        marks += [
-            fig.Line(at, quantity.values(one.before), color=fig.QUIET, dash="dashed", key="before"),
-            fig.Line(at, quantity.values(one.after), color=fig.OURS, key="after"),
-        ]
-        y = fig.Axis(label=quantity.unit_text)
-        panels.append(fig.Panel(title=name, marks=tuple(marks), x=x, y=y))
+            at = one.number.values[known]
+            below = [fig.band(at, low[known], high[known], color=fig.MEASURED, key=key)]
+        above = {line: lines[line] for line in lines if not below or line != "measured"}
+        y = {"label": quantity.unit_text}
+        panel = chart.between(below, chart.panel(one, "number", above, x=x, y=y))
+        panels.append(replace(panel, title=name))
     band = "; band: two standard deviations about the recorded" if is_scattered else ""
     plot = Plot(
         fig.Figure(panels=fig.in_grid(panels, 3, share="x"), height=210.0),
@@ -188,30 +190,24 @@ def compared(data: xr.Dataset, quantity: Quantity, what: str, is_scattered: bool
     return Part(f"{quantity.words.capitalize()}: recorded and computed", (plot, table))
 
 
-def _thinned(data: xr.Dataset) -> xr.Dataset:
-    """Return some of many places for a picture, evenly chosen."""
-    return data.isel(place=slice(None, None, max(1, data.sizes["place"] // MOST_DRAWN)))
+def _thinned(data: xr.Dataset) -> tuple[xr.Dataset, dict[str, Any]]:
+    """Return some of many places for a picture, evenly chosen, and the axis that names some.
 
-
-def _axis(data: xr.Dataset) -> tuple[FloatArray, fig.Axis]:
-    """Return the numbers of the places, and the axis that names some of them."""
-    at = np.arange(data.sizes["place"], dtype=float)
+    The coordinate `number` counts them.
+    """
+    drawn = data.isel(place=slice(None, None, max(1, data.sizes["place"] // MOST_DRAWN)))
+    at = np.arange(drawn.sizes["place"], dtype=float)
     step = max(1, len(at) // 6)
-    ticks = fig.named(data.place.values[::step].tolist(), at[::step].tolist())
-    return at, fig.Axis(ticks=ticks)
+    ticks = fig.named(drawn.place.values[::step].tolist(), at[::step].tolist())
+    return drawn.assign_coords(number=("place", at)), {"label": "", "ticks": ticks}
 
 
 def _residuals(data: xr.Dataset) -> Part:
-    drawn, misfit = _thinned(data), quantity_of(data.misfit)
-    at, x = _axis(drawn)
-    colors = fig.COLOURS * (1 + data.sizes["sensor"] // len(fig.COLOURS))
-    lines = [
-        fig.Line(at, misfit.values(drawn.misfit.sel(sensor=name)), color=color, key=name)
-        for name, color in zip(data.sensor.values.tolist(), colors, strict=False)
-    ]
-    panel = fig.Panel(
-        marks=(fig.Rule(0.0, color=fig.MARK), *lines), x=x, y=fig.Axis(label=misfit.label)
+    drawn, x = _thinned(data)
+    lines = chart.panel(
+        drawn, "number", ["misfit"], x=x, by="sensor", key=lambda of, _: of.sensor.values.item()
     )
+    panel = chart.between([fig.Rule(0.0, color=fig.MARK)], lines)
     plot = Plot(
         fig.Figure(panels=(panel,), height=280.0),
         "Residuals of the fit.",

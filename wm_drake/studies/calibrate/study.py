@@ -4,9 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wm_drake.batch.ledger import key_of
-from wm_drake.batch.remembered import model_version, sources_version
-from wm_drake.model.machine import Machine
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.vary_file import VaryFile
 from wm_drake.studies.calibrate.computed import Evaluation
@@ -92,23 +89,6 @@ class Calibration:
     plan: SearchPlan
     solutions: tuple[Solution, ...]
     ended: tuple[Solution, ...]
-
-
-def identity_of(
-    machine: Machine, free: VaryFile, targets: Targets, plan: SearchPlan
-) -> dict[str, str]:
-    """Return the texts that identify a calibration in its ledger."""
-    return {
-        "study": "calibration",
-        "machine": key_of(
-            machine=machine.parameters.model_dump(exclude={"sources"}),
-            model=model_version(machine.parameters),
-        )[:8],
-        "free": key_of(free=free)[:8],
-        "targets": key_of(targets=targets)[:8],
-        "plan": key_of(plan=plan)[:8],
-        "sources": sources_version(),
-    }
 
 
 def calibrate(

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -9,6 +10,7 @@ import xarray as xr
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.recorded_sensors import RecordedSensor
 from wm_drake.parameters.units import Unit
+from wm_drake.report import chart
 from wm_drake.report import figure as fig
 from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.quantity import SHARE, SPEED, TIME, Quantity, quantity_of, shown, text_of
@@ -202,43 +204,54 @@ def _regions_part(repeats: xr.Dataset, names: Sequence[str], quantity: str) -> P
 RECORDED, COMPUTED = "recorded", "computed"
 
 
-def _panels(data: xr.Dataset, marks: Callable[[xr.Dataset], list[fig.Mark]], y: str) -> fig.Figure:
+LINES: Mapping[str, Mapping[str, Any]] = {
+    "measured": {"color": fig.MEASURED, "width": 2.4, "key": RECORDED},
+    "computed": {"color": fig.OURS, "key": COMPUTED},
+}
+"""Style of the lines of what was measured and computed."""
+
+ZERO = fig.Rule(0.0, color=fig.MARK)
+
+
+def _panels(
+    data: xr.Dataset,
+    drawn: chart.Drawn,
+    below: Callable[[xr.Dataset], Sequence[fig.Mark]] = lambda of: (),
+) -> fig.Figure:
     """Return a figure with a panel for each sensor over the places.
 
     Args:
-        marks: Function that returns the marks of one sensor.
-        y: Label of the vertical axes.
+        drawn: Variables, as for `chart.panel`.
+        below: Function that returns other marks of one sensor, below them.
     """
-    panels = [
-        fig.Panel(
-            title=name,
-            marks=tuple(marks(data.sel(sensor=name))),
-            x=fig.Axis(label=quantity_of(data.place).label),
-            y=fig.Axis(label=y),
-        )
-        for name in data.sensor.values.tolist()
-    ]
+    y = {"label": quantity_of(data[next(iter(drawn))]).unit_text}
+    panels = []
+    for name in data.sensor.values.tolist():
+        of = data.sel(sensor=name)
+        panel = chart.between(below(of), chart.panel(of, "place", drawn, y=y))
+        panels.append(replace(panel, title=name))
     columns = 2 if len(panels) in (2, 4) else 3
     return fig.Figure(panels=fig.in_grid(panels, columns, share="x"), height=210.0)
 
 
-def _amplitudes(amplitudes: xr.Dataset, count: int) -> Plot:
-    def marks(of: xr.Dataset) -> list[fig.Mark]:
-        x, measured = shown(of.place), shown(of.measured)
-        computed = fig.Line(x, shown(of.computed), color=fig.OURS, key=COMPUTED)
-        line = fig.Line(x, measured, color=fig.MEASURED, width=2.4, key=RECORDED)
-        if count == 1:
-            return [line, computed]
-        low, high = shown(of.measured_least), shown(of.measured_most)
-        known = np.isfinite(low)
-        band = fig.band(
-            x[known], low[known], high[known], color=fig.MEASURED, opacity=0.35, key=RECORDED
-        )
-        return [band, replace(line, width=1.2), computed]
+def _band(of: xr.Dataset, low: xr.DataArray, high: xr.DataArray, **style: Any) -> fig.Area:
+    """Return the band between two variables of a sensor, where they are known."""
+    known = np.isfinite(low.values)
+    return fig.band(*(shown(ends)[known] for ends in (of.place, low, high)), **style)
 
-    of_repeats = f"mean and range of {count} repeats" if count > 1 else "one record"
+
+def _amplitudes(amplitudes: xr.Dataset, count: int) -> Plot:
+    style = {"color": fig.MEASURED, "opacity": 0.35, "key": RECORDED}
+    lines, of_repeats = LINES, "one record"
+    if count > 1:
+        lines = {**LINES, "measured": {**LINES["measured"], "width": 1.2}}
+        of_repeats = f"mean and range of {count} repeats"
+
+    def band(of: xr.Dataset) -> list[fig.Mark]:
+        return [_band(of, of.measured_least, of.measured_most, **style)] if count > 1 else []
+
     return Plot(
-        _panels(amplitudes, marks, quantity_of(amplitudes.measured).unit_text),
+        _panels(amplitudes, lines, band),
         "Measured and computed amplitudes of each sensor.",
         f"Amplitude within the pass band: its smooth envelope. Recorded: {of_repeats}.",
     )
@@ -246,44 +259,31 @@ def _amplitudes(amplitudes: xr.Dataset, count: int) -> Plot:
 
 def _residuals(amplitudes: xr.Dataset, tolerance: str) -> Plot:
     shares = amplitudes.assign(allowed=amplitudes.tolerance / amplitudes.measured.max("place"))
-    shares["allowed"] = quantity_of(amplitudes.difference).on(shares.allowed)
+    quantity = quantity_of(amplitudes.difference)
 
-    def marks(of: xr.Dataset) -> list[fig.Mark]:
-        x, allowed = shown(of.place), shown(of.allowed)
-        known = np.isfinite(allowed)
-        band = fig.band(x[known], -allowed[known], allowed[known], color=fig.QUIET, key="tolerance")
-        line = fig.Line(x, shown(of.difference), color=fig.OURS, key="computed less recorded")
-        return [band, fig.Rule(0.0, color=fig.MARK), line]
+    def below(of: xr.Dataset) -> list[fig.Mark]:
+        low, high = (quantity.on(side * of.allowed) for side in (-1.0, 1.0))
+        return [_band(of, low, high, color=fig.QUIET, key="tolerance"), ZERO]
 
+    line = {"difference": {"color": fig.OURS, "key": "computed less recorded"}}
     return Plot(
-        _panels(shares, marks, quantity_of(amplitudes.difference).unit_text),
+        _panels(shares, line, below),
         "Difference of the amplitudes of each sensor.",
         "Computed less recorded amplitude, by the largest recorded one of the sensor. " + tolerance,
     )
 
 
 def _order_one(one: xr.Dataset) -> Plot:
-    def marks(of: xr.Dataset) -> list[fig.Mark]:
-        x = shown(of.place)
-        return [
-            fig.Line(x, shown(of.measured), color=fig.MEASURED, width=2.4, key=RECORDED),
-            fig.Line(x, shown(of.computed), color=fig.OURS, key=COMPUTED),
-        ]
-
     return Plot(
-        _panels(one, marks, quantity_of(one.measured).unit_text),
+        _panels(one, LINES),
         "Amplitude of order 1 of each sensor.",
         "Amplitude of order 1, which turns with the unbalance.",
     )
 
 
 def _phases(one: xr.Dataset) -> Plot:
-    def marks(of: xr.Dataset) -> list[fig.Mark]:
-        points = fig.Points(shown(of.place), shown(of.phase), size=4.0)
-        return [fig.Rule(0.0, color=fig.MARK), points]
-
     return Plot(
-        _panels(one, marks, quantity_of(one.phase).unit_text),
+        _panels(one, {"phase": {"kind": fig.Points, "size": 4.0}}, lambda of: [ZERO]),
         "Phase difference of order 1 of each sensor.",
         "Phase of order 1, recorded less computed. The angle of the drum at the start, the same "
         "for all sensors, is taken out.",

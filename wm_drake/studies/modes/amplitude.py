@@ -21,8 +21,9 @@ from scipy.linalg import LinAlgWarning, lu_factor, lu_solve
 
 from wm_drake.model.machine import Setup
 from wm_drake.parameters.types import ComplexArray, FloatArray
+from wm_drake.report.labelled import rows_of
 from wm_drake.studies.modes import quantities as q
-from wm_drake.studies.modes.data import labelled, oscillation
+from wm_drake.studies.modes.data import oscillation
 from wm_drake.studies.modes.linearisation import Spectrum
 from wm_drake.studies.response.balance import HarmonicBalance
 from wm_drake.studies.response.series import Series
@@ -63,7 +64,7 @@ def amplitude_modes(
         for value, vector in zip(stuck.values, stuck.right.T, strict=True)
     ]
     amplitude, omega, beta = np.concatenate([np.empty((0, 3)), *every]).T
-    return labelled(
+    return rows_of(
         {"mode": [name for name, points in zip(names, every, strict=True) for _ in points]},
         amplitude=q.AMPLITUDE.variable("row", amplitude),
         **oscillation("row", omega / (2.0 * np.pi), beta / omega),

@@ -17,8 +17,9 @@ import numpy as np
 import xarray as xr
 
 from wm_drake.parameters.types import FloatArray
+from wm_drake.report.labelled import rows_of
 from wm_drake.studies.modes import quantities as q
-from wm_drake.studies.modes.data import labelled, oscillation
+from wm_drake.studies.modes.data import oscillation
 from wm_drake.studies.modes.linearisation import Spectrum
 
 CLEAR_MAC = 0.8
@@ -141,7 +142,7 @@ def critical_speeds(
         for crossing in _crossings(diagram, orders)
     ]
     names, modes, order, speed, damping = zip(*rows, strict=True) if rows else ((),) * 5
-    return labelled(
+    return rows_of(
         {"linearisation": names, "mode": modes},
         order=q.ORDER.variable("row", order),
         speed=q.CRITICAL_SPEED.variable("row", speed),

@@ -8,6 +8,7 @@ import xarray as xr
 
 from wm_drake.engines.trajectory import COORDINATES
 from wm_drake.parameters.units import Unit
+from wm_drake.report.labelled import rows_of
 from wm_drake.report.quantity import SPEED, Quantity
 from wm_drake.studies.modes import quantities as q
 from wm_drake.studies.modes.linearisation import SLIDING, STUCK
@@ -15,11 +16,6 @@ from wm_drake.studies.modes.sensitivity import Sensitivity
 from wm_drake.studies.modes.shapes import Mode, Nearness, parts
 
 RAD, M = Unit("rad", "rad"), Unit("m", "m")
-
-
-def labelled(labels: Mapping[str, Sequence[Any]], **variables: xr.Variable) -> xr.Dataset:
-    """Return a dataset over `row` with labels of its rows."""
-    return xr.Dataset(variables, {name: ("row", list(of)) for name, of in labels.items()})
 
 
 def of_modes(modes: Mapping[str, Sequence[Mode]], elements: Sequence[str]) -> xr.Dataset:
@@ -49,7 +45,7 @@ def of_modes(modes: Mapping[str, Sequence[Mode]], elements: Sequence[str]) -> xr
         of_elements = np.array([getattr(mode, name) for mode in every])
         variables[name] = quantity.hidden(("row", "element"), of_elements)
     labels = {"linearisation": [name for name, _ in rows], "mode": [mode.name for mode in every]}
-    return labelled(labels, **variables).assign_coords(element=list(elements))
+    return rows_of(labels, **variables).assign_coords(element=list(elements))
 
 
 def at_amplitude(over: xr.Dataset, names: Sequence[str], amplitude: float) -> xr.Dataset:
@@ -108,7 +104,7 @@ def of_numbers(
         "key": [entry.key for _, _, entry, _ in rows],
         "per": per,
     }
-    return labelled(
+    return rows_of(
         labels,
         relative_change_of_frequency=q.FREQUENCY_CHANGE.variable("row", frequency),
         change_of_damping_ratio=q.DAMPING_CHANGE.variable("row", damping),
@@ -131,7 +127,7 @@ def of_gaps(gaps: Mapping[str, Nearness]) -> xr.Dataset:
         "mode": [mode for _, mode, *_ in rows],
         "between": [parts(gap) for _, _, gap, _ in rows],
     }
-    return labelled(
+    return rows_of(
         labels,
         smallest_gap=q.SMALLEST_GAP.variable("row", [gap.distance for _, _, gap, _ in rows]),
         is_nearest=xr.Variable("row", [nearest for *_, nearest in rows]),

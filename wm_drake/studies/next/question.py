@@ -2,7 +2,7 @@
 
 import contextlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
@@ -11,13 +11,12 @@ from wm_drake.engines.compiled.step_check import check_step
 from wm_drake.errors import InputError
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
-from wm_drake.report.formatting import three_digits
-from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.measures.responses import Response
 from wm_drake.simulation.steps import checked_step
-from wm_drake.studies.experiment import Experiment, quantity_of, response_of
+from wm_drake.studies.experiment import Experiment, response_of
 from wm_drake.studies.next.knowledge import Knowledge
 from wm_drake.studies.next.measurements import CandidateMeasurement, TriedMachines
+from wm_drake.studies.proposal import SIGNS
 
 
 @dataclass(frozen=True)
@@ -89,7 +88,7 @@ class Question:
     def _signed(self, runs: xr.Dataset, response: Response) -> FloatArray:
         """Return a response of each load, signed so that less is better. (machines, loads)"""
         values = response_of(runs, response).sel(load=list(self.loads))
-        return sign_of(response) * values.transpose("point", "load").values
+        return SIGNS[response.better] * values.transpose("point", "load").values
 
     def worst(self, answers: FloatArray) -> FloatArray:
         """Return each answer of its worst load, with its own sign. (k, answers) [SI]
@@ -98,7 +97,7 @@ class Question:
             answers: As of `Observed.answers`.
         """
         of_loads = answers.reshape(len(answers), len(self.answers), len(self.loads))
-        return np.array([sign_of(r) for r in self.answers]) * of_loads.max(axis=2)
+        return np.array([SIGNS[r.better] for r in self.answers]) * of_loads.max(axis=2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,13 +118,3 @@ def _placed(values: FloatArray, kept: Sequence[int], count: int) -> FloatArray:
     rows = np.full((count, values.shape[1]), np.nan)
     rows[list(kept)] = values
     return rows
-
-
-def sign_of(response: Response) -> float:
-    """Return the sign by which less of a response is better."""
-    return -1.0 if response.better == "larger" else 1.0
-
-
-def quantities_of(question: Question) -> dict[str, Quantity]:
-    """Return words and unit of each answer, with three digits."""
-    return {r.name: replace(quantity_of(r), form=three_digits) for r in question.answers}

@@ -30,8 +30,9 @@ import xarray as xr
 from wm_drake.errors import input_error
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report.quantity import HIDDEN, SHARE, Quantity
+from wm_drake.studies.experiment import in_three_digits
 from wm_drake.studies.next.measurements import CandidateMeasurement
-from wm_drake.studies.next.question import Question, quantities_of
+from wm_drake.studies.next.question import Question
 
 STEP = 1.0
 """Step of the central differences, in standard deviations of what is known."""
@@ -300,7 +301,7 @@ def singles_of(model: Model) -> xr.Dataset:
     costs = np.array([m.cost for m in measurements])
     gain = 1.0 - widths[:, 0] / before[0]
     error = [model.gain_error(chosen) for chosen in every]
-    of_answer = quantities_of(model.question)
+    of_answer = in_three_digits(model.question.answers)
     width = Quantity("± after").of_each("answer", of_answer, ("candidate", "answer"), widths)
     data = xr.Dataset(
         {
@@ -348,7 +349,7 @@ def steps_of(model: Model, taken: Sequence[int]) -> xr.Dataset:
         in the middle, and the ends `low` and `high` of its interval of 95 %.
     """
     question = model.question
-    of_answer = quantities_of(question)
+    of_answer = in_three_digits(question.answers)
     draws = [model.after(taken[:count]) for count in range(len(taken) + 1)]
     low, high = np.array([np.percentile(d, ENDS, axis=0) for d in draws]).swapaxes(0, 1)
     value = np.tile(question.worst(model.middle[None])[0], (len(draws), 1))

@@ -2,12 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from wm_drake.model.scene import Outline
 from wm_drake.parameters.types import FloatArray
+from wm_drake.report import chart
 from wm_drake.report import figure as fig
 from wm_drake.report.quantity import SPEED, quantity_of, shown
 from wm_drake.simulation.outputs import point_positions
@@ -101,9 +103,9 @@ def forces_figure(cases: Sequence[xr.Dataset]) -> fig.Figure:
     """Return displacement of the box and forces of the gasket over the speed, one line a load."""
     panels = []
     for name in ("detergent_displacement", "gasket_force", "gasket_moment"):
+        peaks = [case.assign({name: case[name].max("axis", keep_attrs=True)}) for case in cases]
         title = quantity_of(cases[0][name]).label
-        lines = [(case, shown(case[name].max("axis", keep_attrs=True))) for case in cases]
-        panels.append(_force_panel(title, lines, []))
+        panels.append(_force_panel(title, peaks, {name: {}}, ""))
     return fig.Figure(panels=fig.in_grid(panels, COLUMNS, share="x"), height=210.0)
 
 
@@ -114,37 +116,36 @@ def mounts_figure(cases: Sequence[xr.Dataset]) -> fig.Figure:
     """
     has_gasket = any(case.gasket == GASKET[True] for case in cases)
     mounts = cases[0].mount.values.tolist()
-    panels = []
-    for mount in (name for name in mounts if has_gasket or name != "gasket"):
-        of_mount = [(case, case.sel(mount=mount)) for case in cases]
-        peaks = [(case, shown(force.mount_force_peak)) for case, force in of_mount]
-        dynamic = [(case, shown(force.mount_force_dynamic_rms)) for case, force in of_mount]
-        panel = _force_panel(mount, peaks, dynamic)
-        panels.append(replace(panel, y=replace(panel.y, label=FORCE.label)))
+    drawn = {"mount_force_peak": {}, "mount_force_dynamic_rms": {"dash": "dashed"}}
+    panels = [
+        _force_panel(mount, [case.sel(mount=mount) for case in cases], drawn, FORCE.label)
+        for mount in mounts
+        if has_gasket or mount != "gasket"
+    ]
     return fig.Figure(panels=fig.in_grid(panels, COLUMNS, share="x"), height=160.0)
 
 
 def _force_panel(
     title: str,
-    peaks: list[tuple[xr.Dataset, FloatArray]],
-    dynamic: list[tuple[xr.Dataset, FloatArray]],
+    cases: Sequence[xr.Dataset],
+    drawn: Mapping[str, Mapping[str, Any]],
+    label: str,
 ) -> fig.Panel:
-    """Return values over the speed of cases, one colour a load; those of `dynamic` are dashed.
+    """Return variables over the speed of cases, one colour a load.
 
     A line has gaps where no steady motion is reachable.
+
+    Args:
+        drawn: Variables with the style of their lines.
+        label: Of the vertical axis.
     """
-    colors = colors_of_loads([case for case, _ in peaks])
-    marks = []
-    kinds: tuple[tuple[fig.Dash, list[tuple[xr.Dataset, FloatArray]]], ...] = (
-        ("", peaks),
-        ("dashed", dynamic),
-    )
-    for dash, lines in kinds:
-        for case, values in lines:
-            load, reached = load_of(case), np.where(case.reachable, values, np.nan)
-            line = fig.Line(shown(case.speed), reached, color=colors[load], width=2.0, key=load)
-            marks.append(replace(line, dash=dash))
-    y = fig.Axis(range=(0.0, None))
+    colors, marks = colors_of_loads(cases), list[fig.Mark]()
+    for name, style in drawn.items():
+        for case in cases:
+            load, reached = load_of(case), case[[name]].where(case.reachable)
+            look = {"color": colors[load], "width": 2.0, "key": load, **style}
+            marks += chart.marks_of(reached, "speed", {name: look})
+    y = fig.Axis(label=label, range=(0.0, None))
     return fig.Panel(title=title, marks=tuple(marks), x=fig.Axis(label=SPEED.label), y=y)
 
 

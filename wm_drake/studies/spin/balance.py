@@ -8,11 +8,11 @@ import xarray as xr
 from wm_drake.parameters.units import Unit
 from wm_drake.report import figure as fig
 from wm_drake.report.formatting import listed, shape_name
-from wm_drake.report.labelled import LabelledTable
+from wm_drake.report.labelled import LabelledTable, rows_of
 from wm_drake.report.quantity import SPEED, TIME, Quantity
 from wm_drake.simulation.balance import Balance, balance_of
 from wm_drake.studies.answer import Part, Plot
-from wm_drake.studies.spin.data import ANGLE, rows_of
+from wm_drake.studies.spin.data import ANGLE
 from wm_drake.studies.spin.figures import speed_axis
 from wm_drake.studies.spin.study import CaseResult, SpinRuns
 

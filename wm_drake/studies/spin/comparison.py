@@ -12,7 +12,7 @@ from wm_drake.parameters import MachineParameters, SpinProfile, measured_changes
 from wm_drake.parameters.measured import EXPERIMENT
 from wm_drake.report import figure as fig
 from wm_drake.report.formatting import MISSING, listed
-from wm_drake.report.labelled import LabelledTable
+from wm_drake.report.labelled import LabelledTable, rows_of
 from wm_drake.report.quantity import CHANGE, SHARE, SPEED, Quantity, of_measure, quantity_of
 from wm_drake.report.table import readable
 from wm_drake.simulation.displacements import envelopes, smooth_envelope
@@ -25,7 +25,6 @@ from wm_drake.studies.spin.data import (
     DISPLACEMENT,
     amplitudes_of,
     experiment_of,
-    rows_of,
 )
 from wm_drake.studies.spin.page import Files, spin_answer
 from wm_drake.studies.spin.study import GAP, CaseResult, SpinRuns, band_text
@@ -326,7 +325,7 @@ def _plot(variants: Variants) -> Plot | None:
     figure = envelopes_figure(variants)
     if figure is None:
         return None
-    cases = [case for runs in variants.values() for case in runs.results if _has_envelopes(case)]
+    cases = [case for runs in variants.values() for case in runs.results if case.has_envelopes]
     caption = (
         f"Displacement at each sensor over time, in the band {band_text(*cases)}. Each shaded area "
         "extends from the lower to the upper envelope. Dots: the largest absolute values, which "
@@ -336,10 +335,6 @@ def _plot(variants: Variants) -> Plot | None:
     )
     words = f"Overlaid envelopes of the displacement over time: {', '.join(variants)}."
     return Plot(figure, words, caption)
-
-
-def _has_envelopes(case: CaseResult) -> bool:
-    return not bool(case.measures.amplitude.isnull().any())
 
 
 def envelopes_figure(variants: Variants) -> fig.Figure | None:
@@ -356,7 +351,7 @@ def envelopes_figure(variants: Variants) -> fig.Figure | None:
         cases = {
             name: case
             for name, runs in variants.items()
-            if _has_envelopes(case := runs.results[index])
+            if (case := runs.results[index]).has_envelopes
         }
         if cases:
             panels += _panels(variants, cases, sensors)

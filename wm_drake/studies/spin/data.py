@@ -1,8 +1,5 @@
 """Datasets of spin runs: what tables, files, JSON, figures and sentences show. All in SI."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
-
 import numpy as np
 import xarray as xr
 
@@ -11,6 +8,7 @@ from wm_drake.parameters.measured import BAND, EXPERIMENT
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.report.formatting import shape_name
+from wm_drake.report.labelled import rows_of
 from wm_drake.report.quantity import CHANGE, MASS, SHARE, SPEED, TIME, Quantity, of_measure
 from wm_drake.simulation.mount_forces import mount_forces, rms_table, speed_ranges
 from wm_drake.simulation.vibration import sensor_accelerations
@@ -30,11 +28,6 @@ ANGLE = Quantity("angle", Unit("rad", "deg"), 1)
 PLACE = Quantity("place", MM, 0)
 DIFFERENCE = CHANGE.named("difference")
 """Relative difference from a reference, [B] Eq. (1); its text has the sign."""
-
-
-def rows_of(labels: Mapping[str, Sequence[Any]], **variables: Any) -> xr.Dataset:
-    """Return a dataset over `row` with labels of its rows."""
-    return xr.Dataset(variables, {name: ("row", list(of)) for name, of in labels.items()})
 
 
 def amplitudes_of(runs: SpinRuns) -> xr.Dataset:

@@ -12,7 +12,7 @@ from wm_drake.parameters import quantities
 from wm_drake.parameters.measured import measured_notes
 from wm_drake.parameters.plausibility import unusual_numbers
 from wm_drake.report.formatting import slack_warning
-from wm_drake.report.labelled import LabelledTable
+from wm_drake.report.labelled import LabelledTable, rows_of
 from wm_drake.report.page import versions_of
 from wm_drake.report.quantity import CHANGE, SHARE, SPEED, Quantity
 from wm_drake.report.table import readable
@@ -39,7 +39,6 @@ from wm_drake.studies.spin.data import (
     of_sensors,
     profiles_of,
     row_of,
-    rows_of,
 )
 from wm_drake.studies.spin.drive import capture_warnings, drive_in_short, drive_parts
 from wm_drake.studies.spin.floor import floor_parts, floor_warnings
@@ -302,7 +301,7 @@ def _contact_sentence(cases: list[CaseResult]) -> str:
 
 def _case_facts(case: CaseResult) -> str:
     facts = "The run is too short for the band-pass filter, so it has no amplitudes."
-    if _has_envelopes(case):
+    if case.has_envelopes:
         facts = f"Largest amplitude: {_peak_text(case)}."
     gap = case.gap_text
     return f"{facts} Smallest gap to the housing: {gap}." if gap else facts
@@ -498,12 +497,8 @@ def changed_parameters(runs: SpinRuns) -> xr.Dataset:
     return rows_of(labels, value=("row", [text for *_, text in rows]))
 
 
-def _has_envelopes(case: CaseResult) -> bool:
-    return not bool(case.measures.amplitude.isnull().any())
-
-
 def _envelopes_plot(case: CaseResult, amplitudes: xr.Dataset) -> Plot | None:
-    if not _has_envelopes(case):
+    if not case.has_envelopes:
         return None
     measured, of_case = experiment_of(amplitudes, case), case.measures.amplitude
     largest = ", ".join(

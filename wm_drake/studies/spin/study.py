@@ -67,6 +67,11 @@ class CaseResult:
         return f"{self.case.name} ({'with' if self.has_gasket else 'without'} gasket)"
 
     @property
+    def has_envelopes(self) -> bool:
+        """Whether it is long enough for the filter of the amplitudes, and did not fail."""
+        return not bool(self.measures.amplitude.isnull().any())
+
+    @property
     def gap_text(self) -> str:
         """Smallest gap, its parts, and drum speed and time there; "" without one."""
         gap = self.measures.smallest_gap

@@ -2,16 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
-from wm_drake.batch import simulate_many
 from wm_drake.elements.bushing import AXES
 from wm_drake.errors import InputError, check_known, input_error
-from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters, SpinProfile
 from wm_drake.parameters.drive import motor_of
 from wm_drake.parameters.unbalance_cases import TABLE_9, UnbalanceCase, load_unbalance_cases
@@ -225,8 +222,3 @@ def measured_displacements(
     if options.accelerations:
         return read_accelerations(options.accelerations, labels, profile, names, unit)
     return None
-
-
-def compiled_runs(machine: Machine) -> RunCases:
-    """Return a function that runs cases of a built machine with the compiled engine."""
-    return partial(simulate_many, machine, measures=measures_of(machine.parameters))

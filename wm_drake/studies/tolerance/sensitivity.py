@@ -5,8 +5,6 @@ sensitivity analysis of model output, Computer Physics Communications 181 (2010)
 B, and A with one column of B for each quantity.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy import stats
 
@@ -17,24 +15,6 @@ RESAMPLES = 400
 
 PERCENTILES = (2.5, 97.5)
 """Ends of a 95 % interval."""
-
-
-@dataclass(frozen=True)
-class Index:
-    """Sobol indices of one quantity for one measure, with 95 % intervals.
-
-    Attributes:
-        first: Share of the variance that the quantity causes alone.
-        total: Share that it causes alone and together with others.
-        first_lower, first_upper, total_lower, total_upper: Ends of the intervals.
-    """
-
-    first: float
-    first_lower: float
-    first_upper: float
-    total: float
-    total_lower: float
-    total_upper: float
 
 
 def exchanged(a: FloatArray, b: FloatArray) -> FloatArray:
@@ -56,7 +36,7 @@ def exchanged(a: FloatArray, b: FloatArray) -> FloatArray:
 
 def sobol_indices(
     at_a: FloatArray, at_exchanged: FloatArray, *, seed: int = 0
-) -> list[Index] | None:
+) -> dict[str, FloatArray] | None:
     """Return the Sobol indices of each quantity.
 
     The intervals are percentiles of a bootstrap over the rows of the samples.
@@ -66,7 +46,9 @@ def sobol_indices(
         at_exchanged: Measure at the rows of `exchanged`. ((d + 1) n,)
 
     Returns:
-        An index for each quantity; None if the measure is not finite at a row or does not vary.
+        For each quantity (d,): `first`, the share of the variance that it causes alone, `total`,
+        alone and together with others, and the ends of their 95 % intervals, `first_lower` and so
+        on. None if the measure is not finite at a row or does not vary.
     """
     n = len(at_a)
     parts = at_exchanged.reshape(-1, n)
@@ -82,7 +64,9 @@ def sobol_indices(
         estimates.append([result.first_order[:-1], result.total_order[:-1]])
     indices = np.array(estimates)  # (resample, first or total, quantity)
     lower, upper = np.percentile(indices[1:], PERCENTILES, axis=0)
-    return [
-        Index(*map(float, (i[0], low[0], high[0], i[1], low[1], high[1])))
-        for i, low, high in zip(indices[0].T, lower.T, upper.T, strict=True)
-    ]
+    ends = {"": indices[0], "_lower": lower, "_upper": upper}
+    return {
+        f"{name}{end}": values[place]
+        for place, name in enumerate(("first", "total"))
+        for end, values in ends.items()
+    }

@@ -212,11 +212,11 @@ class ToleranceTrials:
             at_a = samples[name].values[:count]
             indices = sobol_indices(at_a, at_others.values.T.ravel(), seed=self.settings.seed)
             if indices is not None:
-                estimated[name] = [vars(index) for index in indices]
+                estimated[name] = indices
         return xr.Dataset(
             {
                 part: INDEX.named(words).variable(
-                    ("measure", "quantity"), [[i[part] for i in of] for of in estimated.values()]
+                    ("measure", "quantity"), [of[part] for of in estimated.values()]
                 )
                 for part, words in INDICES.items()
                 if estimated

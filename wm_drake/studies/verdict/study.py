@@ -6,7 +6,7 @@ rule of `wm_drake.studies.proposal` chooses among them.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -18,11 +18,11 @@ from wm_drake.parameters.keys import quantities
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Share
 from wm_drake.parameters.variation import value_at
-from wm_drake.report.formatting import shape_name, three_digits
+from wm_drake.report.formatting import shape_name
 from wm_drake.report.quantity import CHANGE, Quantity, of_measure
 from wm_drake.simulation.measures.kind import Better
 from wm_drake.simulation.measures.responses import Response
-from wm_drake.studies.experiment import Experiment, quantity_of, responses
+from wm_drake.studies.experiment import Experiment, in_three_digits, responses
 from wm_drake.studies.proposal import (
     AFTER,
     BEFORE,
@@ -207,8 +207,7 @@ def proposal(question: VerdictQuestion, states: xr.Dataset, tried: xr.Dataset) -
         tried: As of `influences`.
     """
     chosen, changes = question.responses, question.changes
-    each = {r.name: replace(quantity_of(r), form=three_digits) for r in chosen}
-    dims = ("setting", "load", "response")
+    each, dims = in_three_digits(chosen), ("setting", "load", "response")
     labels = {
         "setting": [BEFORE, AFTER][: states.sizes["state"]],
         "load": states["load"].values,
