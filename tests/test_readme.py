@@ -1,5 +1,6 @@
 """README and the how-to pages are checked where a machine can: commands, snippets, machine files."""
 
+import itertools
 import shlex
 import subprocess
 from collections import Counter
@@ -132,7 +133,8 @@ def test_the_python_snippets_run(path, tmp_path, monkeypatch):
         assert names["response"].amplitude.sel(sensor="Zf").size >= names["speeds"].size
         return
     if path == page("detect-unbalance"):
-        assert names["found"].tables()["errors"]["estimate"].iloc[0] == "mass"
+assert names["found"].tables()["errors"]["estimate"].iloc[0] == "mass"
+        assert [key for key, _ in itertools.groupby(names["steps"])] == [1, 0, 1, 2]
         return
     if path == README:
         assert np.abs(names["displacement"]).max() < 1e-3  # 21 rpm
@@ -180,6 +182,7 @@ MACHINES = [  # page, index of the block, a number in it by key path
     (page("compliant-bearing"), 0, "imperfections.bearing.y", None),
     (page("compliant-bearing"), 1, "imperfections.bearing.clearance", 1e-4),
     (page("cycle"), 0, "loads.towels.unbalances.0.water.time_constant", 25.0),
+    (page("detect-unbalance"), 0, "elements.monitor.turns", 2.0),
     (page("drive"), 0, "drive.belt_ratio", 12.0),
     (page("extend"), 0, "elements.slow.coefficient", 400.0),
     (page("floor"), 0, "cabinet.friction", 0.5),

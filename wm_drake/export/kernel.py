@@ -39,6 +39,7 @@ from wm_drake.engines.compiled.mechanics import (
     write_sample,
 )
 from wm_drake.model.outline import lowest_point
+from wm_drake.simulation.histories import write_outputs_of_others
 
 HARMONICS_BEGIN, HARMONICS_END = BODIES.offsets["drum_moment_x"], BODIES.offsets["joint_damping"]
 HARMONICS_SIZE = HARMONICS_END - HARMONICS_BEGIN
@@ -60,7 +61,7 @@ LARGEST_ANGLE = 2000.0 * np.pi
 Places = namedtuple(
     "Places",
     "speed acceleration torque time_constant unbalances parameters displacements "
-    "accelerations drum current gasket mounts cabinet feet gap state rate in_force turned "
+    "accelerations drum current gasket mounts cabinet feet gap own state rate in_force turned "
     "packed inputs stage total nodes sample wrenches size",
 )
 """Indices in the array of an instance.
@@ -71,7 +72,8 @@ each; parameters: numbers of the machine file; displacements, accelerations: of 
 m/s^2]; drum: angle, speed, acceleration and torque [rad, rad/s, rad/s^2, N m]; current: of the
 motor [A]; gasket: force and
 moment on the housing [N, N m]; mounts: force of each on the cabinet; cabinet: force and moment of
-all; feet: force of the floor on each [N]; gap: smallest distance [m]; state, rate: state of the
+all; feet: force of the floor on each [N]; gap: smallest distance [m]; own:
+outputs of elements of other packages; state, rate: state of the
 engine and its derivative; in_force: acceleration of a prescribed drum [rad/s^2]; turned: angle
 taken off the drum's [rad]; the others are packed numbers and arrays to work in; size: of the array.
 """
@@ -376,6 +378,7 @@ def _outputs(plan: Any) -> Any:
                 numbers[at.cabinet + 3 + k] = numbers[at.cabinet + 3 + k] + moment
         write_floor(numbers, x, p, cabinet)
         write_drum(numbers, x, rate, p)
+        write_outputs_of_others(x, motion, p, elements.mounts.others, numbers, at.own)
         if count.currents:
             numbers[at.current] = constants[of.current] * numbers[at.drum + 3]
         if count.pairs:

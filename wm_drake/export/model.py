@@ -232,6 +232,7 @@ class _Contents:
             "cabinet": 6,
             "feet": 3 * count.feet,
             "gap": 1,
+            "own": sum(element.kind.output_size for element in self.setup.elements.others.values()),
             "state": begins.size,
             "rate": begins.size,
             "in_force": 1,
@@ -343,6 +344,14 @@ class _Contents:
             add(feet, at.feet, "N", "force of the floor on a foot, in W")
         if self.count.pairs:
             add(["gap"], at.gap, "m", "smallest distance of tub group and housing (lower bound)")
+        first = at.own
+        for label, element in self.setup.elements.others.items():
+            for output in element.kind.outputs:
+                name = structured(f"elements.{label}.{output.name}")
+                several = [f"{name}[{k}]" for k in range(1, output.size + 1)]
+                unit = output.unit.replace(" ", "*")
+                add(several if output.size > 1 else [name], first, unit, output.words)
+                first += output.size
         return variables
 
     def _states(self, at: Any, numbers: FloatArray) -> list[FmuVariable]:

@@ -74,14 +74,14 @@ def output_history(states, points, p, mounts, outputs):
             for k in range(6):
                 answer[column + k] = on_housing[k]
             column += 6
-        _write_outputs_of_others(x, motion, q, mounts.others, answer, column)
+        write_outputs_of_others(x, motion, q, mounts.others, answer, column)
         lanes_to_rows(numbers, begin, outputs)
     keep(p_numbers)
     keep(point_numbers)
 
 
 @law
-def _write_outputs_of_others(x, motion, p, others, answer, column):
+def write_outputs_of_others(x, motion, p, others, answer, column):
     """Write the outputs of each element of another package; `others` is None without any."""
     if others is not None:
         for i in range(len(others.at)):

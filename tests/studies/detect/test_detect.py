@@ -9,12 +9,15 @@ from motor_machines import isotropic_motor
 from simple_machines import unbalance
 
 from wm_drake.batch import simulate_many
+from wm_drake.elements.unbalance_monitor import UnbalanceMonitor
 from wm_drake.engines.compiled.step_check import drum_inertia
 from wm_drake.errors import InputError
+from wm_drake.export.model import exported_model
 from wm_drake.model.build import build_machine
 from wm_drake.parameters import Load, SpinProfile, Unbalance, load_machine, with_values
 from wm_drake.report.quantity import SPEED, Quantity
 from wm_drake.simulation.cases import Case
+from wm_drake.simulation.runs import simulate
 from wm_drake.studies.detect.decision import (
     NoThresholdError,
     speed_limits,
@@ -29,7 +32,7 @@ from wm_drake.studies.detect.signals import chosen_signals, features_of
 from wm_drake.studies.detect.study import truths_of
 
 RUN_UP = SpinProfile(time=(0.0, 40.0, 50.0), speed=(0.0, 40.0, 40.0))
-W = float(SPEED.to_si(90.0))
+W = SPEED.unit.to_si(90.0)
 
 
 def test_orders_of_a_window_are_those_planted_beside_a_trend():
@@ -155,9 +158,9 @@ def test_phases_against_the_first_signal_separate_mass_and_place():
 def test_mass_and_moment_of_a_load():
     lump = {"radius": 0.2, "phase": 1.0}
     one = Load(unbalances=(Unbalance(mass=0.5, y=-0.1, **lump),))
-    assert truths_of(one) == pytest.approx((0.5, -0.5 * 0.2 * 0.1))
+    assert truths_of(one) == pytest.approx((0.5, -0.5 * 0.2 * 0.1, 0.5 * 0.2))
     two = Load(unbalances=(Unbalance(mass=0.5, y=-0.1, **lump), Unbalance(mass=0.3, y=0.2, **lump)))
-    assert truths_of(two) == pytest.approx((0.8, 0.2 * (0.3 * 0.2 - 0.5 * 0.1)))
+    assert truths_of(two) == pytest.approx((0.8, 0.2 * (0.3 * 0.2 - 0.5 * 0.1), 0.16))
 
 
 def orders_of(machine, loads, engine="compiled"):
@@ -167,28 +170,56 @@ def orders_of(machine, loads, engine="compiled"):
     return simulate_many(machine, cases, measures=[SIGNALS_OF_HOLD.name], engine=engine)
 
 
-def test_torque_and_speed_ripple_of_a_fixed_tub_are_the_closed_form():
-    """Compare with docs/theory/detect.md; a tub of 1000 kg on 1e7 N/m moves by micrometres."""
+def on_fixed_tub(**elements):
+    """Return a machine with a motor whose tub of 1000 kg on 1e7 N/m moves by micrometres."""
     stiff = {f"gasket.stiffness_{axis}": 1e7 for axis in "xyz"}
     stiff |= {f"gasket.rotational_stiffness_{axis}": 1e6 for axis in "xyz"}
     heavy = {f"bodies.tub.inertia.{axis}": 100.0 for axis in ("xx", "yy", "zz")}
     heavy |= {"gravity": 9.81, "bodies.tub.mass": 1e3}
-    machine = build_machine(with_values(isotropic_motor(), stiff | heavy))
-    drive, mass, radius = machine.parameters.drive, np.array([0.3, 1.0, 1.0]), 0.24
-    places = (0.0, -0.13, 0.13)
+    machine = with_values(isotropic_motor(), stiff | heavy)
+    return build_machine(machine.model_copy(update={"elements": elements}))
+
+
+def impedances_of(machine, inertia):
+    """Return controller C and impedance C + j w J of docs/theory/detect.md at 90 rpm."""
+    drive = machine.parameters.drive
+    gains, ratio = drive.controller, drive.belt_ratio**2
+    control = ratio * (gains.proportional_gain + gains.integral_gain / (1j * W))
+    return control, control + 1j * W * (drum_inertia(machine.set_up()) + inertia)
+
+
+def test_torque_and_speed_ripple_of_a_fixed_tub_are_the_closed_form():
+    machine = on_fixed_tub()
+    mass, radius, places = np.array([0.3, 1.0, 1.0]), 0.24, (0.0, -0.13, 0.13)
     found = orders_of(
         machine, [unbalance(m, radius, y, 1.0) for m, y in zip(mass, places, strict=True)]
     )
-    gains, ratio = drive.controller, drive.belt_ratio**2
-    control = ratio * (gains.proportional_gain + gains.integral_gain / (1j * W))
-    inertia = drum_inertia(machine.set_up()) + mass * radius**2
-    pull = mass * radius * 9.81
-    speed = pull / np.abs(control + 1j * W * inertia)
+    control, impedance = impedances_of(machine, mass * radius**2)
+    speed = mass * radius * 9.81 / np.abs(impedance)
     torque = np.linalg.norm(found.window_torque_1.values[:, -1], axis=-1)
     ripple = np.linalg.norm(found.window_speed_1.values[:, -1], axis=-1)
     np.testing.assert_allclose(ripple, speed, rtol=3e-3)
     np.testing.assert_allclose(torque, np.abs(control) * speed, rtol=3e-3)
     assert np.ptp(torque[1:]) < 1e-3 * torque[1]  # the place does not matter
+
+
+def test_a_monitor_estimates_the_unbalance_from_the_closed_form_impedance():
+    mass, radius = 0.7, 0.24
+    impedance = abs(impedances_of(on_fixed_tub(), mass * radius**2)[1])
+    monitor = UnbalanceMonitor(kind="unbalance_monitor", impedance=impedance, turns=2.0)
+    machine = on_fixed_tub(monitor=monitor)
+    profile = SpinProfile(time=(0.0, 20.0), speed=(W, W))
+    record = simulate(machine, Case("one", unbalance(mass, radius, 0.1, 1.0), profile))
+    last = record.unbalance_monitor_unbalance_estimate.values[-800:].mean()
+    assert last == pytest.approx(mass * radius, rel=0.01)
+
+
+def test_an_fmu_has_the_estimate_as_an_output():
+    monitor = UnbalanceMonitor(kind="unbalance_monitor", impedance=5.3)
+    machine = load_machine("motor").model_copy(update={"elements": {"monitor": monitor}})
+    outputs = {v.name: v for v in exported_model(machine, "middle", input_kind="torque").variables}
+    estimate = outputs["elements.monitor.unbalance_estimate"]
+    assert (estimate.causality, estimate.unit) == ("output", "kg*m")
 
 
 @pytest.mark.slow

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from wm_drake.parameters import MachineParameters
 from wm_drake.parameters.types import FloatArray
+from wm_drake.parameters.units import Unit
 from wm_drake.report import figure as fig
 from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.quantity import SHARE, SPEED, TIME, Quantity, shown
@@ -18,6 +19,7 @@ from wm_drake.studies.detect.decision import (
     IN_TABLE,
     MINUTES,
     OF_LOADS,
+    NoThresholdError,
     Verdict,
     speed_limits,
     table_of,
@@ -25,7 +27,7 @@ from wm_drake.studies.detect.decision import (
     verdict_of,
 )
 from wm_drake.studies.detect.estimators import LinearFit
-from wm_drake.studies.detect.signals import ControllerSignal
+from wm_drake.studies.detect.signals import ControllerSignal, known_signals
 from wm_drake.studies.detect.study import (
     GAP,
     TRUTHS,
@@ -33,6 +35,7 @@ from wm_drake.studies.detect.study import (
     Plan,
     choices_of,
     errors_of,
+    monitor_of,
     ranked,
     summary_of,
 )
@@ -93,6 +96,7 @@ def detect_answer(question: RiskQuestion, draws: Draws, more: Sequence[Controlle
                 links=(("speed_limits.h", "the table as an array of C"),),
             ),
             Part("The estimate", tuple(_coefficients(fit))),
+            *_monitor(question, draws),
         ),
         (
             ("Laundry", question.laundry),
@@ -161,6 +165,7 @@ def _short(question: RiskQuestion, draws: Draws, verdict: Verdict, ranking: xr.D
     return Part("In short", facts=rows)
 
 
+UNBALANCE = Quantity("unbalance", Unit("kg*m", "g*m"), 0)
 ABOUT_RISK = (
     "chosen on half the draws so that (t + 1) / (n + 1) is at most the risk, if t of the n loads "
     "that spin touch"
@@ -237,6 +242,27 @@ def _coefficients(fit: object) -> list[LabelledTable]:
     )
     caption = "Smallest gap = constant + sum of coefficient times feature, all in SI units."
     return [LabelledTable("coefficients", data, "The estimated gap", caption)]
+
+
+def _monitor(question: RiskQuestion, draws: Draws) -> list[Part]:
+    """Return the lines of a monitor for the machine file; none without a motor."""
+    speed = known_signals(question.machine).get("speed")
+    if speed is None:
+        return []
+    fitted = draws.is_fitted
+    impedance, *values = monitor_of(question.plan, speed, draws, question.machine.gravity)
+    estimates = np.array(values)
+    line = f"monitor: {{kind: unbalance_monitor, impedance: {impedance:.4g} N*m*s/rad}}"
+    text = (
+        "As an element of the machine file, with which records, diagrams of Drake and FMUs have "
+        f"the output unbalance_estimate. elements: {line}"
+    )
+    try:
+        threshold = threshold_for(estimates[fitted], draws.touches[fitted], question.risk)
+    except NoThresholdError:
+        return [Part("Monitor", text=f"{text}.")]
+    safe = UNBALANCE.text(threshold)
+    return [Part("Monitor", text=f"{text}. Spin if the estimate is below {safe}.")]
 
 
 def c_array(limits: xr.Dataset, quantity: Quantity) -> str:

@@ -45,13 +45,13 @@ TRUTHS = {
 load; moment of the mass in its direction about mid-depth, positive at the rear; smallest gap."""
 
 
-def truths_of(load: Load) -> tuple[float, float]:
-    """Return mass and moment of a load, as of `TRUTHS`. [kg, kg m^2]"""
+def truths_of(load: Load) -> tuple[float, float, float]:
+    """Return mass and moment of a load, as of `TRUTHS`, and its unbalance. [kg, kg m^2, kg m]"""
     parts = [(u.mass * u.radius * np.exp(1j * u.phase), u.y, u.mass) for u in load.unbalances]
     static, total = sum(p[0] for p in parts), sum(p[2] for p in parts)
     size, radius = abs(static), sum(abs(p[0]) for p in parts) / total if total else 1.0
     moment = sum(p[0] * p[1] for p in parts) * np.conj(static) / size if size else 0.0
-    return float(size / radius), float(np.real(moment))
+    return float(size / radius), float(np.real(moment)), float(size)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +63,7 @@ class Draws:
         seen: Measures of the draws in each hold.
         truths: What is true of each draw, by the names of `TRUTHS`; the gap is NaN if the spin
             failed.
+        unbalance: Static unbalance, mass times radius. (draws,) [kg m]
         highest: Highest speed up to which the clearance is kept, 0 if none. (draws,) [rad/s]
         clearance: Gap that must remain. [m]
     """
@@ -70,6 +71,7 @@ class Draws:
     holds: tuple[Hold, ...]
     seen: tuple[xr.Dataset, ...]
     truths: dict[str, FloatArray]
+    unbalance: FloatArray
     highest: FloatArray
     clearance: float
     seed: int
@@ -124,9 +126,9 @@ def draws_of(
         by_range = run([GAPS.name], again, touching, "speeds of contact").region_gap.values
         first = np.argmax(~(by_range > clearance), axis=1)
         highest[touching] = np.append(0.0, limits)[first]
-    mass, moment = np.array([truths_of(case.load) for case in cases]).T
+    mass, moment, unbalance = np.array([truths_of(case.load) for case in cases]).T
     truths = {"mass": mass, "moment": moment, "gap": gaps}
-    return Draws(holds, seen, truths, highest, clearance, seed)
+    return Draws(holds, seen, truths, unbalance, highest, clearance, seed)
 
 
 def with_profile(cases: Iterable[Case], hold: Hold) -> Iterator[Case]:
@@ -171,6 +173,22 @@ class Plan:
         """Return what the estimator learned of a truth, and its estimates."""
         of = draws.truths[name]
         return estimated(self.estimator, self.features(draws), of, draws.is_fitted)
+
+
+def monitor_of(plan: Plan, speed: ControllerSignal, draws: Draws, gravity: float) -> FloatArray:
+    """Return the impedance of a monitor, and the unbalance that it estimates of each draw.
+
+    The impedance Z fits the weight of the unbalance of the first half, m r g = Z |u|, to the exact
+    ripple u of the drum speed.
+
+    Returns:
+        (1 + draws,) [N m s/rad, kg m]
+    """
+    exact = replace(plan, signals=(replace(speed, noise=0.0, resolution=0.0),))
+    ripple, weight = exact.ripple(draws), gravity * draws.unbalance
+    used = draws.is_fitted & np.isfinite(ripple)
+    impedance = np.sum(weight[used] * ripple[used]) / np.sum(ripple[used] ** 2)
+    return np.append(impedance, impedance * ripple / gravity)
 
 
 def errors_of(plan: Plan, draws: Draws) -> xr.Dataset:
