@@ -133,7 +133,7 @@ def test_the_python_snippets_run(path, tmp_path, monkeypatch):
         assert names["response"].amplitude.sel(sensor="Zf").size >= names["speeds"].size
         return
     if path == page("detect-unbalance"):
-assert names["found"].tables()["errors"]["estimate"].iloc[0] == "mass"
+        assert names["found"].tables()["errors"]["estimate"].iloc[0] == "mass"
         assert [key for key, _ in itertools.groupby(names["steps"])] == [1, 0, 1, 2]
         return
     if path == README:
