@@ -28,7 +28,7 @@ SAME |= {"deg/s", "rad/s", "rad/s^2", "W", "1/s"}
 """Display units that are the same in the US."""
 
 WORDS_OF_FILES = (
-    "Laundry of 200 to 600 g", "--clearance '10 mm'", "320 mm at the housing", "wall of 2.5 mm"
+    "Laundry of 200 to 600 g", "0.1 to 2 kg in one lump", "--clearance '10 mm'", "320 mm at the housing", "wall of 2.5 mm"
 )  # fmt: skip
 """Words of shipped files, and an example of an option."""
 

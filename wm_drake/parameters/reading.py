@@ -41,6 +41,7 @@ CUSTOMARY = {
     "N*s^2/m^2": "lbf*s^2/ft^2",
     "s/m": "s/ft",
     "g*mm^2": "oz*in^2",
+    "g*m^2": "oz*in^2",
     "N*m/m": "lbf",
     "MPa": "psi",
     "J": "lbf*ft",

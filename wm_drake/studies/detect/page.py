@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
+from markupsafe import Markup
 from numpy.typing import NDArray
 
 from wm_drake.parameters import MachineParameters
@@ -113,8 +114,7 @@ def answer_text(question: RiskQuestion, draws: Draws, chosen: float, verdict: Ve
     """Return the answer in a few sentences."""
     plan = question.plan
     signal, speed = plan.signals[0].quantity, draws.holds[plan.hold].speed
-    does = "touch" if not draws.clearance else f"keep less than {GAP.text(draws.clearance)}"
-    spins = verdict.spins
+    does, spins = _touch(draws), verdict.spins
     if not draws.touches.any():
         return (
             f"Every load may spin: none of {len(draws.touches)} loads {does}, so this laundry "
@@ -130,6 +130,11 @@ def answer_text(question: RiskQuestion, draws: Draws, chosen: float, verdict: Ve
         f"{does} (95 % interval "
         f"{OF_LOADS.text(of.lower)} to {OF_LOADS.text(of.upper)})."
     )
+
+
+def _touch(draws: Draws) -> str:
+    """Return what a load does that must not spin."""
+    return "touch" if not draws.clearance else f"keep less than {GAP.text(draws.clearance)}"
 
 
 def _of_round(share: float) -> str:
@@ -150,7 +155,7 @@ def _short(question: RiskQuestion, draws: Draws, verdict: Verdict, ranking: xr.D
             f"{MINUTES.number(distributions[0] * question.retry / 60.0)} minutes; "
             f"{OF_LOADS.text(verdict.refused.estimate)} of the loads are refused though safe",
         ),
-        ("Without a threshold", f"{OF_LOADS.text(without)} of the loads touch"),
+        ("Without a threshold", f"{OF_LOADS.text(without)} of the loads {_touch(draws)}"),
         ("Tolerated risk", f"{question.risk_text} of the washes; {ABOUT_RISK}"),
     ]
     best = ranking.isel(choice=0)
@@ -252,17 +257,18 @@ def _monitor(question: RiskQuestion, draws: Draws) -> list[Part]:
     fitted = draws.is_fitted
     impedance, *values = monitor_of(question.plan, speed, draws, question.machine.gravity)
     estimates = np.array(values)
-    line = f"monitor: {{kind: unbalance_monitor, impedance: {impedance:.4g} N*m*s/rad}}"
+    numbers = f"kind: unbalance_monitor, impedance: {impedance:.4g} N*m*s/rad"
+    lines = Markup("<pre><code>elements:\n  monitor: {{{}}}</code></pre>").format(numbers)
     text = (
-        "As an element of the machine file, with which records, diagrams of Drake and FMUs have "
-        f"the output unbalance_estimate. elements: {line}"
+        "As an element of the machine file it estimates in records, diagrams of Drake and FMUs, "
+        "from the ripple of the drum speed: output unbalance_estimate."
     )
     try:
         threshold = threshold_for(estimates[fitted], draws.touches[fitted], question.risk)
+        text += f" Spin if it is below {UNBALANCE.text(threshold)}."
     except NoThresholdError:
-        return [Part("Monitor", text=f"{text}.")]
-    safe = UNBALANCE.text(threshold)
-    return [Part("Monitor", text=f"{text}. Spin if the estimate is below {safe}.")]
+        pass
+    return [Part("Unbalance monitor", text=text, body=lambda: lines)]
 
 
 def c_array(limits: xr.Dataset, quantity: Quantity) -> str:

@@ -124,7 +124,7 @@ def draws_of(
     if touching:
         again = (replace(cases[k], profile=ranges) for k in touching)
         by_range = run([GAPS.name], again, touching, "speeds of contact").region_gap.values
-        first = np.argmax(~(by_range > clearance), axis=1)
+        first = np.argmax(by_range <= clearance, axis=1)
         highest[touching] = np.append(0.0, limits)[first]
     mass, moment, unbalance = np.array([truths_of(case.load) for case in cases]).T
     truths = {"mass": mass, "moment": moment, "gap": gaps}
