@@ -111,7 +111,7 @@ CASES = {  # command -> arguments, message, more files
         ("--load middle --load middle", "'middle' is given twice"),
         ("--load middle --load middle.yaml", "'middle' is given twice", {"middle.yaml": "unbalances: []\n"}),
         ("--load l.yaml", "l.yaml:1: unbal", {"l.yaml": "unbalances: [{mass: -1 kg, radius: 1 mm, y: 0 mm}]\n"}),
-        ("--profile nosuch.csv", "no such file 'nosuch.csv'"),
+        ("--profile nosuch.csv", "no such file, and no shipped profile"),
         ("--out file", "file: this path is a file, but a folder is needed"),
         ("--out file/out", "file/out: cannot be written to"),
         ("--out ''", "--out: is empty; name a folder"),

@@ -31,6 +31,7 @@ NOT_COMPARED = {"sources", "measured", "published"}
         ("loads.counter.unbalances.1.mass", "300 g", 0.3),
         ("profile.time", (0.0, 50.0, 60.0), (0.0, 50.0, 60.0)),
         ("profile.time", "(0, 50, 60) s", (0.0, 50.0, 60.0)),
+        ("accuracy", "0.1 %", 0.001),  # percents of a share are a value
     ],
 )
 def test_number_is_changed_and_nothing_else(reference, key, value, si):
@@ -38,6 +39,12 @@ def test_number_is_changed_and_nothing_else(reference, key, value, si):
     before, after = ({k: v for k, v, _ in quantities(p)} for p in (reference, changed))
     assert after[key] == pytest.approx(si)
     assert {k for k in before | after if before.get(k) != after.get(k)} == {key}
+
+
+def test_percents_scale_a_number(reference):
+    key = "damper_types.friction.friction_force"
+    half = with_value(reference, key, "50 %").damper_types["friction"].friction_force
+    assert half == 0.5 * reference.damper_types["friction"].friction_force
 
 
 def test_original_is_unchanged(reference):
@@ -103,6 +110,7 @@ def test_number_may_become_a_table(reference):
         ("loads.middle.unbalances.1.mass", "'1' does not exist; allowed are 0 to 0"),
         ("loads.middle.unbalances.first.mass", "'first' does not exist; allowed are 0 to 0"),
         ("gravity.x", "'x' does not exist; the path must end before it"),
+        ("frames.damper_left_tub.position.1", "only the SDF has this list; write all of it"),
         ("", "unknown key ''"),
         ("gasket..stiffness_x", "unknown key ''"),
     ],

@@ -100,8 +100,9 @@ def test_nan_is_refused_in_code_too():
         SpinProfile(time=(0.0, 1.0), speed=(0.0, math.nan))
 
 
-def test_profile_from_csv(tmp_path):
-    text = "# measured on a machine\ntime_s,speed_rpm\n0,0\n140,0  # still\n145, 110\n1.5e2,-60.5\n"
+@pytest.mark.parametrize("head", ["time_s,speed_rpm", "time [s],speed [rpm]"])
+def test_profile_from_csv(tmp_path, head):
+    text = f"# measured on a machine\n{head}\n0,0\n140,0  # still\n145, 110\n1.5e2,-60.5\n"
     profile = from_text(tmp_path, text, "profile.csv")
     assert profile.time == (0.0, 140.0, 145.0, 150.0)
     assert np.array(profile.speed) / RPM == pytest.approx([0.0, 0.0, 110.0, -60.5])

@@ -2,6 +2,7 @@
 
 import io
 import itertools
+import re
 import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,9 @@ from wm_drake.parameters.units import LARGEST_NUMBER, comma_hint
 
 if TYPE_CHECKING:  # slow to import: CSV files
     import pandas as pd
+
+_BRACKETS = re.compile(r"\s*\[([^\[\]\s]+)\]$")
+"""Unit in brackets at the end of a column's name."""
 
 _SIGNS = "; columns are separated by commas, and the decimal sign is a point"
 
@@ -128,8 +132,13 @@ def _table(text: str, **options: Any) -> "pd.DataFrame":
         dtype=str,
         keep_default_na=False,
         **options,
-    )
+    ).rename(columns=_with_unit)
     return table.apply(lambda column: column.str.strip()) if len(table) else table
+
+
+def _with_unit(name: str) -> str:
+    """Return a column's name with its unit as our tables write it: `time_s` of `time [s]`."""
+    return _BRACKETS.sub(lambda match: f"_{match[1].replace('/', '_per_')}", name)
 
 
 def with_distinct_times(samples: FloatArray, where: str) -> FloatArray:

@@ -15,7 +15,7 @@ from wm_drake.errors import InputError, Problem, input_error, nearest_names
 from wm_drake.parameters.elements import CurveTable
 from wm_drake.parameters.machine import MachineParameters
 from wm_drake.parameters.problems import problems_of
-from wm_drake.parameters.units import Share, Unit
+from wm_drake.parameters.units import Fraction, Share, Unit
 
 Tree = typing.TypeVar("Tree", bound=BaseModel)
 
@@ -30,7 +30,7 @@ def with_value(parameters: Tree, key: str, value: Any) -> Tree:
             the machine file.
         value: SI number or text with a unit (``"5 N/mm"``); a mapping for a group of values; None
             removes an element, or sets a number to its default, as null in a machine file.
-            Percents scale the ordinates of a table (``"80 %"``).
+            Percents scale a number or the ordinates of a table (``"80 %"``).
 
     Raises:
         InputError: the key is unknown (the message names similar ones), or the value is not
@@ -131,15 +131,17 @@ class _Edit:
         """Key path of this place."""
         return ".".join(self.key.split(".")[: self.depth])
 
-    def applied(self, node: Any) -> Any:
-        """Return what the changes make of a value."""
+    def applied(self, node: Any, unit: Unit | None = None) -> Any:
+        """Return what the changes make of a value.
+
+        Args:
+            node: The value.
+            unit: Unit of its field, if it is one number. Percents of a share are a value.
+        """
         if self.whole:
             new = self.whole[0]
-            if isinstance(node, CurveTable) and isinstance(new, str) and new.strip().endswith("%"):
-                try:
-                    new = node.scaled(Share().number(new))
-                except ValueError as error:
-                    raise input_error(str(error), key=self.path) from None
+            if _is_number(node) and not isinstance(unit, Fraction):
+                new = self._percents_of(node, new)
             self.is_of_numbers = _is_number(new) and _is_number(node)
             node = new
             if not self.inside:
@@ -152,6 +154,16 @@ class _Edit:
             node = self._in_list(node)
         self.is_of_numbers = all(edit.is_of_numbers for edit in self.inside.values())
         return node
+
+    def _percents_of(self, node: Any, new: Any) -> Any:
+        """Return a number or table times a text such as "80 %"; any other new value as it is."""
+        if not isinstance(new, str) or not new.strip().endswith("%"):
+            return new
+        try:
+            factor = Share().number(new)
+        except ValueError as error:
+            raise input_error(str(error), key=self.path) from None
+        return node.scaled(factor) if isinstance(node, CurveTable) else factor * node
 
     def _in_list(self, node: Any) -> tuple[Any, ...]:
         key = next(iter(self.inside.values())).key
@@ -196,7 +208,8 @@ class _Edit:
                 )
             child = getattr(node, name)
             is_of_sdf = name in OF_SDF and not edit.whole
-            values[name] = edit._in_overrides(child) if is_of_sdf else edit.applied(child)
+            unit = unit_of(fields[name].annotation, fields[name].metadata)
+            values[name] = edit._in_overrides(child) if is_of_sdf else edit.applied(child, unit)
             if values[name] is None:
                 del values[name]
         if isinstance(node, MachineParameters) and all(
@@ -219,6 +232,10 @@ class _Edit:
         for name, edit in added.items():
             if edit.whole == [None]:
                 raise input_error(f"unknown key '{name}'{nearest_names(name, node)}", key=edit.key)
+            for key in edit.keys():
+                if is_index(key.rpartition(".")[2]):
+                    message = "only the SDF has this list; write all of it: '(1, 2, 3) mm'"
+                    raise input_error(message, key=key)
             del self.inside[name]
         entries = self.applied(node)
         self.is_of_numbers = self.is_of_numbers and not added

@@ -270,7 +270,7 @@ class MachineParameters(Frozen):
     model: str = "oscillating_group.sdf"
     gravity: Annotated[u.Acceleration, Field(ge=0.0)]
     step: Annotated[u.Duration, Field(gt=0.0)] = DEFAULT_STEP
-    accuracy: Annotated[u.Ratio, Field(gt=0.0, le=1.0)] = 0.005
+    accuracy: Annotated[float, u.Share(), Field(gt=0.0, le=1.0)] = 0.005
     output_period: Annotated[u.Duration, Field(gt=0.0)] = OUTPUT_PERIOD
     integrator: Integrator = "auto"
     drive: AnyDrive = Drive()

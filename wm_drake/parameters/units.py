@@ -506,6 +506,8 @@ def comma_hint(text: str) -> str:
 
 def _plain_number(value: Any, info: ValidationInfo, unit: Unit, *, is_list: bool = False) -> float:
     example, is_pure = unit.example(is_list=is_list), isinstance(unit, PureNumber)
+    if isinstance(value, str) and (is_pure or (is_list and not _BARE.fullmatch(value))):
+        return unit.number(value)  # an entry with a unit of its own
     if isinstance(value, str) and _BARE.fullmatch(value):
         raise ValueError(f"'{value}' has no unit; write for example '{example}'")
     if isinstance(value, bool) or not isinstance(value, int | float):

@@ -13,7 +13,7 @@ from wm_drake.errors import input_error
 from wm_drake.parameters.elements import CurveTable
 from wm_drake.parameters.keys import field_at, unit_of
 from wm_drake.parameters.machine import MachineParameters
-from wm_drake.parameters.units import Share, Unit
+from wm_drake.parameters.units import Fraction, Share, Unit
 
 Value: TypeAlias = float | CurveTable
 
@@ -156,7 +156,7 @@ def change_of(text: str, unit: Unit, key: str) -> tuple[Change, float]:
         if relative:
             distance = unit.number(relative[2]) if relative[2] else 0.0
             return Change.DISTANCE, -distance if relative[1] == "-" else distance
-        if text.endswith("%") and not isinstance(unit, Share):
+        if text.endswith("%") and not isinstance(unit, Fraction):
             return Change.PERCENT, Share().number(text)
         return Change.VALUE, unit.number(text)
     except ValueError as error:

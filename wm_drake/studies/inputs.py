@@ -55,7 +55,7 @@ def profile_of(parameters: "MachineParameters", path: Path | None) -> "SpinProfi
     """Return the spin profile of the option `--profile`; that of the machine without it."""
     if path is None:
         return parameters.profile
-    return runnable_profile(existing_file(path, "--profile"), parameters)
+    return runnable_profile(path, parameters)
 
 
 def runnable_profile(name_or_path: str | Path, parameters: "MachineParameters") -> "SpinProfile":
@@ -103,10 +103,11 @@ def with_sets(
     numbers may need each other. Of two values of one key the last one counts.
     """
     from wm_drake.parameters import with_values
+    from wm_drake.parameters.keys import is_index
 
     changes: dict[str, Any] = {}
     for name, text in pairs_of(sets, "--set"):
-        if _RELATIVE.match(text):
+        if _RELATIVE.match(text) or is_index(name.rpartition(".")[2]):
             parameters = _with_sdf_number(parameters, name)
         for key, value in _set(parameters, name, text).items():
             changes.pop(key, None)
@@ -151,7 +152,7 @@ def _value(text: str) -> str | None:
 
 
 def _with_sdf_number(parameters: Any, key: str) -> Any:
-    """Return a machine with the number of a key path that only its SDF may have."""
+    """Return a machine with the numbers at a key path that only its SDF may have."""
     from wm_drake.parameters import MachineParameters
 
     if not key.startswith(("bodies.", "frames.")) or not isinstance(parameters, MachineParameters):
