@@ -58,14 +58,6 @@ _HOMES = {
     "with_values": "parameters",
 }
 
-_FOR_EXTENSIONS = {
-    *("Element", "ElementKind", "Output", "State", "FmuOptions", "PageBlock", "Scene"),
-    *("register_block", "register_element", "register_measure", "register_study", "progress_bar"),
-    *("advance_to", "filtered_displacement", "natural_modes", "run_spin"),
-}
-"""Public names that `dir` leaves out: for those who extend the package or look inside a run. They
-stay in `__all__` and in the reference."""
-
 __all__ = sorted(_HOMES)
 
 
@@ -83,4 +75,4 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     special = {name for name in globals() if name.startswith("__")}
-    return sorted({*special, "__version__", *_HOMES} - _FOR_EXTENSIONS)
+    return sorted({*special, "__version__", *_HOMES})

@@ -119,12 +119,12 @@ class _Edit:
             edit = edit.inside[part]
         edit.whole, edit.inside = [value], {}
 
-    def keys(self) -> Iterator[str]:
+    def changed(self) -> Iterator[str]:
         """Yield the key paths of all changes."""
         if self.whole:
             yield self.path
         for edit in self.inside.values():
-            yield from edit.keys()
+            yield from edit.changed()
 
     @property
     def path(self) -> str:
@@ -220,7 +220,7 @@ class _Edit:
         try:
             return type(node).model_validate(values)
         except ValidationError as error:
-            keys = list(self.keys())
+            keys = list(self.changed())
             raise InputError(
                 _with_key_of_change(problem, keys)
                 for problem in problems_of(error, type(node), self.path)
@@ -232,7 +232,7 @@ class _Edit:
         for name, edit in added.items():
             if edit.whole == [None]:
                 raise input_error(f"unknown key '{name}'{nearest_names(name, node)}", key=edit.key)
-            for key in edit.keys():
+            for key in edit.changed():
                 if is_index(key.rpartition(".")[2]):
                     message = "only the SDF has this list; write all of it: '(1, 2, 3) mm'"
                     raise input_error(message, key=key)

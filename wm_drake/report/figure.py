@@ -308,6 +308,11 @@ class Figure:
     key_title: str = ""
     keys: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        """Return the number of panels and marks in one line."""
+        marks = sum(len(panel.marks) for panel in self.panels)
+        return f"<{type(self).__name__} of {len(self.panels)} panels with {marks} marks>"
+
 
 def in_grid(
     panels: Iterable[Panel | None],

@@ -20,7 +20,7 @@ from wm_drake.report.figure import Area, Bars, Cells, Figure, Line, Mark, Points
 DPI = 300
 """Resolution of a PNG, and of pixels in a PDF or SVG. [1/in]"""
 
-LONGEST_NAME = 60
+LONGEST_NAME = 200
 """Largest number of characters of the name of a file, without number and suffix."""
 
 LONGEST_PLAIN = 20_000
@@ -67,7 +67,8 @@ def write_figures(figures: list[tuple[Figure, str]], folder: Path) -> None:
         svg = re.sub(r"<!--.*?-->\n?", "", buffer.getvalue(), flags=re.DOTALL)
         (folder / f"{stem}.svg").write_text(svg, encoding="utf-8")
         metadata = {"CreationDate": None, "Producer": None, "Creator": None}
-        drawing.savefig(folder / f"{stem}.pdf", dpi=DPI, metadata=metadata)
+        with rc_context({"pdf.fonttype": 42}):  # TrueType: journals refuse Type 3
+            drawing.savefig(folder / f"{stem}.pdf", dpi=DPI, metadata=metadata)
         drawing.savefig(folder / f"{stem}.png", dpi=DPI, metadata={"Software": None})
         _write_data(figure_data(figure), folder / f"{stem}.csv")
 

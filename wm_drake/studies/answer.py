@@ -116,6 +116,11 @@ class Answer:
     live: str = ""
     units: str = field(default_factory=READING.get)
 
+    def __repr__(self) -> str:
+        """Return title, answer and names of the tables in three lines."""
+        names = ", ".join(self.labelled())
+        return f"<{type(self).__name__} '{self.title}'\n{self.answer}\ntables: {names}>"
+
     def labelled(self) -> dict[str, LabelledTable]:
         """Return the tables by name."""
         parts = (*self.parts, self.short) if self.short else self.parts
