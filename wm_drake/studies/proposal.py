@@ -15,6 +15,7 @@ of a part. Of each response the worst load counts. The rule:
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -168,6 +169,19 @@ def compared(values: xr.DataArray, goals: Mapping[str, Better]) -> xr.Dataset:
         responses["change"] = CHANGE.variable("response", change)
         responses["loss"] = CHANGE.named("loss").hidden("response", signs * change)
     return responses
+
+
+def command_text(begin: str, options: Any, *more: str) -> str:
+    """Return a command line with the changes of the machine and the profile of some options.
+
+    Args:
+        begin: What it begins with.
+        options: Options of a study of runs.
+        more: More options, before the profile.
+    """
+    sets = [f'--set "{text}"' for text in options.sets]
+    profile = [f"--profile {options.profile}"] if options.profile else []
+    return " ".join([begin, *sets, *more, *profile])
 
 
 def is_confirmed(aim: Aim, runs: xr.Dataset) -> bool:

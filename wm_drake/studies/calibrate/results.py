@@ -1,6 +1,7 @@
 """What a calibration found, as labelled datasets."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -9,6 +10,7 @@ from wm_drake.model.scene import Scene
 from wm_drake.parameters import MachineParameters, measured_amplitudes
 from wm_drake.parameters.measured import EXPERIMENT
 from wm_drake.parameters.units import Share
+from wm_drake.report.labelled import rows_of
 from wm_drake.report.quantity import CHANGE, SPEED, TIME, Quantity
 from wm_drake.simulation.measures import measure
 from wm_drake.simulation.records import Record
@@ -111,7 +113,7 @@ def responses_of(calibration: Calibration) -> xr.Dataset:
     solution, NaN for a response that was not used.
     """
     targets, solutions = calibration.targets.responses, calibration.solutions
-    columns = {
+    columns: dict[str, Any] = {
         "target": VALUE.named("target").variable("row", [t.value for t in targets]),
         "deviation": DIFFERENCE.named("deviation").variable("row", [t.deviation for t in targets]),
         "difference": DIFFERENCE.variable("row", solutions[0].response_errors),
@@ -127,9 +129,7 @@ def responses_of(calibration: Calibration) -> xr.Dataset:
         "unit": [target.unit_text for target in targets],
     }
     ranks = [f"solution_{number}" for number in range(1, len(solutions) + 1)]
-    return xr.Dataset(
-        columns, {name: ("row", texts) for name, texts in labels.items()} | {"solution": ranks}
-    )
+    return rows_of(labels, **columns).assign_coords(solution=ranks)
 
 
 def effects_of(calibration: Calibration) -> xr.DataArray:
@@ -175,7 +175,7 @@ def predictions_of(predictions: Sequence[Prediction]) -> xr.Dataset:
     """
     pairs = [(prediction, kind) for prediction in predictions for kind in prediction.kinds()]
     counts = [kind.predicted.size for _, kind in pairs]
-    columns = {"values": xr.Variable("row", counts, COUNT.attributes())}
+    columns: dict[str, Any] = {"values": xr.Variable("row", counts, COUNT.attributes())}
     for fit in FITS:
         sizes = np.reshape([sizes_of(getattr(kind, fit)) for _, kind in pairs], (-1, 2))
         for name, values in zip(("mean", "largest"), sizes.T, strict=True):
@@ -184,10 +184,10 @@ def predictions_of(predictions: Sequence[Prediction]) -> xr.Dataset:
     covered = [np.mean(kind.is_covered) for _, kind in pairs]
     columns["in_intervals"] = COVERED.variable("row", covered)
     labels = {
-        "held_out": ("row", [" ".join(prediction.loads) for prediction, _ in pairs]),
-        "what": ("row", [kind.name for _, kind in pairs]),
+        "held_out": [" ".join(prediction.loads) for prediction, _ in pairs],
+        "what": [kind.name for _, kind in pairs],
     }
-    return xr.Dataset(columns, labels)
+    return rows_of(labels, **columns)
 
 
 def intervals_of(calibration: Calibration, prediction: Prediction) -> xr.DataArray:

@@ -121,19 +121,29 @@ def regions_of(repeats: xr.Dataset, names: Sequence[str], quantity: str) -> xr.D
         band. Over region: `error`, [A] Eq. (9), with norms over the sensors.
     """
     rms = repeats.rms.sel(sensor=list(names)).mean("repeat")
-    measured, computed = (
-        rms.sel(source=source, drop=True).transpose("region", "sensor")
-        for source in rms.source.values
-    )
-    unit = QUANTITIES[quantity]
+    data = _by_source(rms, QUANTITIES[quantity], ("region", "sensor"))
+    error = relative_error(data["computed"].values, data["measured"].values)
     return xr.Dataset(
-        {
-            "measured": unit.named("measured").variable(("region", "sensor"), measured),
-            "computed": unit.named("computed").variable(("region", "sensor"), computed),
-            "error": ERROR.variable("region", relative_error(computed.values, measured.values)),
-        },
+        {**data, "error": ERROR.variable("region", error)},
         {"region": rms.region.values, "sensor": list(names)},
     )
+
+
+def _by_source(
+    values: xr.DataArray, quantity: Quantity, dims: tuple[str, str], more: str = ""
+) -> dict[str, xr.Variable]:
+    """Return values that were measured and computed.
+
+    Args:
+        values: Over `source` and the dimensions of the result.
+        more: Words behind those of the source.
+    """
+    return {
+        source: quantity.named(f"{source}{more}").variable(
+            dims, values.sel(source=source).transpose(*dims)
+        )
+        for source in values.source.values.tolist()
+    }
 
 
 def integrated_of(
@@ -159,12 +169,7 @@ def integrated_of(
     noise = np.array([sensors[name].noise for name in names])
     power = 2.0 * noise**2 * step
     deviation = np.sqrt(power * (low**-3 - high**-3) / (3.0 * (2.0 * np.pi) ** 4))
-    data = {
-        source: INTEGRATED.named(str(source)).variable(
-            ("region", "sensor"), rms.sel(source=source).transpose("region", "sensor")
-        )
-        for source in rms.source.values
-    }
+    data = _by_source(rms, INTEGRATED, ("region", "sensor"))
     data["deviation"] = INTEGRATED.named("of the noise alone").variable("sensor", deviation)
     return xr.Dataset(data, {"region": rms.region.values, "sensor": names})
 
@@ -172,12 +177,7 @@ def integrated_of(
 def orders_of(repeats: xr.Dataset, names: Sequence[str], quantity: str) -> xr.Dataset:
     """Return the largest sizes of orders over order and sensor: `measured` and `computed`."""
     sizes = repeats.orders.sel(sensor=list(names)).mean("repeat")
-    unit = QUANTITIES[quantity]
-    dims = ("order", "sensor")
-    data = {
-        source: unit.named(str(source)).variable(dims, sizes.sel(source=source).transpose(*dims))
-        for source in sizes.source.values
-    }
+    data = _by_source(sizes, QUANTITIES[quantity], ("order", "sensor"))
     return xr.Dataset(data, {"order": ORDER.variable("order", sizes.order), "sensor": list(names)})
 
 
@@ -188,13 +188,8 @@ def order_one_of(repeats: xr.Dataset, names: Sequence[str], quantity: str) -> xr
     the same for all sensors, is taken out. [rad]
     """
     sizes = repeats.order_one.sel(sensor=list(names)).mean("repeat")
-    dims, unit = ("place", "sensor"), QUANTITIES[quantity]
-    data = {
-        source: unit.named(f"{source}, order 1").variable(
-            dims, sizes.sel(source=source).transpose(*dims)
-        )
-        for source in sizes.source.values
-    }
+    dims = ("place", "sensor")
+    data = _by_source(sizes, QUANTITIES[quantity], dims, ", order 1")
     phase = repeats.phase.sel(sensor=list(names)).mean("repeat").transpose(*dims)
     data["phase"] = PHASE.variable(dims, np.angle(phase))
     return xr.Dataset(data, {"place": repeats.place.variable, "sensor": list(names)})

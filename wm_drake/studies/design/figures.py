@@ -4,6 +4,7 @@
 """
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -46,40 +47,27 @@ def front_figure(designs: MachineDesigns, front: xr.Dataset) -> fig.Figure:
         front: Front with at least one design and two objectives.
     """
     numbers = sorted(set(chosen_designs(designs, front).values()))
-    picked = first_picked(designs, front)
-    of_chosen, of_picked = front.sel(design=numbers), front.sel(design=[picked])
+    machine = {"symbol": "cross-thin", "color": fig.MARK, "size": 15.0, "key": "the machine itself"}
+    picked = {"is_open": True, "color": fig.MEASURED, "size": 15.0, "key": PICKED}
+    layers: tuple[tuple[xr.Dataset, str, dict[str, Any]], ...] = (
+        (front, "", {"key": DESIGNS}),
+        (
+            front.sel(design=numbers),
+            "",
+            {"symbol": "diamond", "size": 11.0, "key": "chosen designs"},
+        ),
+        (front.expand_dims("machine"), "nominal_", machine),
+        (front.sel(design=[first_picked(designs, front)]), "", picked),
+    )
     panels = []
     for pair in pairs_of(designs):
-        goals = [designs.objectives[index] for index in pair]
-        (x, y), chosen, one, machine = (
-            [shown(data[f"{prefix}{goal.name}"]) for goal in goals]
-            for data, prefix in (
-                (front, ""),
-                (of_chosen, ""),
-                (of_picked, ""),
-                (front, "nominal_"),
-            )
-        )
-        marks: tuple[fig.Mark, ...] = (
-            fig.Points(x, y, key=DESIGNS),
-            fig.Points(*chosen, symbol="diamond", size=11.0, key="chosen designs"),
-            fig.Points(
-                *map(np.atleast_1d, machine),
-                symbol="cross-thin",
-                color=fig.MARK,
-                size=15.0,
-                key="the machine itself",
-            ),
-            fig.Points(
-                *one,
-                is_open=True,
-                color=fig.MEASURED,
-                size=15.0,
-                key=PICKED,
-            ),
-        )
-        across, up = (fig.Axis(label=goal.quantity.label) for goal in goals)
-        panels.append(fig.Panel(marks=marks, x=across, y=up))
+        x, y = (designs.objectives[index] for index in pair)
+        marks: list[fig.Mark] = []
+        for data, begin, style in layers:
+            drawn = {f"{begin}{y.name}": style}
+            marks += chart.marks_of(data, f"{begin}{x.name}", drawn, kind=fig.Points)
+        across, up = (chart.axis(goal.quantity) for goal in (x, y))
+        panels.append(fig.Panel(marks=tuple(marks), x=across, y=up))
     return fig.Figure(panels=fig.in_grid(panels, len(panels)), height=330.0)
 
 

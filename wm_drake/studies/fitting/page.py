@@ -7,9 +7,10 @@ import numpy as np
 import xarray as xr
 
 from wm_drake.parameters.units import Unit
-from wm_drake.report.figure import Axis, Figure, Line, Panel
+from wm_drake.report.chart import panel
+from wm_drake.report.figure import Figure
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import Quantity, shown
+from wm_drake.report.quantity import Quantity
 from wm_drake.studies.answer import Part, Plot
 from wm_drake.studies.fitting.fit import Estimate, Fit
 
@@ -124,10 +125,12 @@ def _history(fit: Fit, error: Quantity) -> tuple[Plot, LabelledTable]:
     history = xr.Dataset(
         {"least_rmse": least.variable("round", fit.log.history)}, {"round": rounds}
     )
-    curve = Line(rounds, np.maximum(shown(history.least_rmse), 1e-300), symbol="circle", size=5.0)
-    x, y = Axis(label="round of the search"), Axis(label=least.label, is_log=True)
+    x, y = {"label": "round of the search"}, {"is_log": True}
+    # a logarithm has no 0
+    above = history.clip(min=least.reading.to_si(1e-300), keep_attrs=True)
+    curve = panel(above, "round", ["least_rmse"], x=x, y=y, symbol="circle", size=5.0)
     plot = Plot(
-        Figure(panels=(Panel(marks=(curve,), x=x, y=y),), height=180.0),
+        Figure(panels=(curve,), height=180.0),
         "Smallest RMSE after each round of the search.",
         "Smallest RMSE that was found up to the end of each round of the search.",
     )

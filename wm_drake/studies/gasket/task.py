@@ -37,7 +37,13 @@ from wm_drake.studies.gasket.study import DEFAULT_LEVELS, GasketTrials, run_leve
 from wm_drake.studies.gasket.surface import Setting, models_of, run_settings
 from wm_drake.studies.gasket.words import Words
 from wm_drake.studies.inputs import existing_file, pairs_of, selected_cases
-from wm_drake.studies.proposal import AFTER, compared, is_confirmed, proposal_of
+from wm_drake.studies.proposal import (
+    AFTER,
+    command_text,
+    compared,
+    is_confirmed,
+    proposal_of,
+)
 from wm_drake.studies.run import machine_text
 from wm_drake.studies.study import Task
 from wm_drake.studies.vary import in_vary_file, varying_of
@@ -156,15 +162,12 @@ class GasketTask(Task):
 
     def _command(self, sets: Sequence[Mapping[str, str]]) -> str:
         """Return the command that runs changes, each the values of `--set`; "" if there is none."""
-        options = self.options
+        machine = self.options.machine
         if not sets or not all(sets):
             return ""
-        texts = [f"{name}={text}" for of_factor in sets for name, text in of_factor.items()]
-        words = ["wm-drake spin"]
-        words += [f"--machine {options.machine}"] if options.machine != "reference" else []
-        words += [f'--set "{text}"' for text in (*options.sets, *texts)]
-        words += [f"--profile {options.profile}"] if options.profile else []
-        return " ".join(words)
+        each = (pair for of_factor in sets for pair in of_factor.items())
+        begin = "wm-drake spin" if machine == "reference" else f"wm-drake spin --machine {machine}"
+        return command_text(begin, self.options, *(f'--set "{n}={text}"' for n, text in each))
 
 
 def _change_text(factor: Varied, text: str) -> str:

@@ -28,12 +28,10 @@ from wm_drake.studies.gasket_curves.study import (
     curves_data,
     values_data,
 )
-from wm_drake.studies.rig.quantities import LINEAR, loop_quantities
+from wm_drake.studies.rig.quantities import LINEAR, PREFIXES, loop_quantities
 
 PLACE = LINEAR["displacement"]
 LARGEST_STRETCH = Quantity("largest stretch", decimals=2)
-PREFIXES = {False: "", True: "rotational_"}
-"""Beginning of the names of tables, by whether their curves are about an axis."""
 
 METHOD = (
     "Finite elements of the rubber in large deformation, nearly incompressible. The rim at the "

@@ -6,15 +6,16 @@ from dataclasses import replace
 import xarray as xr
 
 from wm_drake.parameters import MeasuredLoop
-from wm_drake.report.figure import MEASURED, QUIET, Figure, Line, Mark, Panel, in_grid
+from wm_drake.report.chart import marks_of
+from wm_drake.report.figure import MEASURED, OURS, QUIET, Figure, Line, Mark, Panel, in_grid
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import SHARE, hidden, quantity_of, shown, text_of
+from wm_drake.report.quantity import SHARE, hidden, quantity_of, text_of
 from wm_drake.rigs import AXES
 from wm_drake.studies.answer import Answer, Part, Plot
 from wm_drake.studies.identify.fragment import Destination, table_entry, written_fragment
 from wm_drake.studies.identify.static import NOMINAL, field_of, is_about, table_of_curve
 from wm_drake.studies.rig.figures import loop_panel
-from wm_drake.studies.rig.quantities import loop_quantities
+from wm_drake.studies.rig.quantities import PREFIXES, loop_quantities
 
 StaticTests = Mapping[tuple[str, ...], Sequence[MeasuredLoop]]
 """Tests of an axis, by all axes that get its table."""
@@ -26,9 +27,6 @@ METHOD = (
     "taken off. The mean curve is shifted to zero force at zero displacement, the rest position of "
     "the component."
 )
-PREFIXES = {False: "", True: "rotational_"}
-"""Beginning of the names of tables, by whether their curves are about an axis."""
-
 
 NOTICED = 0.02
 """Part of the largest force above which a fall of the mean is told."""
@@ -138,12 +136,9 @@ def _panel(curve: xr.Dataset, loops: Sequence[MeasuredLoop]) -> Panel:
         replace(faint, x=motion.values(loop.displacement), y=load.values(loop.force - offset))
         for loop in loops
     ]
-    x = shown(curve.position)
-    marks += [
-        Line(x, shown(branch), color=MEASURED, width=1.8, key="loading and unloading")
-        for branch in (curve.loading, curve.unloading)
-    ]
-    marks.append(Line(x, shown(curve["mean"]), width=2.4, key="mean (table)"))
+    branch = {"color": MEASURED, "width": 1.8, "key": "loading and unloading"}
+    mean = {"color": OURS, "width": 2.4, "key": "mean (table)"}
+    marks += marks_of(curve, "position", {"loading": branch, "unloading": branch, "mean": mean})
     return loop_panel(_name(curve), marks, motion.label, load.label)
 
 

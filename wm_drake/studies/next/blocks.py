@@ -16,10 +16,9 @@ if TYPE_CHECKING:
 
 def _of_verdict(task: "VerdictTask") -> Extend:
     """Return the block of a machine that is known from drawings and catalogues."""
-    options = task.options
-    sets = [f'--set "{text}"' for text in options.sets]
-    profile = [f"--profile {options.profile}"] if options.profile else []
-    command = " ".join(["wm-drake study next", options.machine, *sets, *profile])
+    from wm_drake.studies.proposal import command_text
+
+    command = command_text(f"wm-drake study next {task.options.machine}", task.options)
 
     def known() -> "Knowledge":
         from wm_drake.studies.next.knowledge import of_file

@@ -20,6 +20,9 @@ ANGULAR = {
     "stiffness": Quantity("dynamic stiffness", Unit("N*m/rad", "N*m/rad"), 2),
 }
 
+PREFIXES = {False: "", True: "rotational_"}
+"""Beginning of the names of tables, by whether their curves are about an axis."""
+
 
 def loop_quantities(rotates: bool) -> Mapping[str, Quantity]:
     """Return the quantities of a loop by name; `rotates`: whether its motion is an angle."""

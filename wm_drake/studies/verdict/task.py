@@ -15,6 +15,7 @@ from wm_drake.studies.answer import Answer
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.inputs import profile_of, selected_cases
+from wm_drake.studies.proposal import command_text
 from wm_drake.studies.study import Task
 from wm_drake.studies.tolerance.options import ToleranceOptions
 from wm_drake.studies.tolerance.study import CONTACTS, laundry_masses
@@ -65,10 +66,8 @@ class VerdictTask(Task):
     def _command(self) -> str:
         """Return the command of this verdict, without sizes."""
         options = self.options
-        words = ["wm-drake verdict", options.machine, *(f'--set "{text}"' for text in options.sets)]
-        words += [f"--clearance '{options.clearance}'"] if self.clearance else []
-        words += [f"--profile {options.profile}"] if options.profile else []
-        return " ".join(words)
+        more = [f"--clearance '{options.clearance}'"] if self.clearance else []
+        return command_text(f"wm-drake verdict {options.machine}", options, *more)
 
     def _laundry(self, machine: Machine) -> ToleranceTask:
         """Return the tolerance study of a machine, without what a verdict does not show."""
