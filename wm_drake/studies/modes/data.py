@@ -12,7 +12,6 @@ from wm_drake.report.labelled import rows_of
 from wm_drake.report.quantity import SPEED, Quantity
 from wm_drake.studies.modes import quantities as q
 from wm_drake.studies.modes.linearisation import SLIDING, STUCK
-from wm_drake.studies.modes.sensitivity import Sensitivity
 from wm_drake.studies.modes.shapes import Mode, Nearness, parts
 
 RAD, M = Unit("rad", "rad"), Unit("m", "m")
@@ -86,33 +85,25 @@ def over_speed(diagrams: Mapping[str, xr.Dataset]) -> xr.Dataset:
 
 
 def of_numbers(
-    sensitivities: Mapping[str, Sequence[Sensitivity]], modes: Mapping[str, Sequence[Mode]]
+    sensitivities: Mapping[str, xr.Dataset], modes: Mapping[str, Sequence[Mode]]
 ) -> xr.Dataset:
-    """Return the sensitivity of each mode to each number of the machine file, a row each."""
-    rows = [
-        (name, mode.name, entry, index)
-        for name, entries in sensitivities.items()
-        for entry in entries
-        for index, mode in enumerate(modes[name])
+    """Return the sensitivity of each mode to each number of the machine file, a row each.
+
+    Args:
+        sensitivities: Of each linearisation.
+        modes: Of each linearisation.
+    """
+    every = [
+        one.assign_coords(mode=[mode.name for mode in modes[name]]).stack(
+            row=("key", "mode"), create_index=False
+        )
+        for name, one in sensitivities.items()
     ]
-    per = [entry.unit.shown if entry.per_unit else RELATIVE for _, _, entry, _ in rows]
-    frequency = [entry.frequency[index] for _, _, entry, index in rows]
-    damping = [entry.damping[index] for _, _, entry, index in rows]
-    labels = {
-        "linearisation": [name for name, *_ in rows],
-        "mode": [name for _, name, *_ in rows],
-        "key": [entry.key for _, _, entry, _ in rows],
-        "per": per,
-    }
-    return rows_of(
-        labels,
-        relative_change_of_frequency=q.FREQUENCY_CHANGE.variable("row", frequency),
-        change_of_damping_ratio=q.DAMPING_CHANGE.variable("row", damping),
-    )
-
-
-RELATIVE = "relative change"
-"""What the sensitivity to a number that is not zero is divided by."""
+    rows = xr.concat(every, "row")
+    names = np.repeat(list(sensitivities), [one.sizes["row"] for one in every])
+    labels = {"linearisation": names, **{n: rows[n].values for n in ("mode", "key", "per")}}
+    changes = ("relative_change_of_frequency", "change_of_damping_ratio")
+    return rows_of(labels, **{name: rows[name].variable for name in changes})
 
 
 def of_gaps(gaps: Mapping[str, Nearness]) -> xr.Dataset:

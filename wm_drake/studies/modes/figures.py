@@ -14,7 +14,6 @@ from wm_drake.report import chart
 from wm_drake.report import figure as fig
 from wm_drake.report.quantity import SPEED, quantity_of, shown
 from wm_drake.simulation.outputs import point_positions
-from wm_drake.studies.modes.data import RELATIVE
 from wm_drake.studies.modes.linearisation import SLIDING, STUCK
 from wm_drake.studies.modes.quantities import (
     AMPLITUDE,
@@ -22,6 +21,7 @@ from wm_drake.studies.modes.quantities import (
     FREQUENCY,
     without_rounding,
 )
+from wm_drake.studies.modes.sensitivity import RELATIVE
 from wm_drake.studies.modes.shapes import Mode
 from wm_drake.studies.modes.study import ORDERS, MachineModes
 

@@ -9,17 +9,17 @@ preloads and rest pose follow.
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
+import xarray as xr
 
 from wm_drake.errors import InputError
 from wm_drake.parameters import Change, MachineParameters, with_value
 from wm_drake.parameters.keys import quantities
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Unit
 from wm_drake.parameters.variation import Number
 from wm_drake.studies.modes.linearisation import Spectrum
+from wm_drake.studies.modes.quantities import DAMPING_CHANGE, FREQUENCY_CHANGE
 
 RELATIVE_STEP = 1e-3
 """Half of the central difference, as part of the number."""
@@ -31,27 +31,8 @@ SKIPPED = ("profile", "step", "sensors", "measured")
 """Groups of numbers that no linearisation depends on."""
 
 
-@dataclass(frozen=True)
-class Sensitivity:
-    """Derivatives of the modes by one number of the machine file.
-
-    A table counts as one number: a factor of all its values.
-
-    Attributes:
-        key: Key path.
-        value: The number; NaN for a table. SI
-        frequency: Relative change of each frequency over the relative change of the number; per
-            display unit if the number is zero. (m,)
-        damping: Change of each damping ratio, likewise. (m,)
-        per_unit: Whether the number is zero.
-    """
-
-    key: str
-    value: float
-    unit: Unit
-    frequency: FloatArray
-    damping: FloatArray
-    per_unit: bool
+RELATIVE = "relative change"
+"""What the sensitivity to a number that is not zero is divided by."""
 
 
 def sensitivities(
@@ -60,14 +41,22 @@ def sensitivities(
     matrix_of: Callable[[MachineParameters], FloatArray],
     loads: bool,
     progress: Callable[[], None] = lambda: None,
-) -> list[Sensitivity]:
+) -> xr.Dataset:
     """Return the sensitivity of modes to every number, without those that cannot be changed.
+
+    A table counts as one number: a factor of all its values.
 
     Args:
         matrix_of: Returns the matrix of a machine with a number changed.
         loads: Whether the matrix depends on a load.
+
+    Returns:
+        Over `key`, the key path of the number, and mode: `relative_change_of_frequency` over the
+        relative change of the number, and `change_of_damping_ratio` likewise. A number that is zero
+        has no relative change: the display unit that they are divided by is in `per`, which else is
+        `RELATIVE`.
     """
-    sensitive = []
+    every = list[tuple[str, str, FloatArray, FloatArray]]()
     for number in numbers_of(parameters, loads):
         slope = _slope(parameters, number, matrix_of)
         progress()
@@ -77,11 +66,18 @@ def sensitivities(
         size = np.abs(spectrum.values)
         relative = np.real(np.conj(spectrum.values) * change) / size**2
         damping = -change.real / size + spectrum.values.real * relative / size
-        value = np.nan if isinstance(number.original, tuple) else float(number.nominal or 0.0)
-        sensitive.append(
-            Sensitivity(number.key, value, number.unit, relative, damping, per_unit=value == 0.0)
-        )
-    return sensitive
+        is_zero = not isinstance(number.original, tuple) and not number.nominal
+        per = number.unit.shown if is_zero else RELATIVE
+        every.append((number.key, per, relative, damping))
+    keys, units, frequency, damping = zip(*every, strict=True)
+    return xr.Dataset(
+        {
+            "relative_change_of_frequency": FREQUENCY_CHANGE.variable(("key", "mode"), frequency),
+            "change_of_damping_ratio": DAMPING_CHANGE.variable(("key", "mode"), damping),
+            "per": ("key", list(units)),
+        },
+        {"key": list(keys)},
+    )
 
 
 def numbers_of(parameters: MachineParameters, loads: bool) -> Iterator[Number]:

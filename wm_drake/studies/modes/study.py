@@ -27,7 +27,7 @@ from wm_drake.studies.modes.linearisation import (
     check_fixed_cabinet,
 )
 from wm_drake.studies.modes.quantities import AMPLITUDE, DAMPING, FREQUENCY
-from wm_drake.studies.modes.sensitivity import Sensitivity, numbers_of, sensitivities
+from wm_drake.studies.modes.sensitivity import numbers_of, sensitivities
 from wm_drake.studies.modes.shapes import Mode, modes_of, names_at_speed
 from wm_drake.studies.threads import on_one_thread
 
@@ -261,7 +261,7 @@ def _sensitivities(
     gasket: bool,
     spectra: dict[str, Spectrum],
     progress: Callable[[float], None],
-) -> dict[str, list[Sensitivity]]:
+) -> dict[str, xr.Dataset]:
     context = machine.diagram.CreateDefaultContext()
     loaded = load is not None
     count = 2 * sum(1 for _ in numbers_of(machine.parameters, loaded))
