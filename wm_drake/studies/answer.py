@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import pandas as pd
-import xarray as xr
 
 from wm_drake.errors import check_known
 from wm_drake.parameters import MachineParameters
@@ -274,12 +273,6 @@ def pictures_first(parts: Sequence[Part]) -> tuple[Part, ...]:
         else:
             others.append(part)
     return (*pictures, *others)
-
-
-def diverged_runs(runs: xr.Dataset) -> tuple[str, ...]:
-    """Return a line for each run of a table of runs that diverged."""
-    texts = zip(runs.case.values, runs.diverged.values, strict=True)
-    return tuple(f"{case}: {text}" for case, text in texts if text)
 
 
 def _section(part: Part) -> Any:

@@ -13,7 +13,7 @@ from wm_drake.report.quantity import SHARE, Quantity, text_of
 from wm_drake.simulation.feet import MARGINS
 from wm_drake.simulation.spring_tension import slack_springs
 from wm_drake.simulation.vibration import MOST_MISSING
-from wm_drake.studies.answer import diverged_runs
+from wm_drake.studies.experiment import failures
 from wm_drake.studies.spin.study import gap_size
 from wm_drake.studies.spin_cycle.study import (
     ERROR,
@@ -92,7 +92,7 @@ def warnings_of(parameters: MachineParameters, data: xr.Dataset, period: str) ->
     """
     texts = [
         f"Case {text}. Regions that this run did not complete have no values."
-        for text in diverged_runs(data)
+        for text in failures(data)
     ]
     texts += missing_warnings(compared_of(data), data.measured) if "measured" in data else []
     touching = data.case.values[data.smallest_gap.values <= 0.0].tolist()

@@ -10,7 +10,8 @@ from wm_drake.parameters import MachineParameters, SpinProfile
 from wm_drake.parameters.unbalance_cases import UnbalanceCase
 from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.quantity import STEP
-from wm_drake.studies.answer import Answer, Part, Plot, diverged_runs
+from wm_drake.studies.answer import Answer, Part, Plot
+from wm_drake.studies.experiment import failures
 from wm_drake.studies.spin_cycle.figures import bars_figure, heat_map_figure, profile_figure
 from wm_drake.studies.spin_cycle.findings import case_description, summary, warnings_of
 from wm_drake.studies.spin_cycle.measured import DIMS
@@ -72,7 +73,7 @@ def spin_cycle_answer(
             ),
         ),
         warned=tuple(warnings_of(parameters, data, period)),
-        diverged=diverged_runs(data),
+        diverged=failures(data),
     )
 
 
