@@ -100,8 +100,11 @@ def of_numbers(
         for name, one in sensitivities.items()
     ]
     rows = xr.concat(every, "row")
-    names = np.repeat(list(sensitivities), [one.sizes["row"] for one in every])
-    labels = {"linearisation": names, **{n: rows[n].values for n in ("mode", "key", "per")}}
+    counts = [one.sizes["row"] for one in every]
+    labels = {
+        "linearisation": np.repeat(list(sensitivities), counts).tolist(),
+        **{name: rows[name].values.tolist() for name in ("mode", "key", "per")},
+    }
     changes = ("relative_change_of_frequency", "change_of_damping_ratio")
     return rows_of(labels, **{name: rows[name].variable for name in changes})
 
