@@ -239,7 +239,22 @@ def _lines_of_tables(
     rows = (
         ("2", "damper", "", "damper", largest_force(machine, "damper", "", "damper"), "damper"),
         ("4", "bushing", "radial", "bushing, radial", axial, "bushing --axis x"),
-        ("4", "bushing", "axial", "bushing, axial", axial, "bushing --axis y"),
+        (
+            "4",
+            "bushing",
+            "axial",
+            "bushing, axial, 0.8 mm as in Fig. 16",
+            axial,
+            "bushing --axis y",
+        ),
+        (
+            "4",
+            "bushing",
+            "axial",
+            "bushing, axial, 0.4 mm as in the table",
+            largest_force(machine, "bushing", "y", "bushing"),
+            "bushing --axis y",
+        ),
         ("5", "bushing", "rotational", shipped, tilt, "bushing --axis about_x"),
         ("5", "bushing", "rotational", reading, tilt_of_other, "bushing --axis about_x"),
         ("7", "gasket", "radial", "gasket, radial", radial, "gasket --axis x"),
