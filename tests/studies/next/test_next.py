@@ -12,6 +12,7 @@ from wm_drake.parameters import load_machine
 from wm_drake.parameters.candidates import load_candidates
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.measures.responses import Response
+from wm_drake.studies.next.knowledge import of_calibration_folder
 from wm_drake.studies.next.measurements import CandidateMeasurement, measurements_of
 from wm_drake.studies.next.question import Observed, Question
 from wm_drake.studies.next.study import (
@@ -207,3 +208,28 @@ def test_candidates_add_loads_and_sensors_to_the_machine(tmp_path):
     taken = file.model_copy(update={"loads": {"middle": file.loads["test_mass"]}})
     with pytest.raises(InputError, match=r"loads\.middle: is in the machine already"):
         with_candidates(reference, taken)
+
+
+def test_a_calibration_to_records_is_known_without_its_recorder(tmp_path):
+    """Of a normal distribution of three, two have their part of the covariance."""
+    force, mass = "damper_types.friction.friction_force", "bodies.motor.mass"
+    vary = tmp_path / "vary.yaml"
+    vary.write_text(
+        f"vary:\n  {force}: {{low: 10 N, high: 70 N, mean: 40 N, deviation: 4 N}}\n"
+        f"  {mass}: {{low: 1 kg, high: 11 kg, mean: 6 kg, deviation: 1 kg}}\n"
+    )
+    (tmp_path / "estimates.csv").write_text(
+        f"unknown,unit,value,deviation\ngain of S1,,1.01,0.01\n{force},N,42,2\n{mass},kg,6,0.5\n"
+    )
+    (tmp_path / "correlations.csv").write_text(
+        f"unknown,gain of S1,{force},{mass}\n"
+        f"gain of S1,1,0.3,0.2\n{force},0.3,1,0.5\n{mass},0.2,0.5,1\n"
+    )
+    machine = build_machine(load_machine("reference"))
+    knowledge = of_calibration_folder(machine, str(vary), tmp_path)
+    assert set(knowledge.names) == {force, mass}
+    values = knowledge.values(np.random.default_rng(1).standard_normal((20000, 2)))
+    at = [knowledge.names.index(name) for name in (force, mass)]
+    assert values.mean(axis=0)[at] == pytest.approx([42.0, 6.0], rel=0.01)
+    assert values.std(axis=0)[at] == pytest.approx([2.0, 0.5], rel=0.02)
+    assert np.corrcoef(values.T)[0, 1] == pytest.approx(0.5, abs=0.02)

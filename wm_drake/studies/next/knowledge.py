@@ -94,7 +94,10 @@ def of_calibration(
 
 
 def of_calibration_folder(machine: Machine, name: str, folder: Path) -> Knowledge:
-    """Return what the results of `wm-drake calibrate` in a folder say.
+    """Return what the results of `wm-drake calibrate` in a folder say of the machine.
+
+    A fit to records also has unknowns of the recorder. The distribution of the others alone is the
+    normal one with their part of the covariance.
 
     Args:
         name: Name or path of the vary file of the calibration.
@@ -107,12 +110,15 @@ def of_calibration_folder(machine: Machine, name: str, folder: Path) -> Knowledg
     estimates, of_pairs = (folder / f"{name}.csv" for name in ("estimates", "correlations"))
     with problems_at("--calibrated"):
         table = read_csv(estimates, read_header(existing_file(estimates, "")))
-        columns = {"unknown", "value", "deviation"}
-        if not columns <= set(table) or table["unknown"].tolist() != parameters.names:
+        columns, names = {"unknown", "value", "deviation"}, parameters.names
+        found = table["unknown"].tolist() if columns <= set(table) else []
+        if not set(names) <= set(found):
             raise input_error(
                 f"'{folder}' does not have the quantities of {path.name}; allowed is the folder of "
                 "a calibration with this file"
             )
+        rows = [found.index(name) for name in names]
+        table = table.iloc[rows]
         labels = [unknown.unit.label for unknown in parameters.unknowns]
         if "unit" in table and table["unit"].fillna("").tolist() != labels:
             raise input_error(
@@ -120,8 +126,8 @@ def of_calibration_folder(machine: Machine, name: str, folder: Path) -> Knowledg
                 "of a calibration with --units si"
             )
         numbers = finite_numbers(table[["value", "deviation"]], estimates)
-        pairs = read_csv(existing_file(of_pairs, ""), ["unknown", *parameters.names])
-        correlation = finite_numbers(pairs[parameters.names], of_pairs)
+        pairs = read_csv(existing_file(of_pairs, ""), ["unknown", *found])
+        correlation = finite_numbers(pairs[names], of_pairs)[rows]
     units = np.array([unknown.unit.from_si(1.0) for unknown in parameters.unknowns])
     point, deviation = (column / units for column in numbers.T)
     covariance = correlation * np.outer(deviation, deviation)
