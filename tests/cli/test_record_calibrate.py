@@ -18,6 +18,7 @@ from wm_drake.simulation.cases import Case
 from wm_drake.simulation.recorded_signal import recorded_signal
 from wm_drake.simulation.runs import simulate
 from wm_drake.studies.calibrate.records import RecordModel, turned_load
+from wm_drake.studies.next.knowledge import of_calibration_folder
 
 SENSORS = ("S1_x", "S1_z", "S3_x", "S3_z")
 FRICTION = "damper_types.friction.friction_force"
@@ -95,6 +96,10 @@ def test_a_planted_friction_is_found(calibrate, by):
     for name, sensor in test.sensors.items():  # gains and tilts that were planted, as found
         assert sensor.gain == pytest.approx(1.0, abs=4.0 * GAIN)
         assert np.abs(sensor.tilt).max() < 4.0 * TILT, name
+    machine = build_machine(load_machine("reference"))
+    knowledge = of_calibration_folder(machine, "out/calibrated_vary.yaml", Path("out"))
+    assert list(knowledge.names) == [FRICTION]
+    assert knowledge.values(np.zeros((1, 1))).item() == pytest.approx(found["value"], rel=1e-5)
 
 
 SOON = ("springs", "envelope")

@@ -1,6 +1,7 @@
-"""Write what a fit to records found of sensors, loads and clocks, as the test of the next one."""
+"""Write what a fit to records found, as test and vary file of the next one."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -11,6 +12,34 @@ from wm_drake.parameters.recorded_sensors import RecordedSensor, RecordedTest
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.calibrate.records import RecordModel
 from wm_drake.studies.fitting.fit import Fit
+from wm_drake.studies.fitting.free_numbers import FreeNumbers
+
+FOUND = ("low", "high", "mean", "deviation")
+"""Values of an entry of a vary file that a fit gives."""
+
+
+def found_text(free: FreeNumbers, fit: Fit, source: str) -> str:
+    """Return the numbers of the machine that a fit determined, as the text of a vary file.
+
+    Value and standard deviation are the prior of the next fit, to other records.
+
+    Args:
+        free: The numbers, which are the first unknowns of the fit.
+        source: Where the values come from.
+    """
+    deviations, entries = np.sqrt(np.diag(fit.covariance)), {}
+    for varied, estimate, deviation in zip(
+        free.varying.every, fit.estimates, deviations.tolist(), strict=False
+    ):
+        if not (estimate.determined and np.isfinite(deviation)):
+            continue
+        at = {**varied.at, "mean": estimate.value, "deviation": deviation}
+        found = replace(varied, at=at)
+        entry = varied.entry.model_dump(mode="json", include={"keys", "sets", "about"})
+        texts = {name: found.reading(name) for name in FOUND}
+        entries[varied.name] = {key: each for key, each in entry.items() if each} | texts
+        entries[varied.name]["source"] = source
+    return yaml_text({"vary": entries})
 
 
 def calibrated_test(model: RecordModel, fit: Fit, test: RecordedTest) -> RecordedTest:
