@@ -132,7 +132,8 @@ def free_number(parameters: MachineParameters, name: str, entry: Entry) -> tuple
     value = at.get("mean", first.nominal)
     if "low" not in at or "high" not in at:
         if value is None or value <= 0.0:
-            message = "is not positive, so its range must be given; write KEY=LOW..HIGH"
+            why = "is in the SDF only" if value is None else "is not positive"
+            message = f"{why}, so its range must be given; write NAME=LOW..HIGH"
             raise input_error(message, key=first.key)
         at = {"low": value / SPAN, "high": value * SPAN} | at
     for number in numbers:  # the search may go to either end
