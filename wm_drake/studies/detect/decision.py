@@ -46,14 +46,10 @@ class Verdict:
     refused: SampleShare
     touches: SampleShare | None
 
-    def distributions(self) -> tuple[float, float, float]:
-        """Return the expected number of distributions, and the ends of its 95 % interval.
-
-        Each one draws the laundry anew, so the number is geometric: 1 over the share that spins.
-        """
-        ends = (self.spins.estimate, self.spins.upper, self.spins.lower)
-        best, low, high = (1.0 / share if share else np.inf for share in ends)
-        return best, low, high
+    @property
+    def distributions(self) -> float:
+        """Return the expected number of distributions: each one draws the laundry anew."""
+        return 1.0 / self.spins.estimate if self.spins.count else np.inf
 
 
 def verdict_of(score: FloatArray, touches: NDArray[np.bool_], threshold: float) -> Verdict:
@@ -132,7 +128,7 @@ def table_of(
             values = [np.nan if s is None else getattr(s, end) for s in shares]
             key = name if end == "estimate" else f"{name}_{end}"
             columns[key] = OF_LOADS.named(more).variable("threshold", values)
-    expected = np.array([verdict.distributions()[0] for verdict in verdicts])
+    expected = np.array([verdict.distributions for verdict in verdicts])
     columns["distributions"] = DISTRIBUTIONS.variable("threshold", expected)
     columns["minutes"] = MINUTES.variable("threshold", expected * retry / 60.0)
     return xr.Dataset(columns, {"threshold": quantity.variable("threshold", thresholds)})

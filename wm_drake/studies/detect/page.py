@@ -145,14 +145,14 @@ def _of_round(share: float) -> str:
 
 def _short(question: RiskQuestion, draws: Draws, verdict: Verdict, ranking: xr.Dataset) -> Part:
     """Return the part in short."""
-    distributions = verdict.distributions()
+    distributions = verdict.distributions
     without = draws.touches[~draws.is_fitted].mean()
     rows = [
         (
             "Cost",
-            f"{DISTRIBUTIONS.number(distributions[0])} distributions of "
+            f"{DISTRIBUTIONS.number(distributions)} distributions of "
             f"{TIME.named('', decimals=0).text(question.retry)} per wash, "
-            f"{MINUTES.number(distributions[0] * question.retry / 60.0)} minutes; "
+            f"{MINUTES.number(distributions * question.retry / 60.0)} minutes; "
             f"{OF_LOADS.text(verdict.refused.estimate)} of the loads are refused though safe",
         ),
         ("Without a threshold", f"{OF_LOADS.text(without)} of the loads {_touch(draws)}"),
