@@ -50,9 +50,6 @@ def Cabinet_(T: type) -> Any:
                 {state, self._on_tub.ticket(), self._on_feet.ticket()},
             )
 
-        def _construct_copy(self, _: Any, converter: Any = None) -> None:
-            Impl._construct(self, converter=converter)
-
         def _calc_seen(self, context: Any, output: Any) -> None:
             state, seen = self._state.Eval(context), empty(PLANT_STATE_SIZE, T)
             self._seen(state[:PLANT_STATE_SIZE], state[PLANT_STATE_SIZE:], seen)
@@ -64,7 +61,6 @@ def Cabinet_(T: type) -> Any:
             self._reactions(*inputs, force)
             output.SetFromVector(force)
 
-    Impl = Cabinet
     return Cabinet
 
 

@@ -178,9 +178,6 @@ def _class_of(kind: ElementKind, base: Any) -> Any:
                 LeafSystem_[T].__init__(self, converter=converter)
                 self.declare_element(T, packed, initial)
 
-            def _construct_copy(self, other: Any, converter: Any = None) -> None:
-                Impl._construct(self, other.packed, other.initial, converter=converter)
-
         Impl.kind = kind
         return Impl
 

@@ -114,10 +114,6 @@ def SpeedController_(T: type) -> Any:
             LeafSystem_[T].__init__(self, converter=converter)
             self.declare_controller(T, packed, sample_time)
 
-        def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._construct(self, other.packed, other.sample_time, converter=converter)
-
-    Impl = SpeedController
     return SpeedController
 
 
@@ -149,9 +145,6 @@ def Motor_(T: type) -> Any:
             )
             self.DeclareVectorOutputPort("torque_limit", 1, callback(self._calc_limit), needs)
 
-        def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._construct(self, other.packed, converter=converter)
-
         def _response(self, context: Any, demand: Any) -> Any:
             inputs, outputs = empty(2, T), empty(2, T)
             inputs[:] = demand, self._speed.Eval(context)[0]
@@ -164,7 +157,6 @@ def Motor_(T: type) -> Any:
         def _calc_limit(self, context: Any, output: Any) -> None:
             output.SetFromVector(self._response(context, T(0.0))[1:])
 
-    Impl = Motor
     return Motor
 
 
@@ -202,9 +194,6 @@ def Belt_(T: type) -> Any:
             ):
                 self.DeclareVectorOutputPort(name, 1, callback(calc), {ticket, *needs})
 
-        def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._construct(self, other.packed, converter=converter)
-
         def _calc_speed(self, context: Any, output: Any) -> None:
             output.SetFromVector(self.packed_numbers(context) * self._speed.Eval(context))
 
@@ -214,7 +203,6 @@ def Belt_(T: type) -> Any:
             else:
                 output.SetFromVector(self.packed_numbers(context) * self._torque.Eval(context))
 
-    Impl = Belt
     return Belt
 
 

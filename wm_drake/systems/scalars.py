@@ -1,5 +1,6 @@
 """Scalar types of all systems, and what a system needs to convert between them."""
 
+import inspect
 import sys
 import threading
 from collections.abc import Callable
@@ -26,6 +27,9 @@ def define_system(name: str, module: str) -> Callable[[Callable[[type], Any]], A
     template needs the classes for all scalars. They are therefore defined in a thread of their own,
     whose stack is short.
 
+    A class defines `_construct`. A copy for another scalar is constructed from the attributes that
+    have the names of its arguments.
+
     Args:
         name: Name of the template.
         module: `__name__` of the module that defines it.
@@ -33,7 +37,18 @@ def define_system(name: str, module: str) -> Callable[[Callable[[type], Any]], A
     scope = sys.modules[module]
 
     def decorate(of_scalar: Callable[[type], Any]) -> Any:
-        template = TemplateSystem.define(name, T_list=SCALARS, scope=scope)(of_scalar)
+        def with_copy(scalar: type) -> Any:
+            system = of_scalar(scalar)
+            _, *arguments, _ = inspect.signature(system._construct).parameters
+
+            def _construct_copy(self: Any, other: Any, converter: Any = None) -> None:
+                given = (getattr(other, argument) for argument in arguments)
+                system._construct(self, *given, converter=converter)
+
+            system._construct_copy = _construct_copy
+            return system
+
+        template = TemplateSystem.define(name, T_list=SCALARS, scope=scope)(with_copy)
         thread = threading.Thread(target=lambda: [template[scalar] for scalar in SCALARS])
         thread.start()
         thread.join()

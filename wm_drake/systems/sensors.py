@@ -81,9 +81,6 @@ def Sensors_(T: type) -> Any:
             )
             self.declare_drum_outputs(self._plant_state)
 
-        def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._construct(self, other.points, converter=converter)
-
         def set_points(self, context: Any, points: FloatArray) -> None:
             """Set the measured points (k, `POINT_SIZE`) in the system's own Context."""
             context.get_mutable_numeric_parameter(self._index).SetFromVector(points.ravel())
@@ -100,7 +97,6 @@ def Sensors_(T: type) -> Any:
         def _calc_detergent(self, context: Any, output: Any) -> None:
             output.SetFromVector(self._displacements(context)[-DETERGENT_SIZE:])
 
-    Impl = Sensors
     return Sensors
 
 

@@ -44,9 +44,6 @@ def SpeedSource_(T: type) -> Any:
             self.DeclareVectorOutputPort("actuation", 1, callback(self._calc_actuation), needs)
             self.DeclareInitializationPublishEvent(callback(self._check_start))
 
-        def _construct_copy(self, _: Any, converter: Any = None) -> None:
-            Impl._construct(self, converter=converter)
-
         def _check_start(self, context: Any) -> None:
             if not self._acceleration.HasValue(context):
                 check_start(context.get_time(), *(port.Eval(context)[0] for port in self._speeds))
@@ -57,7 +54,6 @@ def SpeedSource_(T: type) -> Any:
             )
             output.SetFromVector(REFLECTED_INERTIA * acceleration.Eval(context))
 
-    Impl = SpeedSource
     return SpeedSource
 
 
@@ -81,20 +77,16 @@ def MotorTorque_(T: type) -> Any:
 
         def _construct(self, size: int, drum: int, converter: Any = None) -> None:
             LeafSystem_[T].__init__(self, converter=converter)
-            self._size, self._drum = size, drum
+            self.size, self.drum = size, drum
             self._actuation = self.DeclareVectorInputPort("actuation", 1)
             self._rates = self.DeclareVectorInputPort("generalized_acceleration", size)
             needs = {self._actuation.ticket(), self._rates.ticket()}
             self.DeclareVectorOutputPort("torque", 1, callback(self._calc_torque), needs)
 
-        def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._construct(self, other._size, other._drum, converter=converter)
-
         def _calc_torque(self, context: Any, output: Any) -> None:
-            rate = self._rates.Eval(context)[self._drum : self._drum + 1]
+            rate = self._rates.Eval(context)[self.drum : self.drum + 1]
             output.SetFromVector(self._actuation.Eval(context) - REFLECTED_INERTIA * rate)
 
-    Impl = MotorTorque
     return MotorTorque
 
 

@@ -46,9 +46,6 @@ def SpinProfileSource_(T: type) -> Any:
             )
             self.DeclareVectorOutputPort("speed", 1, callback(self._calc_speed), needs)
 
-        def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._construct(self, other.profile, converter=converter)
-
         def set_profile(self, context: Any, profile: SpinProfile) -> None:
             """Set the profile in the source's own Context."""
             context.get_mutable_abstract_parameter(self._index).set_value(profile)
@@ -67,7 +64,6 @@ def SpinProfileSource_(T: type) -> Any:
             acceleration, speed = drum_at(self.get_profile(context), _number(time))
             output.SetFromVector([(time - _number(time)) * acceleration + speed])
 
-    Impl = SpinProfileSource
     return SpinProfileSource
 
 

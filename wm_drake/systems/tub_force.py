@@ -33,16 +33,12 @@ def TubForce_(T: type) -> Any:
                 {self._force.ticket()},
             )
 
-        def _construct_copy(self, _: Any, converter: Any = None) -> None:
-            Impl._construct(self, converter=converter)
-
         def _calc(self, context: Any, output: Any) -> None:
             force = [T(0.0)] * GENERALIZED_FORCE_SIZE
             if self._force.HasValue(context):
                 force[:-1] = self._force.Eval(context)
             output.SetFromVector(force)
 
-    Impl = TubForce
     return TubForce
 
 

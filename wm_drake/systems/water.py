@@ -42,9 +42,6 @@ def Water_(T: type) -> Any:
             state = self.DeclareContinuousState(BasicVector_[T](np.ones(count)))
             self.DeclareStateOutputPort("left", state)
 
-        def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._construct(self, other.count, other.packed, converter=converter)
-
         def set_load(self, context: Any, packed: Sequence[FloatArray]) -> None:
             """Set the numbers of each wet mass in the system's own Context, with all its water."""
             context.get_mutable_abstract_parameter(self._index).set_value(tuple(packed))
@@ -61,7 +58,6 @@ def Water_(T: type) -> Any:
                 rates[k] = self._rate_of(left[k], speed, packed[k], 0) if wet else T(0.0)
             derivatives.get_mutable_vector().SetFromVector(rates)
 
-    Impl = Water
     return Water
 
 
