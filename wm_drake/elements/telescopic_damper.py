@@ -99,7 +99,7 @@ class TelescopicDamperParameters:
 
     @property
     def structure(self) -> list[int]:
-        """What must be equal in a batch: number of the law, points of the tables."""
+        """Numbers that must be equal in a batch: number of the law, points of the tables."""
         return [
             *self.tub_bushing.structure,
             *self.housing_bushing.structure,

@@ -83,58 +83,43 @@ def add_washing_machine(
     resting = drawn.at_rest(load, parameters, Parts(gasket))
     assert resting.bodies is not None  # they are asked for
     plant = builder.AddNamedSystem(f"{prefix}bodies", plant_at(drawn.plant, resting.bodies))
-    layout, placed = drawn.state_layout, resting.elements
-    wiring = Wiring(builder, plant, layout, prefix)
-    by_label, on_tub, links = _element_systems(placed, parameters.profile.speed[0])
+    wiring = Wiring(builder, plant, drawn.state_layout, prefix)
+    by_label, on_tub, links = _element_systems(resting.elements, parameters.profile.speed[0])
     drive = motor_of(parameters.drive)
     friction = element_system(DRUM_FRICTION, packed_friction(drive)) if drive else None
     tub_force, sensors = TubForce(), Sensors(resting.measured_points)
     others = [("tub_force", tub_force), *([("drum_friction", friction)] if friction else [])]
-    tub_state = wiring.tub_state()
-    cabinet, feet, seen = None, None, tub_state
-    if resting.cabinet is not None:
-        cabinet, feet = (
-            Cabinet(),
-            element_system(FEET, resting.cabinet.packed(), np.zeros(SLIP_SIZE)),
-        )
-        on_cabinet = Link("cabinet", cabinet, len(layout.trees) - 1)
-        wiring.connect_elements(tub_state, others, [*links, on_cabinet])
-        seen = wiring.connect_cabinet(cabinet, on_tub, feet)
-    else:
-        wiring.connect_elements(tub_state, [*on_tub, *others], links)
-    builder.Connect(seen, wiring.add("sensors", sensors).GetInputPort("plant_state"))
+    mounting = _connect_elements(wiring, resting, on_tub, others, links)
+    builder.Connect(mounting.seen, wiring.add("sensors", sensors).GetInputPort("plant_state"))
     profile = wiring.add("spin_profile", SpinProfileSource(parameters.profile))
-    source, motor = None, None
     if drive and friction:
-        motor, driven = _add_motor(wiring, drive, profile, sensors, friction)
+        driven = _add_motor(wiring, drive, profile, sensors, friction)
     else:
-        source, driven = _add_speed_source(wiring, profile, sensors)
-    outputs = {"state": plant.get_state_output_port()}
-    for port in ("displacement", "detergent_displacement", *DRUM_OUTPUTS):
-        outputs[port] = sensors.GetOutputPort(port)
-    outputs |= driven.outputs
+        driven = _add_speed_source(wiring, profile, sensors)
     water = _add_water(wiring, resting, sensors)
-    if water:
-        outputs["water_left"] = water.GetOutputPort("left")
-    if feet:
-        outputs["tub_in_cabinet"] = seen
-        outputs["feet_floor_force"] = feet.GetOutputPort("floor_force")
-    for label, system in [*on_tub, *((link.label, link.system) for link in links)]:
-        outputs |= _element_outputs(label, system)
     return MachineSystems(
         parameters=parameters,
         plant=plant,
         drawn=drawn,
         spin_profile=profile,
-        speed_source=source,
-        motor=motor,
+        speed_source=driven.source,
+        motor=driven.motor,
         sensors=sensors,
-        **_by_kind(placed, by_label),
-        cabinet=cabinet,
-        feet=feet,
+        **_by_kind(resting.elements, by_label),
+        cabinet=mounting.cabinet,
+        feet=mounting.feet,
         water=water,
         inputs=Inputs(driven.inputs, tub_force=tub_force.GetInputPort("tub_force")),
-        outputs=Outputs(outputs),
+        outputs=Outputs(
+            {
+                "state": plant.get_state_output_port(),
+                **_sensed(sensors),
+                **driven.outputs,
+                **({"water_left": water.GetOutputPort("left")} if water else {}),
+                **mounting.outputs(),
+                **_element_outputs(by_label),
+            }
+        ),
     )
 
 
@@ -213,11 +198,65 @@ def _by_kind(placed: PlacedElements, by_label: dict[str, ElementSystem]) -> dict
     return by_field | {"bearing": next(systems, None)}
 
 
-class DrivePorts(NamedTuple):
-    """Input and output ports of a drive, by name."""
+class Mounting(NamedTuple):
+    """Where the tub is mounted.
+
+    Attributes:
+        seen: Port of the state of tub and drum seen from there.
+        cabinet, feet: The cabinet and its feet if it moves, else None.
+    """
+
+    seen: OutputPort
+    cabinet: Cabinet | None = None
+    feet: ElementSystem | None = None
+
+    def outputs(self) -> dict[str, OutputPort]:
+        """Return the output ports of a cabinet that moves, by name."""
+        if self.feet is None:
+            return {}
+        return {
+            "tub_in_cabinet": self.seen,
+            "feet_floor_force": self.feet.GetOutputPort("floor_force"),
+        }
+
+
+def _connect_elements(
+    wiring: Wiring,
+    resting: RestingMachine,
+    on_tub: list[tuple[str, Any]],
+    others: list[tuple[str, Any]],
+    links: list[Link],
+) -> Mounting:
+    """Connect all elements to the plant, those on the tub by way of a cabinet if it moves.
+
+    Args:
+        on_tub, links: From `_element_systems`.
+        others: Systems on tub and drum that no cabinet carries, by label.
+    """
+    tub_state = wiring.tub_state()
+    if resting.cabinet is None:
+        wiring.connect_elements(tub_state, [*on_tub, *others], links)
+        return Mounting(tub_state)
+    cabinet = Cabinet()
+    feet = element_system(FEET, resting.cabinet.packed(), np.zeros(SLIP_SIZE))
+    on_cabinet = Link("cabinet", cabinet, len(wiring.layout.trees) - 1)
+    wiring.connect_elements(tub_state, others, [*links, on_cabinet])
+    return Mounting(wiring.connect_cabinet(cabinet, on_tub, feet), cabinet, feet)
+
+
+class Driven(NamedTuple):
+    """Drive of a machine.
+
+    Attributes:
+        inputs, outputs: Its ports by name.
+        source: The speed source, None with a motor.
+        motor: The systems of the motor, None with a speed source.
+    """
 
     inputs: dict[str, InputPort]
     outputs: dict[str, OutputPort]
+    source: SpeedSource | None = None
+    motor: MotorSystems | None = None
 
 
 def _add_motor(
@@ -226,7 +265,7 @@ def _add_motor(
     profile: SpinProfileSource,
     sensors: Sensors,
     friction: ElementSystem,
-) -> tuple[MotorSystems, DrivePorts]:
+) -> Driven:
     """Add controller, motor and belt, and connect them to each other, the profile and the plant."""
     connect = wiring.builder.Connect
     sample_time = drive.controller.sample_time or 0.0
@@ -252,12 +291,10 @@ def _add_motor(
         "motor_torque": torque,
         "drum_friction_torque": friction.GetOutputPort("torque"),
     }
-    return MotorSystems(controller, motor, belt, friction), DrivePorts(inputs, outputs)
+    return Driven(inputs, outputs, motor=MotorSystems(controller, motor, belt, friction))
 
 
-def _add_speed_source(
-    wiring: Wiring, profile: SpinProfileSource, sensors: Sensors
-) -> tuple[SpeedSource, DrivePorts]:
+def _add_speed_source(wiring: Wiring, profile: SpinProfileSource, sensors: Sensors) -> Driven:
     """Add speed source and motor torque, and connect them to the profile and the plant."""
     builder, plant = wiring.builder, wiring.plant
     source = wiring.add("speed_source", SpeedSource())
@@ -275,7 +312,7 @@ def _add_speed_source(
         torque.GetInputPort("generalized_acceleration"),
     )
     inputs = {"drum_acceleration": source.GetInputPort("drum_acceleration")}
-    return source, DrivePorts(inputs, {"motor_torque": torque.GetOutputPort("torque")})
+    return Driven(inputs, {"motor_torque": torque.GetOutputPort("torque")}, source=source)
 
 
 def _add_water(wiring: Wiring, resting: RestingMachine, sensors: Sensors) -> Water | None:
@@ -290,12 +327,18 @@ def _add_water(wiring: Wiring, resting: RestingMachine, sensors: Sensors) -> Wat
     return water
 
 
-def _element_outputs(label: str, system: Any) -> dict[str, OutputPort]:
-    """Return the element's own output ports, their names behind its label."""
-    ports = [system.get_output_port(i) for i in range(system.num_output_ports())]
+def _sensed(sensors: Sensors) -> dict[str, OutputPort]:
+    """Return the output ports of the sensors by name."""
+    names = ("displacement", "detergent_displacement", *DRUM_OUTPUTS)
+    return {name: sensors.GetOutputPort(name) for name in names}
+
+
+def _element_outputs(by_label: dict[str, ElementSystem]) -> dict[str, OutputPort]:
+    """Return the elements' own output ports, their names behind the label of the element."""
     return {
         f"{label}_{port.get_name()}": port
-        for port in ports
+        for label, system in by_label.items()
+        for port in map(system.get_output_port, range(system.num_output_ports()))
         if port.get_name() not in ("generalized_force", "state")
     }
 

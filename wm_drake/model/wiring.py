@@ -59,14 +59,7 @@ class Wiring:
                 they read the state.
             links: Elements between tub and drum and another tree.
         """
-        total = self.add("total_force", Adder(len(elements) + len(links), GENERALIZED_FORCE_SIZE))
-        for index, (label, system) in enumerate(elements):
-            self.add(label, system)
-            if system.HasInputPort("plant_state"):
-                self.builder.Connect(tub_state, system.GetInputPort("plant_state"))
-            self.builder.Connect(
-                system.GetOutputPort("generalized_force"), total.get_input_port(index)
-            )
+        total = self._total("total_force", tub_state, elements, more=len(links))
         forces = total.get_output_port()
         if links:
             forces = self._with_links(forces, total, len(elements), links)
@@ -85,12 +78,7 @@ class Wiring:
             The port of the state of tub and drum seen from the cabinet.
         """
         seen = cabinet.GetOutputPort("tub_in_cabinet")
-        total = self.add("mounts_force", Adder(len(mounts), GENERALIZED_FORCE_SIZE))
-        for index, (label, system) in enumerate(mounts):
-            self.add(label, system)
-            self.builder.Connect(seen, system.GetInputPort("plant_state"))
-            force = system.GetOutputPort("generalized_force")
-            self.builder.Connect(force, total.get_input_port(index))
+        total = self._total("mounts_force", seen, mounts)
         self.builder.Connect(total.get_output_port(), cabinet.GetInputPort("mounts_force"))
         self.add("feet", feet)
         state = self._part_of_state("state_of_feet", [len(self.layout.trees) - 1])
@@ -98,6 +86,25 @@ class Wiring:
         force = feet.GetOutputPort("generalized_force")
         self.builder.Connect(force, cabinet.GetInputPort("feet_force"))
         return seen
+
+    def _total(
+        self, name: str, state: OutputPort, elements: list[tuple[str, Any]], more: int = 0
+    ) -> Adder:
+        """Add elements of tub and drum, by label, and the sum of their forces; return the sum.
+
+        Args:
+            name: Name of the sum in the diagram.
+            state: The state of tub and drum that they read.
+            more: Number of further inputs of the sum.
+        """
+        total = self.add(name, Adder(len(elements) + more, GENERALIZED_FORCE_SIZE))
+        for index, (label, system) in enumerate(elements):
+            self.add(label, system)
+            if system.HasInputPort("plant_state"):
+                self.builder.Connect(state, system.GetInputPort("plant_state"))
+            force = system.GetOutputPort("generalized_force")
+            self.builder.Connect(force, total.get_input_port(index))
+        return total
 
     def _with_links(
         self, on_tub: OutputPort, total: Adder, first: int, links: list[Link]

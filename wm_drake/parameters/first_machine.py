@@ -287,7 +287,7 @@ class FirstMachine:
 
     @cached_property
     def whole(self) -> Mass:
-        """All that hangs in the springs."""
+        """Mass of all that hangs in the springs."""
         return combined(list(self.bodies.values()), "")
 
     @property

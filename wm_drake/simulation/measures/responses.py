@@ -68,7 +68,7 @@ class Response:
 
     @property
     def better(self) -> Better:
-        """Which change is an improvement."""
+        """The change that is an improvement."""
         return self.variable.better
 
     @property
