@@ -36,9 +36,9 @@ def law_of(packed: FloatArray, at: int = 0) -> DamperLaw:
     return _BY_NUMBER[whole_number(packed[at])]
 
 
-def law_numbers(packed: FloatArray, at: int = 0) -> Any:
+def law_numbers(packed: FloatArray) -> Any:
     """Return the own numbers of a packed law as a named tuple."""
-    return _LAYOUTS[law_of(packed, at).number].unpack(packed, at + 1)
+    return _LAYOUTS[law_of(packed).number].unpack(packed, 1)
 
 
 def law_structure(packed: FloatArray, at: int = 0) -> list[int]:

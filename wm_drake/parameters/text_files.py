@@ -98,7 +98,7 @@ def read_text(path: Path, *, key: str = "", largest: int = LARGEST_TABLE) -> str
         raise input_error("is not text in UTF-8", where=str(path), key=key) from None
 
 
-def read_any_text(path: Path, *, key: str = "", largest: int = LARGEST_TABLE) -> str:
+def read_any_text(path: Path, *, key: str = "") -> str:
     """Return the text of a regular file as spreadsheets and loggers write it.
 
     It is in UTF-8, in UTF-16 with a byte order mark, or in the code page 1252 of Western Windows,
@@ -106,9 +106,8 @@ def read_any_text(path: Path, *, key: str = "", largest: int = LARGEST_TABLE) ->
 
     Args:
         key: Key path for messages.
-        largest: Largest size. [byte]
     """
-    content = _read_bytes(path, key, largest)
+    content = _read_bytes(path, key, LARGEST_TABLE)
     is_wide = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     for encoding in ("utf-16",) if is_wide else ("utf-8-sig", "cp1252"):
         try:

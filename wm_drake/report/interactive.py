@@ -310,7 +310,7 @@ def _add_mark(
         data.append(curve | ({"legendgroup": mark.key} if mark.key else {}))
 
 
-def _hover(mark: fig.Mark, panel: fig.Panel, value: str = "") -> str:
+def _hover(mark: fig.Mark, panel: fig.Panel) -> str:
     name = mark.name or mark.key
     head = f"<b>{escaped(name)}</b><br>" if name else ""
     y_axis = panel.second if mark.is_second and panel.second else panel.y
@@ -318,7 +318,7 @@ def _hover(mark: fig.Mark, panel: fig.Panel, value: str = "") -> str:
         escaped(text.replace("\n", " "))
         for text in (panel.x.label or "x", y_axis.label or panel.name or panel.title or "y")
     )
-    return f"{head}{x}: %{{x:.5~g}}<br>{y}: %{{y:.5~g}}{value}<extra></extra>"
+    return f"{head}{x}: %{{x:.5~g}}<br>{y}: %{{y:.5~g}}<extra></extra>"
 
 
 def _rule(mark: fig.Rule, axes: tuple[str, str]) -> Plain:

@@ -148,11 +148,11 @@ class Quantity:
         """
         return {"quantity": self, "long_name": self.words, "units": self.unit.si}
 
-    def column(self, words: str = "") -> "Column":
-        """Return the column of a table, with its words or others."""
+    def column(self) -> "Column":
+        """Return the column of a table."""
         from wm_drake.report.table import Column  # slow to import: pandas
 
-        return Column(words or self.words, self.unit_text, self._decimals, self.form)
+        return Column(self.words, self.unit_text, self._decimals, self.form)
 
 
 def quantity_of(array: "xr.DataArray") -> Quantity:

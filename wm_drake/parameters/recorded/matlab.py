@@ -55,7 +55,7 @@ def matlab_signals(path: Path) -> Iterator[Signal]:
         )
 
 
-def _channels(name: str, group: str, content: Any, depth: int, unit: str = "") -> Iterator[Signal]:
+def _channels(name: str, group: str, content: Any, depth: int) -> Iterator[Signal]:
     """Yield the channels in a variable: an array, or the fields of structures."""
     if depth > DEEPEST:
         return
@@ -74,7 +74,7 @@ def _channels(name: str, group: str, content: Any, depth: int, unit: str = "") -
         for number, part in enumerate(np.asarray(content, dtype=object).reshape(-1), 1):
             yield from _channels(f"{name}({number})", group, part, depth + 1)
     else:
-        yield from _arrays(name, group, content, unit)
+        yield from _arrays(name, group, content, "")
 
 
 def _columns(content: Any) -> np.ndarray | None:
