@@ -28,8 +28,12 @@ from wm_drake.studies.detect.decision import (
 from wm_drake.studies.detect.estimators import LINEAR, LinearFit, estimated
 from wm_drake.studies.detect.holds import hold_of, in_ranges
 from wm_drake.studies.detect.measures import SIGNALS_OF_HOLD, amplitudes_of_orders
+from wm_drake.studies.detect.options import DetectOptions
 from wm_drake.studies.detect.signals import chosen_signals, features_of
-from wm_drake.studies.detect.study import truths_of
+from wm_drake.studies.detect.study import draws_of, truths_of
+from wm_drake.studies.detect.task import DetectTask
+from wm_drake.studies.experiment import Experiment
+from wm_drake.studies.tolerance.distributions import base_samples
 
 RUN_UP = SpinProfile(time=(0.0, 40.0, 50.0), speed=(0.0, 40.0, 40.0))
 W = SPEED.unit.to_si(90.0)
@@ -229,6 +233,29 @@ def test_both_engines_have_the_same_orders(shipped):
     for name in ("torque_1", "speed_1", "displacement_1"):
         ours_, theirs_ = (of[f"window_{name}"].values for of in (ours, theirs))
         assert np.abs(ours_ - theirs_).max() < 2e-3 * np.abs(theirs_).max()
+
+
+def drawn(machine, scores, seed):
+    """Return the plan of the default study, and draws of its laundry at given scores."""
+    task = DetectTask(DetectOptions(), machine)
+    cases = list(task.laundry.uncertain.cases(scores))
+    experiment = Experiment(task.laundry.machine, ())
+    return task.plan, draws_of(experiment, cases, task.holds, 0.0, seed, has_accelerometers=False)
+
+
+@pytest.mark.hours
+@pytest.mark.parametrize("count", [20000])
+def test_the_risk_is_that_of_plain_sampling(shipped, count):
+    """Four minutes of processor time. Risk 0.30 % where 0.5 % is tolerated."""
+    machine, size = shipped("motor"), 7
+    plan, few = drawn(machine, base_samples(size, 1024, 0)[0], 0)
+    _, many = drawn(machine, np.random.default_rng(99).standard_normal((count, size)), 99)
+    score, half = plan.ripple(few), few.is_fitted
+    threshold = threshold_for(score[half], few.touches[half], 0.005)
+    judged = verdict_of(score[~half], few.touches[~half], threshold).touches
+    risk = many.touches[plan.ripple(many) <= threshold].mean()
+    assert judged.lower <= risk <= judged.upper
+    assert risk <= 0.005
 
 
 def test_the_command_answers_and_writes_what_a_controller_carries(wm_drake, tmp_path):
