@@ -20,7 +20,7 @@ from wm_drake.studies.calibrate.records import RecordModel
 from wm_drake.studies.calibrate.test_file import (
     calibrated_test,
     clock_remarks,
-    found_text,
+    vary_text,
     test_text,
 )
 from wm_drake.studies.compare.pairs import QUANTITIES
@@ -130,9 +130,9 @@ def fitted_answer(
     answer = fit_answer(model, fit, data, texts, parts)
     calibrated_sensors = calibrated_test(model, fit, tests[0].test)
     name, text = f"{words[1]}_test.yaml", test_text(calibrated_sensors, clock_remarks(model, fit))
-    found = {name: text, f"{words[1]}_vary.yaml": found_text(model.free, fit, texts.source)}
+    of_next = {name: text, f"{words[1]}_vary.yaml": vary_text(model.free, fit, texts.source)}
     warnings = [warning for test in tests for warning in test.warnings]
-    return replace(answer, files={**answer.files, **found}, warned=(*warnings, *answer.warned))
+    return replace(answer, files={**answer.files, **of_next}, warned=(*warnings, *answer.warned))
 
 
 def recorded_load(test: CompareTask, executor: Executor, load_at: Any) -> RecordedLoad:

@@ -14,11 +14,11 @@ from wm_drake.studies.calibrate.records import RecordModel
 from wm_drake.studies.fitting.fit import Fit
 from wm_drake.studies.fitting.free_numbers import FreeNumbers
 
-FOUND = ("low", "high", "mean", "deviation")
+VALUES = ("low", "high", "mean", "deviation")
 """Values of an entry of a vary file that a fit gives."""
 
 
-def found_text(free: FreeNumbers, fit: Fit, source: str) -> str:
+def vary_text(free: FreeNumbers, fit: Fit, source: str) -> str:
     """Return the numbers of the machine that a fit determined, as the text of a vary file.
 
     Value and standard deviation are the prior of the next fit, to other records.
@@ -34,9 +34,9 @@ def found_text(free: FreeNumbers, fit: Fit, source: str) -> str:
         if not (estimate.determined and np.isfinite(deviation)):
             continue
         at = {**varied.at, "mean": estimate.value, "deviation": deviation}
-        found = replace(varied, at=at)
+        posterior = replace(varied, at=at)
         entry = varied.entry.model_dump(mode="json", include={"keys", "sets", "about"})
-        texts = {name: found.reading(name) for name in FOUND}
+        texts = {name: posterior.reading(name) for name in VALUES}
         entries[varied.name] = {key: each for key, each in entry.items() if each} | texts
         entries[varied.name]["source"] = source
     return yaml_text({"vary": entries})

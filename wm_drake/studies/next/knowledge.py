@@ -111,13 +111,13 @@ def of_calibration_folder(machine: Machine, name: str, folder: Path) -> Knowledg
     with problems_at("--calibrated"):
         table = read_csv(estimates, read_header(existing_file(estimates, "")))
         columns, names = {"unknown", "value", "deviation"}, parameters.names
-        found = table["unknown"].tolist() if columns <= set(table) else []
-        if not set(names) <= set(found):
+        unknowns = table["unknown"].tolist() if columns <= set(table) else []
+        if not set(names) <= set(unknowns):
             raise input_error(
                 f"'{folder}' does not have the quantities of {path.name}; allowed is the folder of "
                 "a calibration with this file"
             )
-        rows = [found.index(name) for name in names]
+        rows = [unknowns.index(name) for name in names]
         table = table.iloc[rows]
         labels = [unknown.unit.label for unknown in parameters.unknowns]
         if "unit" in table and table["unit"].fillna("").tolist() != labels:
@@ -126,7 +126,7 @@ def of_calibration_folder(machine: Machine, name: str, folder: Path) -> Knowledg
                 "of a calibration with --units si"
             )
         numbers = finite_numbers(table[["value", "deviation"]], estimates)
-        pairs = read_csv(existing_file(of_pairs, ""), ["unknown", *found])
+        pairs = read_csv(existing_file(of_pairs, ""), ["unknown", *unknowns])
         correlation = finite_numbers(pairs[names], of_pairs)[rows]
     units = np.array([unknown.unit.from_si(1.0) for unknown in parameters.unknowns])
     point, deviation = (column / units for column in numbers.T)
