@@ -20,8 +20,8 @@ from wm_drake.studies.calibrate.records import RecordModel
 from wm_drake.studies.calibrate.test_file import (
     calibrated_test,
     clock_remarks,
-    vary_text,
     test_text,
+    vary_text,
 )
 from wm_drake.studies.compare.pairs import QUANTITIES
 from wm_drake.studies.compare.recordings import check_distinct
