@@ -17,10 +17,11 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from choose_step import DAMPERS, machine_with, machine_with_tubes
 
 import wm_drake as wm
 from wm_drake.engines.trajectory import Estimates
-from wm_drake.parameters import SpinProfile
+from wm_drake.parameters import MachineParameters, SpinProfile
 from wm_drake.report.drawing import matplotlib_of
 from wm_drake.report.figure import OURS, QUIET, Axis, Figure, Line, Panel, Points, in_grid
 from wm_drake.simulation.convergence import Attempt, difference
@@ -42,20 +43,24 @@ class Row:
     """A machine and how it is run.
 
     Attributes:
-        name, machine, load: Words for it, its name or file, and its load.
+        name, machine, load: Words for it, its name, file or parameters, and its load.
         steps: Steps, the longest first. [ms]
         changes: New values by key path.
         profile: Spin profile; None for its own.
     """
 
     name: str
-    machine: str | Path
+    machine: str | Path | MachineParameters
     steps: tuple[float, ...] = (2.5, 1.25, 0.625)
     changes: dict[str, Any] = field(default_factory=dict)
     profile: SpinProfile | None = None
     load: str = "middle"
 
 
+RUBBER = {
+    "gasket.maxwell_stiffness_x": "2 N/mm", "gasket.maxwell_damping_x": "0.04 N*s/mm",
+    "gasket.dahl_force_z": "8 N", "gasket.dahl_displacement_z": "1 mm",
+}  # fmt: skip
 TYPE = "damper_types.friction."
 ROWS = (
     Row("reference", "reference"),
@@ -82,13 +87,20 @@ ROWS = (
     Row("motor", "motor"),
     Row("liquid_rings", "liquid_rings", (1.0, 0.5), {}, run_up(600.0, 20.0)),
     Row("ball_rings", "ball_rings", (0.25, 0.125), {}, run_up(600.0, 20.0)),
+    Row("ball_rings, own profile", "ball_rings", (0.25, 0.125)),
+    Row("rubber gasket", "reference", (2.5, 1.25), RUBBER),
+    Row("Coulomb friction", machine_with(DAMPERS["Coulomb"]), (2.5, 1.25, 0.625)),
     Row("free_stroke, midpoint", "free_stroke", (0.25, 0.125), {}, run_up(350.0, 25), "front"),
+    Row("MSTV, midpoint", machine_with_tubes(DAMPERS["MSTV"]), (0.25, 0.125), {},
+        run_up(350.0, 25), "rear"),
 )  # fmt: skip
 
 
 def runs(row: Row) -> Iterator[tuple[float, float, float]]:
     """Yield step [ms], estimate and true error of each run of a row."""
-    parameters = wm.with_values(wm.load_machine(row.machine), {"accuracy": 1.0} | row.changes)
+    given = row.machine
+    drawn = given if isinstance(given, MachineParameters) else wm.load_machine(given)
+    parameters = wm.with_values(drawn, {"accuracy": 1.0} | row.changes)
     machine = wm.build_machine(parameters)
     case = wm.case_of(parameters, row.load)
     case = replace(case, profile=row.profile or case.profile)

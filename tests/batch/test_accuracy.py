@@ -31,10 +31,12 @@ def test_a_run_is_accepted_by_its_estimate():
     assert (accuracy.error, accuracy.is_converged, finer) == (0.004, 1.0, None)
 
 
-@pytest.mark.parametrize(("estimate", "halvings"), [(0.006, 1), (0.03, 1), (0.1, 2), (9.0, 3)])
-def test_a_rough_run_is_repeated_the_finer_the_rougher_it_is(estimate, halvings):
+@pytest.mark.parametrize(
+    ("estimate", "halvings", "closer"), [(0.006, 1, 1), (0.03, 1, 1), (0.1, 2, 1), (9.0, 3, 2)]
+)
+def test_a_rough_run_is_repeated_the_finer_the_rougher_it_is(estimate, halvings, closer):
     accuracy, finer = judged(attempt(estimate), None, ALLOWED)
-    assert (accuracy.is_converged, finer.step, finer.period) == (0.0, halvings, 0)
+    assert (accuracy.is_converged, finer.step, finer.period) == (0.0, halvings, closer)
     assert finer.step <= MOST_AT_ONCE
 
 
@@ -126,3 +128,41 @@ def test_results_do_not_depend_on_workers_and_neighbours():
         for name in ("amplitude", "detergent_displacement", "gasket_force"):
             np.testing.assert_array_equal(together[name][number], expected[name][0])
         assert together.error[number] == expected.error[0]
+
+
+RUBBER_X = {"gasket.maxwell_stiffness_x": "2 N/mm", "gasket.maxwell_damping_x": "0.04 N*s/mm"}
+LONG = {"output_period": "20 ms", "step": "20 ms", "integrator": "runge_kutta"}
+KINDS = {
+    "springs that go slack": ("reference", LONG | {"gravity": "1.5 m/s^2"}),
+    "gasket and dampers": ("reference", LONG),
+    "rubber": ("reference", LONG | RUBBER_X),
+    "motor": ("motor", LONG | {"output_period": "10 ms", "step": "10 ms"}),
+    "feet": ("light_cabinet", LONG | {"output_period": "5 ms", "step": "5 ms"}),
+    "balls": ("ball_rings", {}),
+    "liquid": ("liquid_rings", {"step": "1.25 ms", "integrator": "runge_kutta"}),
+    "tubes": ("free_stroke", {"step": "0.25 ms"}),
+}
+"""Machine and changes, with the longest step that the machine at rest allows."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_each_kind_shows_what_too_long_a_step_loses(kind):
+    name, changes = KINDS[kind]
+    parameters = wm.with_values(wm.load_machine(name), changes)
+    machine, (load, *_) = wm.build_machine(parameters), parameters.loads
+
+    def run(accuracy, step=None):
+        given = parameters.model_copy(update={"accuracy": accuracy})
+        case = wm.Case(load, parameters.loads[load], RUN_UP, parameters=given)
+        table = wm.simulate_many(machine, [case], step=step, workers=1)
+        values = {v: table[v].values[0] for v in ("amplitude", "detergent_displacement")}
+        size = float(np.abs(values["detergent_displacement"]).max())
+        return table, Attempt(Estimates(0.0, 0.0), 0.0, values=values, size=size)
+
+    (rough, as_it_is), (_, true) = run(1.0), run(1.0, parameters.step / 16)
+    lost = difference(as_it_is, true)
+    assert rough.error.item() >= 0.5 * lost  # never optimistic by more than 2
+    repeated, _ = run(0.5 * rough.error.item())
+    assert repeated.halvings.item() > 0
+    assert repeated.is_converged.item() == 1.0

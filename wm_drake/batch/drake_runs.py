@@ -26,6 +26,7 @@ from wm_drake.model.machine import Machine
 from wm_drake.model.scene import Scene
 from wm_drake.parameters import MachineParameters
 from wm_drake.simulation.cases import Case
+from wm_drake.simulation.convergence import accuracy_in
 from wm_drake.simulation.measures import MEASURES, measure
 from wm_drake.simulation.runs import DivergenceWarning, simulate
 
@@ -90,7 +91,15 @@ class DrakeRunner:
         values = {str(name): array.values for name, array in measures.table.items()}
         kept = record if chosen.histories else None
         return [
-            RunResult(number, case, values, record.attrs["diverged"], kept, measures.smallest_gap)
+            RunResult(
+                number,
+                case,
+                values,
+                record.attrs["diverged"],
+                kept,
+                measures.smallest_gap,
+                accuracy=accuracy_in(record.attrs),
+            )
         ]
 
 

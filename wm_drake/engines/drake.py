@@ -27,6 +27,9 @@ less than 0.1 % (docs/theory/integrator.md)."""
 ACCURATE = 1e-5
 """Target accuracy of the engine `drake-accurate`: peaks within 0.01 %."""
 
+PEAKS_WITHIN = {"drake": 1e-3, "drake-accurate": 1e-4}
+"""Relative error of peaks by engine, of `reference` (docs/theory/integrator.md)."""
+
 LARGEST_STEPS = 2.0
 """Largest step of the error control over the step of the machine, which is half a sample."""
 

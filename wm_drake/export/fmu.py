@@ -23,7 +23,6 @@ from pathlib import Path
 import numpy as np
 
 from wm_drake.engines.compiled.mechanics import DRUM_RATE
-from wm_drake.engines.compiled.run import run_compiled
 from wm_drake.engines.trajectory import LARGEST_ANGLE, LARGEST_DISPLACEMENT, LARGEST_TILT
 from wm_drake.errors import check_known, input_error, shortened
 from wm_drake.export.description import IDENTIFIER, Identity, model_description
@@ -38,7 +37,8 @@ from wm_drake.export.object_code import (
 )
 from wm_drake.export.options import FmuOptions
 from wm_drake.parameters import MachineParameters
-from wm_drake.simulation.outputs import variables_of
+from wm_drake.simulation.cases import Case
+from wm_drake.simulation.runs import simulate
 from wm_drake.written_files import check_new, filled, temporary_folder, write_files
 
 WRAPPER = Path(__file__).parent / "c" / "fmu.c"
@@ -312,20 +312,18 @@ def _reference(model: ExportedModel) -> bytes:
 
     The masses stay, as those of an FMU do until an importer changes them.
     """
-    profile, load = model.setup.parameters.profile, model.setup.parameters.loads[model.load]
-    setup = model.setup.machine.set_up(
-        load.with_masses(load.masses(np.ones(len(load.wet)))),
-        context=model.setup.context,
-        gasket=model.plan.gasket >= 0,
-    )
-    trajectory = run_compiled(setup, profile, model.step, lambda _: None, integrator="runge_kutta")
-    values = variables_of(setup, trajectory)["displacement"][1]
+    parameters = model.setup.parameters
+    profile, load = parameters.profile, parameters.loads[model.load]
+    load = load.with_masses(load.masses(np.ones(len(load.wet))))
+    case = Case("reference", load, profile, model.plan.gasket >= 0)
+    record = simulate(parameters, case, step=model.step, integrator="runge_kutta")
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    names = [f"displacement.{name}" for name in setup.sensors]
+    names = [f"displacement.{name}" for name in record.sensor.values]
     writer.writerow(["time", "drum_speed", *names])
-    speed = np.interp(trajectory.time, profile.time, profile.speed)
-    for row in np.column_stack([trajectory.time, speed, values]):
+    time = record.time.values
+    speed = np.interp(time, profile.time, profile.speed)
+    for row in np.column_stack([time, speed, record.displacement.values]):
         writer.writerow([f"{number:.12g}" for number in row])
     return text.getvalue().encode()
 

@@ -138,6 +138,7 @@ def _midpoint(plan: Any) -> Any:
             part(v, at.inputs, inputs),
             part(v, at.stage, size),
             part(v, at.past_rates, size),
+            part(v, at.past_rates + size, size),
             part(v, at.sum, size),
         )
         p, x = part(v, at.packed, count), part(v, at.state, size)

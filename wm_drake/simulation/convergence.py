@@ -1,12 +1,12 @@
 """Whether the step of a run was short enough: a run is accepted, or repeated with a shorter step.
 
-This is the one rule of all runs of the compiled engine. The error of a run is estimated while it is
-integrated (`wm_drake.engines.compiled.local_error`). If the estimate is above the accuracy that the
-machine file demands, the run is repeated. It is accepted when its estimate holds, or when its
-measures differ from those of the run before it by no more than the accuracy. A run whose measures
-still differ after `MOST_HALVINGS` is not converged, and this difference is its spread: friction
-that jumps, or a motion that is chaotic. The rule sees one run only, so that its result depends
-neither on other runs nor on their number.
+This is the one rule of all runs of the compiled engine; the Drake engine controls its error itself.
+The error of a run is estimated while it is integrated (`wm_drake.engines.compiled.local_error`). If
+the estimate is above the accuracy that the machine file demands, the run is repeated. It is
+accepted when its estimate holds, or when its measures differ from those of the run before it by no
+more than the accuracy. A run whose measures still differ after `MOST_HALVINGS` is not converged,
+and this difference is its spread: friction that jumps, or a motion that is chaotic. The rule sees
+one run only, so that its result depends neither on other runs nor on their number.
 """
 
 import math
@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
 
 from wm_drake.engines.trajectory import Estimates
 from wm_drake.parameters.spin import SAMPLES_OF_TURN
@@ -31,8 +32,9 @@ MOST_AT_ONCE = 3
 FALLS_BY = 4.0
 """By how much the estimate falls at least where the step is halved, as of corners of a force."""
 
-LARGEST_LOSS = 1.0 - math.cos(math.pi / SAMPLES_OF_TURN)
-"""Part of the largest acceleration that may lie between samples: 0.55 %, that of order one."""
+LARGEST_LOSS = 2.0 * (1.0 - math.cos(math.pi / SAMPLES_OF_TURN))
+"""Part of the largest acceleration that may lie between samples: 1.1 %, twice that of order one,
+because an acceleration has orders above one. Displacements then lose less than 0.5 %."""
 
 SMALLEST_PART = 0.1
 """Smallest size by which a difference is divided, by the largest number of its variable; of
@@ -80,7 +82,7 @@ def attributes_of(accuracy: Accuracy) -> dict[str, Any]:
 
 
 def accuracy_in(attributes: Mapping[str, Any]) -> Accuracy | None:
-    """Return the accuracy in the attributes of a record; None of the Drake engine."""
+    """Return the accuracy in the attributes of a record; None if it has none."""
     if "converged" not in attributes:
         return None
     is_converged = float(attributes["converged"] == "yes")
@@ -144,11 +146,13 @@ def judged(
     accuracy_of_run = Accuracy(error, float(holds), run.step, float(run.halvings))
     if holds or not left:
         return accuracy_of_run, None
-    halvings, period = MOST_AT_ONCE, int(run.estimates.samples > LARGEST_LOSS)
+    halvings = MOST_AT_ONCE
     if not run.diverged:
         ratio = max(run.estimates.steps / accuracy, 1.0)
-        halvings = max(math.ceil(math.log(ratio, FALLS_BY) - 0.5), period, 1)
-    return accuracy_of_run, Refinement(min(halvings, MOST_AT_ONCE, left), period)
+        halvings = max(math.ceil(math.log(ratio, FALLS_BY) - 0.5), 1)
+    halvings = min(halvings, MOST_AT_ONCE, left)
+    # a motion that is rough for its steps has peaks of force between its samples, too
+    return accuracy_of_run, Refinement(halvings, math.ceil(halvings / 2))
 
 
 def difference(before: Attempt, run: Attempt) -> float:
@@ -189,7 +193,7 @@ class StepSummary:
     def __init__(self) -> None:
         """Begin without runs."""
         self.runs = 0
-        self.unconverged: dict[str, Accuracy] = {}
+        self.unconverged: list[tuple[str, Accuracy]] = []
         self._steps: set[float] = set()
         self._repeated, self._error = 0, 0.0
 
@@ -204,7 +208,13 @@ class StepSummary:
         if of_run.is_converged:
             self._error = max(self._error, of_run.error)
         else:
-            self.unconverged[name] = of_run
+            self.unconverged.append((name, of_run))
+
+    def add_table(self, table: xr.Dataset) -> None:
+        """Add the runs of a table of `simulate_many`."""
+        accuracies = zip(*(table[name].values for name in Accuracy._fields), strict=True)
+        for name, accuracy in zip(table.case.values.tolist(), accuracies, strict=True):
+            self.add(name, accuracy)
 
     @property
     def text(self) -> str:
@@ -222,7 +232,7 @@ class StepSummary:
         """Return which runs are not converged; "" if all are."""
         if not self.unconverged:
             return ""
-        name, worst = max(self.unconverged.items(), key=lambda pair: pair[1].error)
+        name, worst = max(self.unconverged, key=lambda pair: pair[1].error)
         differ = f"{PERCENT.from_si(worst.error):.2g} %"
         return (
             f"{len(self.unconverged)} of {self.runs} runs are not converged, with steps down to "

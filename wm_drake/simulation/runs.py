@@ -11,14 +11,14 @@ from wm_drake.engines import DEFAULT_ENGINE
 from wm_drake.engines.compiled.packing import pack
 from wm_drake.engines.compiled.run import run_compiled
 from wm_drake.engines.compiled.stepping import choose_stepping
-from wm_drake.engines.drake import run_drake, run_drake_accurately
+from wm_drake.engines.drake import PEAKS_WITHIN, run_drake, run_drake_accurately
 from wm_drake.engines.trajectory import Trajectory
 from wm_drake.errors import check_known, input_error
 from wm_drake.model.build import AnyMachine, machine_of
 from wm_drake.model.machine import Machine
 from wm_drake.parameters.machine import Integrator
 from wm_drake.simulation.cases import Case, case_of, notice_jumping_friction
-from wm_drake.simulation.convergence import COMPARED, Attempt, attributes_of, judged
+from wm_drake.simulation.convergence import COMPARED, Accuracy, Attempt, attributes_of, judged
 from wm_drake.simulation.first_call import compile_in_two_processes
 from wm_drake.simulation.measures import measure
 from wm_drake.simulation.records import Record, as_record
@@ -101,7 +101,9 @@ def simulate(
     else:
         setup = machine.set_up(case.load, parameters=case.parameters, gasket=case.gasket)
         trajectory = ENGINES[engine](setup, case.profile, step, progress)
-        record = as_record(setup, case, trajectory).assign_attrs(engine=engine, step_s=step)
+        accuracy = Accuracy(PEAKS_WITHIN[engine], 1.0, step, 0.0)
+        how = {"engine": engine} | attributes_of(accuracy)
+        record = as_record(setup, case, trajectory).assign_attrs(how)
     if record.attrs["diverged"]:
         warnings.warn(record.attrs["diverged"], DivergenceWarning, stacklevel=2)
     return record

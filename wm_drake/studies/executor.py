@@ -167,7 +167,6 @@ class Executor:
     ) -> "xr.Dataset":
         from wm_drake.batch import simulate_remembered
         from wm_drake.batch.cluster import run_on_cluster
-        from wm_drake.simulation.convergence import Accuracy
 
         assert self.ledger is not None, "a study that runs cases is declared with has_runs=True"
         how: dict[str, Any] = {"workers": self.workers, "engine": self.engine, "progress": report}
@@ -175,7 +174,5 @@ class Executor:
             how["run"] = partial(run_on_cluster, client=self.client)
         table = simulate_remembered(machine, cases, self.ledger, measures=measures, **how)
         self.runs += table.sizes["run"]
-        accuracies = zip(*(table[name].values for name in Accuracy._fields), strict=True)
-        for name, accuracy in zip(table.case.values.tolist(), accuracies, strict=True):
-            self.steps.add(name, accuracy)
+        self.steps.add_table(table)
         return table

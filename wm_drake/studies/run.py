@@ -236,12 +236,22 @@ def _executed(order: Order) -> tuple["Answer", Facts, tuple[str, ...]]:
         not_converged = (executor.steps.warning,) if executor.steps.unconverged else ()
         for text in not_converged:
             say(f"warning: {text}", err=True)
+        result = _marked(result, executor)
         wall_s = time.perf_counter() - begin
         warned = (*about_machines, *_warnings(machines, friction_warnings), *not_converged)
         steps = executor.steps.text
         facts = Facts(order.command, wall_s, warned, step, integrator, steps, executor.runs, engine)
         files = _written(result, facts, order.run.out, run)
     return result, facts, files
+
+
+def _marked(result: "Answer", executor: Executor) -> "Answer":
+    """Return a result that names its runs that are not converged."""
+    if not executor.steps.unconverged:
+        return result
+    from wm_drake.studies.not_converged import marked
+
+    return marked(result, executor.steps)
 
 
 def _machine_of(order: Order, name: str) -> "Machine":

@@ -16,7 +16,9 @@ from wm_drake.engines.compiled.local_error import (
     OF_MULTISTEP,
     OF_RUNGE_KUTTA,
     add_fourth_difference,
+    add_inner_peaks,
     add_peaks,
+    alike_before,
     steps_alike,
 )
 from wm_drake.engines.compiled.mechanics import (
@@ -69,7 +71,8 @@ def integrate_lanes(steps, begin, end, p, elements, x, work, sums, history):
     stage, total = lane_array(work.stage), lane_array(work.total)
     past, errors = Past(lane_array(work.past_rates), lane_array(work.past_inputs)), lane_array(sums)
     length, acceleration, drum, row, controls, one_derivative = steps
-    zero, begins, alike = 0.0 * state[0], elements.begins, 0
+    zero, begins, inner = 0.0 * state[0], elements.begins, elements.inner
+    alike = alike_before(begin, length, acceleration)
     for i in range(begin, end):
         sample_controller(state, drum[2 * i, 0], controls[i], numbers, elements.motor, begins.motor)
         hold_masses(numbers, state, begins.water, elements.water)
@@ -81,11 +84,12 @@ def integrate_lanes(steps, begin, end, p, elements, x, work, sums, history):
         remember(past.rates, i, PAST_RATES, rate, begins.size)
         remember(past.inputs, i, PAST_INPUTS, inputs, begins.inputs)
         add_peaks(errors, state, rate, row[i] >= 0)
-        alike = steps_alike(alike, i, begin, length, acceleration)
+        add_inner_peaks(errors, state, length[i], inner)
+        alike = steps_alike(alike, i, length, acceleration)
         if alike >= DIFFERENCED:
             factor = OF_MULTISTEP if one_derivative[i] else OF_RUNGE_KUTTA
             add_fourth_difference(
-                errors, past.rates, i, length[i], factor, begins.size, PAST_RATES
+                errors, past.rates, i, length[i], factor, begins.size, PAST_RATES, inner
             )  # fmt: skip
         if one_derivative[i]:
             multistep_step(state, rate, past, stage, total, i, length[i], numbers, elements)

@@ -101,13 +101,14 @@ assert RATES.fixed_size == RATES_SIZE
 read_first_harmonic, read_second_harmonic = FIRST_HARMONIC.read, SECOND_HARMONIC.read
 read_bodies, read_rates, write_rates_of = BODIES.read, RATES.read, RATES.write
 
-Elements = namedtuple("Elements", "mounts begins tubes bearing motor cabinet water")
+Elements = namedtuple("Elements", "mounts begins tubes bearing motor cabinet water inner")
 """Indices at which the parts of a machine begin in the packed numbers.
 
 mounts: `Mounts`; begins: `Begins`, indices in the state; tubes: array of indices of the bodies of
 telescopic dampers (`TUBES`), None if there are none; bearing: index of the drum's bearing, None if
 it is rigid; motor: index of the motor, None if the speed of the drum is prescribed; cabinet: index
-of the cabinet, None if it is fixed; water: `Water`, None for a load that stays.
+of the cabinet, None if it is fixed; water: `Water`, None for a load that stays; inner:
+`InnerVelocities` of elements, None without any.
 """
 
 MassProperties = namedtuple(

@@ -32,8 +32,10 @@ from wm_drake.elements.motion import BODY_STATE, TREE_STATE, rpy_rates
 from wm_drake.elements.telescopic_damper import DEFORMATION, TUBES_STATE_SIZE
 from wm_drake.engines.compiled.local_error import (
     DIFFERENCED,
+    add_inner_peaks,
     add_peaks,
     add_second_difference,
+    alike_before,
     steps_alike,
 )
 from wm_drake.engines.compiled.mechanics import (
@@ -53,14 +55,15 @@ MOVING = (*range(TUBES), *range(VELOCITIES, VELOCITIES + TUBES))
 """Indices of the positions and velocities of the tubes of a damper, from where its state begins."""
 CARRIER_VELOCITIES = BODY_STATE.offsets["angular_velocity"]
 
-MidpointWork = namedtuple("MidpointWork", ("rate", "inputs", "middle", "past", "change"))
+MidpointWork = namedtuple("MidpointWork", ("rate", "inputs", "middle", "past", "earlier", "change"))
 """Arrays to work in. `past` must stay from call to call: at the index of each velocity its A, at
-that of each sponge the rate of its deformation."""
+that of each sponge the rate of its deformation; and `earlier`, the same of the step before it where
+differences are taken."""
 
 
 def midpoint_work(size, inputs):
     """Return the `MidpointWork` for states and inputs of these sizes."""
-    sizes = (size, inputs, size, size, TUBES)
+    sizes = (size, inputs, size, size, size, TUBES)
     return MidpointWork(*(aligned(count * WIDTH) for count in sizes))
 
 
@@ -83,12 +86,14 @@ def integrate_midpoint_lanes(steps, begin, end, p, elements, relaxation, x, work
     align_stack()
     numbers, state, samples = lane_array(p), lane_array(x), lane_array(history)
     rate, inputs, middle = lane_array(work.rate), lane_array(work.inputs), lane_array(work.middle)
-    past, change = lane_array(work.past), lane_array(work.change)
+    past, change, earlier = (
+        lane_array(work.past), lane_array(work.change), lane_array(work.earlier)
+    )  # fmt: skip
     matrices, errors = lane_array(relaxation), lane_array(sums)
     length, acceleration, drum, row = steps
-    zero, alike = 0.0 * state[0], 0
+    zero, alike = 0.0 * state[0], alike_before(begin, length, acceleration)
     for i in range(begin, end):
-        alike = steps_alike(alike, i, begin, length, acceleration)
+        alike = steps_alike(alike, i, length, acceleration)
         hold_masses(numbers, state, elements.begins.water, elements.water)
         if row[i] >= 0 or i == 0:
             masses = mass_properties(numbers, zero + drum[2 * i, 1], zero + drum[2 * i, 2])
@@ -107,7 +112,10 @@ def integrate_midpoint_lanes(steps, begin, end, p, elements, relaxation, x, work
         speed, speed_rate = zero + drum[node, 0], zero + acceleration[i]
         state_derivative(middle, rate, inputs, masses, speed, speed_rate, numbers, elements)
         add_peaks(errors, middle, rate, False)
-        add_second_difference(errors, rate, i, h, alike >= DIFFERENCED)
+        add_inner_peaks(errors, middle, h, elements.inner)
+        add_second_difference(
+            errors, rate, past, earlier, h, alike >= DIFFERENCED, elements.inner
+        )  # fmt: skip
         advance(state, middle, rate, past, change, h, matrices, elements)
         state[DRUM_ANGLE] = zero + drum[2 * i + 2, 3]
         state[DRUM_RATE] = zero + drum[2 * i + 2, 0]

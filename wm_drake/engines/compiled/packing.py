@@ -19,6 +19,7 @@ from wm_drake.elements.state_map import CARRIER as CARRIER_STATES
 from wm_drake.elements.state_map import ELEMENT, PLACES, TUBES, StateMap
 from wm_drake.elements.water import Water
 from wm_drake.engines.compiled.bearing import TUB, TUB_AND_BEARING
+from wm_drake.engines.compiled.local_error import LEVER, InnerVelocities
 from wm_drake.engines.compiled.mechanics import (
     BODIES,
     BODIES_SIZE,
@@ -99,7 +100,20 @@ class Layout:
         if self.water is not None:
             draining, masses, dry = self.water
             water = Water(np.array(draining), np.array(masses), dry)
-        return Elements(self.mounts, self.states.begins, tubes, bearing, motor, cabinet, water)
+        return Elements(
+            self.mounts, self.states.begins, tubes, bearing, motor, cabinet, water, self._inner
+        )
+
+    @property
+    def _inner(self) -> InnerVelocities | None:
+        """Return the velocities among the states of elements; None without any."""
+        levers = {"m/s": 1.0, "rad/s": LEVER}
+        begin = self.states.begins.elements
+        units = [state.unit for kind in self.kinds for state in kind.states]
+        velocities = [(begin + k, levers[u]) for k, u in enumerate(units) if u in levers]
+        if not velocities:
+            return None
+        return InnerVelocities(*map(np.array, zip(*velocities, strict=True)))
 
 
 def pack(setup: Setup) -> tuple[FloatArray, Layout]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from wm_drake.compiler.lane_memory import aligned, fill_lanes
 from wm_drake.compiler.lanes import WIDTH
-from wm_drake.engines.compiled.local_error import SUMS_SIZE
+from wm_drake.engines.compiled.local_error import SUMS_SIZE, estimates_of
 from wm_drake.engines.compiled.packing import initial_state
 from wm_drake.engines.compiled.run import RunLanes, advance_of
 from wm_drake.engines.compiled.samples import trajectory_of
@@ -26,7 +26,8 @@ def run_pieces(
     """Run a machine through a spin profile and yield its motion piece by piece.
 
     The pieces together are the motion of `wm_drake.engines.compiled.run.run_compiled`. They end at
-    the first sample out of bounds.
+    the first sample out of bounds. The estimated errors of a piece are those of the run up to its
+    end.
 
     Args:
         setup: Machine at rest in its Context, which is not changed.
@@ -58,7 +59,8 @@ def run_pieces(
         advance(first, end)
         piece = _part(schedule, first, end)
         samples = lanes.samples.reshape(rows, size, WIDTH)[: len(piece.time), :, 0].copy()
-        trajectory = trajectory_of(samples, piece, p, layout)
+        estimates = estimates_of(lanes.sums)[0]
+        trajectory = replace(trajectory_of(samples, piece, p, layout), estimates=estimates)
         yield trajectory
         if trajectory.divergence:
             return

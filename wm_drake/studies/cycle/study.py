@@ -15,14 +15,16 @@ import xarray as xr
 from wm_drake.elements.mount import WRENCH_SIZE
 from wm_drake.engines.compiled.packing import pack
 from wm_drake.engines.compiled.pieces import run_pieces
-from wm_drake.engines.compiled.stepping import choose_stepping
-from wm_drake.engines.trajectory import Trajectory
+from wm_drake.engines.compiled.stepping import Stepping, choose_stepping
+from wm_drake.engines.trajectory import Estimates, Trajectory
 from wm_drake.model.machine import Machine, Setup
 from wm_drake.model.scene import Scene
+from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.report.quantity import MASS, SPEED, STEP, TIME, Quantity, of_measure
 from wm_drake.simulation.cases import Case
+from wm_drake.simulation.convergence import Accuracy, Attempt, judged
 from wm_drake.simulation.feet import foot_loads
 from wm_drake.simulation.mounts import mount_wrenches
 from wm_drake.simulation.outputs import tub_outputs
@@ -147,15 +149,17 @@ class Cycle(NamedTuple):
             and largest force along the floor, `sideways`.
         diverged: Why it stopped early; "" if it did not.
         integration: How it was integrated, in words.
+        accuracy: How accurate it is.
     """
 
     course: xr.Dataset
     diverged: str
     integration: str
+    accuracy: Accuracy
 
 
 def run_cycle(machine: Machine, case: Case, scene: Scene | None = None) -> Cycle:
-    """Run a cycle.
+    """Run a cycle, and repeat it with shorter steps until it is accurate.
 
     Args:
         machine: Built machine.
@@ -166,19 +170,37 @@ def run_cycle(machine: Machine, case: Case, scene: Scene | None = None) -> Cycle
     empty = machine.set_up(gasket=case.gasket)
     stepping = choose_stepping(empty, *pack(empty), profile, parameters.step, parameters.integrator)
     period = profile.sample_period(parameters.output_period)
-    rows = max(2, round(max(profile.duration / WINDOWS, SHORTEST) / period))
     setup = machine.set_up(case.load, context=empty.context, gasket=case.gasket)
-    extremes = WindowExtremes(setup, scene or Scene(parameters), rows)
-    pieces = run_pieces(setup, profile, stepping, period, rows * WINDOWS_OF_PIECE)
-    courses, diverged = list[xr.Dataset](), ""
-    for piece in _ahead(pieces):
+    scene, before, halvings = scene or Scene(parameters), None, 0
+    while True:
+        course, diverged, estimates = _course(setup, scene, profile, stepping, period)
+        values = {"amplitude": course.half_swing.max("time"), "smallest_gap": course.gap.min()}
+        arrays, size = {n: v.values for n, v in values.items()}, course.half_swing.max().item()
+        attempt = Attempt(estimates, stepping.step, halvings, diverged, arrays, size)
+        accuracy, finer = judged(attempt, before, parameters.accuracy)
+        if finer is None:
+            break
+        before, halvings = attempt, halvings + finer.step
+        stepping, period = stepping.halved(finer.step), period / 2**finer.period
+    step, every = STEP.text(stepping.step), STEP.text(period)
+    how = f"{stepping.integrator}, steps of {step}, samples every {every}, {accuracy.text}"
+    return Cycle(course, diverged, how, accuracy)
+
+
+def _course(
+    setup: Setup, scene: Scene, profile: SpinProfile, stepping: Stepping, period: float
+) -> tuple[xr.Dataset, str, Estimates]:
+    """Return the course of a run, why it stopped early, "" if it did not, and its errors."""
+    rows = max(2, round(max(profile.duration / WINDOWS, SHORTEST) / period))
+    extremes = WindowExtremes(setup, scene, rows)
+    courses, diverged, estimates = list[xr.Dataset](), "", None
+    for piece in _ahead(run_pieces(setup, profile, stepping, period, rows * WINDOWS_OF_PIECE)):
         if len(piece.time) >= rows:
             courses.append(extremes(piece))
         diverged = piece.divergence.reason if piece.divergence else ""
-    course = xr.concat(courses, "time", combine_attrs="override")
-    step, every = STEP.text(stepping.step), STEP.text(period)
-    how = f"{stepping.integrator}, steps of {step}, samples every {every}"
-    return Cycle(course, diverged, how)
+        estimates = piece.estimates
+    assert estimates is not None  # the compiled engine estimates its errors
+    return xr.concat(courses, "time", combine_attrs="override"), diverged, estimates
 
 
 def _ahead(pieces: Iterator[Trajectory]) -> Iterator[Trajectory]:

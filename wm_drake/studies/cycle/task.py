@@ -28,9 +28,10 @@ class CycleTask(Task):
         name, load = _load(options.load, machine)
         self.case = Case(name, load, load_profile(options.profile))
 
-    def run(self, executor: Executor) -> Answer:  # noqa: ARG002
+    def run(self, executor: Executor) -> Answer:
         """Run the cycle."""
         cycle = run_cycle(self.machine, self.case)
+        executor.steps.add(self.case.name, cycle.accuracy)
         parts = parts_of(cycle.course, self.case)
         return cycle_answer(self.machine.parameters, self.case, cycle, parts)
 

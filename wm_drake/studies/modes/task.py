@@ -42,6 +42,8 @@ class ModesTask(Task):
                 run_up=True,
                 progress=progress,
             )
+        if result.run_up is not None:
+            executor.steps.add_table(result.run_up)
         return modes_answer(result, _replays(result) if self.options.replay else {})
 
 

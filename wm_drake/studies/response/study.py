@@ -18,6 +18,7 @@ from wm_drake.parameters.spin import Region
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report.quantity import SPEED
 from wm_drake.simulation.cases import Case
+from wm_drake.simulation.convergence import StepSummary
 from wm_drake.simulation.displacements import envelopes
 from wm_drake.simulation.records import Record
 from wm_drake.studies.response.balance import HARMONICS, SAMPLES
@@ -78,8 +79,13 @@ def run_response_study(
     loads: Mapping[str, Load],
     settings: ResponseSettings,
     progress: Callable[[float], None] = lambda fraction: None,
+    steps: StepSummary | None = None,
 ) -> tuple[list[xr.Dataset], xr.Dataset | None]:
     """Compute the steady response to loads, runs over the spin profile, and sweeps.
+
+    Args:
+        machine, loads, settings, progress: What is computed.
+        steps: Summary to which the steps and errors of all runs are added.
 
     Returns:
         The cases, each a dataset as of `steady_response` with the labels `load` and `gasket` (yes
@@ -92,15 +98,16 @@ def run_response_study(
     Raises:
         InputError: an argument is wrong, or no periodic motion is found for a load.
     """
+    summary = steps or StepSummary()
     pairs = [(name, load, gasket) for gasket in settings.gaskets for name, load in loads.items()]
     setups = [machine.set_up(load, gasket=gasket) for _, load, gasket in pairs]
     done = _Progress(progress, [RESPONSE_SHARE] * len(pairs) + [RUN_SHARE])
 
     def run() -> tuple[list[Record | None], xr.Dataset | None]:
         cases = [Case(*pair[:2], machine.parameters.profile, pair[2]) for pair in pairs]
-        runs, sweeps = _records(machine, cases, settings.run_threads), None
+        runs, sweeps = _records(machine, cases, settings.run_threads, summary), None
         if len(settings.rates):
-            sweeps = _sweeps(machine, loads, settings, done.of(-1))
+            sweeps = _sweeps(machine, loads, settings, done.of(-1), summary)
         done.of(-1)(1.0)
         return runs, sweeps
 
@@ -184,12 +191,15 @@ class _Progress:
         return report
 
 
-def _records(machine: Machine, cases: list[Case], workers: int | None) -> list[Record | None]:
+def _records(
+    machine: Machine, cases: list[Case], workers: int | None, steps: StepSummary
+) -> list[Record | None]:
     """Return the records of cases; None for a run that diverged."""
     records: dict[int, Record | None] = {}
 
     def keep(run: RunResult) -> None:
         records[run.number] = None if run.diverged else run.record
+        steps.add(run.case.name, run.accuracy)
 
     simulate_many(machine, cases, measures=[], histories=True, workers=workers, finished=keep)
     return [records[index] for index in range(len(cases))]
@@ -225,6 +235,7 @@ def _sweeps(
     loads: Mapping[str, Load],
     settings: ResponseSettings,
     progress: Callable[[float], None],
+    steps: StepSummary,
 ) -> xr.Dataset:
     """Return the largest amplitudes of sweeps and their speeds."""
     low, high = float(min(settings.speeds)), float(max(settings.speeds))
@@ -247,6 +258,7 @@ def _sweeps(
         workers=settings.run_threads,
         progress=lambda done: progress(done / len(cases)),
     )
+    steps.add_table(table)
     complete = table.diverged.values == ""
     for place, kept, run in zip(places, complete, table.run.values, strict=True):
         if kept:

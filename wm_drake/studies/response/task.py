@@ -62,7 +62,9 @@ class ResponseTask(Task):
             options.workers,
         )
         with executor.fraction("response") as progress:
-            cases, sweeps = run_response_study(self.machine, self.loads, settings, progress)
+            cases, sweeps = run_response_study(
+                self.machine, self.loads, settings, progress, executor.steps
+            )
         return response_answer(self.machine.parameters, cases, sweeps)
 
 
