@@ -44,16 +44,19 @@ def read_csv(
 
     text = read_any_text(Path(path), key=key)
     try:
-        named = list(_table(text, nrows=0).columns)
-        if named not in (columns, [*columns, optional]):
-            has = ",".join(map(str, named))
+        written = list(_table(text, nrows=0).columns)
+        allowed = (columns, [*columns, optional])
+        heads = (written, list(map(_with_unit, written)))
+        head = next((names for names in heads if names in allowed), None)
+        if head is None:
+            has = ",".join(map(str, written))
             signs = _SIGNS if ";" in has or "\t" in has else ""
             message = f"needs the columns {','.join(columns)}, has {has}{signs}"
             raise input_error(message, where=str(path), key=key)
         with warnings.catch_warnings():
             # pandas cuts a row that is too long and only warns
             warnings.simplefilter("error", pd.errors.ParserWarning)
-            return _table(text, index_col=False)
+            return _table(text, index_col=False).set_axis(head, axis="columns")
     except pd.errors.ParserWarning:
         message = f"a row has more values than columns{_SIGNS}"
         raise input_error(message, where=str(path), key=key) from None
@@ -132,7 +135,7 @@ def _table(text: str, **options: Any) -> "pd.DataFrame":
         dtype=str,
         keep_default_na=False,
         **options,
-    ).rename(columns=_with_unit)
+    )
     return table.apply(lambda column: column.str.strip()) if len(table) else table
 
 
