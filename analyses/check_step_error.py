@@ -124,10 +124,10 @@ def figure(found: np.ndarray) -> Figure:
     ends = np.array([1e-5, 1e3])
     allowed = wm.load_machine("reference").accuracy
     marks = (
-        Line(ends, ends, name="estimate = error", color=QUIET),
-        Line(ends, 0.5 * ends, name="half of it", color=QUIET, dash="dashed"),
-        Line(ends, np.full(2, 1e2 * allowed), name="accepted below", color=QUIET, dash="dotted"),
-        Points(1e2 * np.maximum(found[:, 0], 1e-7), 1e2 * found[:, 1], name="runs", color=OURS),
+        Line(ends, ends, key="estimate = error", color=QUIET),
+        Line(ends, 0.5 * ends, key="half of it", color=QUIET, dash="dashed"),
+        Line(ends, np.full(2, 1e2 * allowed), key="accepted below", color=QUIET, dash="dotted"),
+        Points(1e2 * np.maximum(found[:, 0], 1e-7), 1e2 * found[:, 1], key="runs", color=OURS),
     )
     x, y = Axis(label="true error, %", is_log=True), Axis(label="estimate, %", is_log=True)
     panel = Panel(marks=marks, x=x, y=y)
