@@ -58,9 +58,35 @@ def test_the_answer_and_the_advice_are_those_of_single_runs(verdict):
     assert gap["before"] == pytest.approx(numbers["smallest_gap_mm"], rel=1e-9)
     assert gap["after"] == pytest.approx(1e3 * min(gaps), rel=1e-9)
     assert gap["after"] > gap["before"]
-    assert max(row["loss_percent"] for row in shown["proposal"]) <= 10.0
+    limited = [row for row in shown["proposal"] if not row["response"].startswith("mount_force")]
+    assert max(row["loss_percent"] for row in limited) <= 10.0
+    why = {row["key"]: row["why_not"] for row in shown["influences"]}
+    assert {key for key, reason in why.items() if not reason} == {
+        text.partition("=")[0] for text in sets
+    }
     page = Path("out/report.html").read_text(encoding="utf-8")
     assert page.index("The tub does not touch the housing") < page.index("Proposal")
+
+
+def test_limits_and_parts_that_may_change_are_the_users(verdict):
+    only = verdict("reference", "--only", "gasket", "--json", "--out", "gasket")
+    changed = json.loads(only.out)["influences"]
+    assert changed
+    assert all(row["key"].startswith("gasket.") for row in changed)
+    tight = ("--limit", "mount_force_peak=0", "--limit", "F=0 %", "--limit", "amplitude=0")
+    shown = json.loads(verdict("reference", *tight, "--json", "--out", "tight").out)
+    if shown["changes"]:
+        named = [row for row in shown["proposal"] if not row["response"].startswith("cabinet")]
+        assert max(row["loss_percent"] for row in named) <= 1e-6
+    assert any("changes by" in row["why_not"] for row in shown["influences"])
+
+
+def test_a_smaller_change_is_not_better_than_the_default(verdict):
+    gaps = []
+    for change in ("20", "9"):
+        shown = json.loads(verdict("reference", "--change", change, "--json", "--out", change).out)
+        gaps += [row["after"] for row in shown["proposal"] if row["response"] == "gap"]
+    assert gaps[0] >= gaps[1]
 
 
 @pytest.mark.parametrize(
@@ -71,6 +97,9 @@ def test_the_answer_and_the_advice_are_those_of_single_runs(verdict):
         (("--clearance", "10 N"), 2, "--clearance"),
         (("--clearance", "-1 mm"), 2, "allowed are 0 mm"),
         (("nothing.yaml",), 2, "nothing.yaml"),
+        (("--limit", "G=5"), 2, "--limit: G: unknown response"),
+        (("--limit", "F=-5"), 2, "is negative"),
+        (("--only", "gaskett"), 2, "--only: gaskett: nothing that can change"),
         (("rodrigues_2010",), 0, ""),  # no springs, so no frequency of bouncing either
     ],
 )

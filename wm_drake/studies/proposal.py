@@ -3,7 +3,8 @@
 Candidates are whatever a study can change: factors of the gasket, variables of a design, any number
 of a part. Of each response the worst load counts. The rule:
 
-1. A candidate may raise no response by more than `MOST_LOSS` of that of the machine.
+1. A candidate may raise no response by more than its limit, `MOST_LOSS` of that of the machine
+   unless the study says otherwise.
 2. The aim is the largest smallest gap. Without a gap among the responses it is the largest
    desirability (Derringer and Suich): the geometric mean over the responses of a number from 0 at
    the worst to 1 at the best value that any run had.
@@ -60,11 +61,14 @@ class Aim:
         goals: Which change of each response is an improvement, by the names of those that have one.
         runs: Responses of the runs that give the ranges; NaN of a failed run. (n, responses)
         machine: Responses of the machine as it is, each of the worst load. (responses,)
+        limits: Largest rise of each response, a share of that of the machine; infinite without one.
+            (responses,), or one number for all.
     """
 
     goals: Mapping[str, Better]
     runs: FloatArray
     machine: FloatArray
+    limits: FloatArray | float = MOST_LOSS
 
     @cached_property
     def _signs(self) -> FloatArray:
@@ -101,12 +105,14 @@ class Aim:
         Args:
             values: Responses of the candidates, each of the worst load. (n, responses)
         """
-        signed, machine = (
-            (self._signs * responses)[..., self._varies] for responses in (values, self.machine)
-        )
-        excess = np.max((signed - machine) / np.maximum(np.abs(machine), 1e-12), axis=1) - MOST_LOSS
+        excess = (self.rises(values) - self.limits)[..., self._varies].max(axis=1)
         value = np.where(excess > 1e-9, -1.0 - excess, self.reached(values))
         return np.nan_to_num(value, nan=-np.inf)
+
+    def rises(self, values: FloatArray) -> FloatArray:
+        """Return by how much responses are worse than those of the machine. (n, responses) [1]"""
+        rise = self._signs * (values - self.machine)
+        return np.asarray(rise / np.maximum(np.abs(self.machine), 1e-12))
 
     def reached(self, values: FloatArray) -> FloatArray:
         """Return how far candidates reach the aim, whatever they lose: 0 to about 1. (n,)"""

@@ -69,7 +69,7 @@ def proposal_text(proposal: xr.Dataset, machine: str = "the machine") -> str:
     if not changes:
         return (
             "No change is proposed: none is clearly better without making another response worse "
-            f"by more than {SHARE.text(MOST_LOSS)}."
+            f"by more than its limit, {SHARE.text(MOST_LOSS)} if none is given."
         )
     text = listed(changes)
     if GAP in proposal.response.values:

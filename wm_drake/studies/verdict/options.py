@@ -24,6 +24,19 @@ class VerdictOptions(Options):
     change: float = option(
         20.0, "Change of a part that is tried, more and less. [%]", "PERCENT", ge=1.0, le=80.0
     )
+    limit: tuple[str, ...] = option(
+        (),
+        "Largest rise that a proposal may cost, in percent of the machine's: of one response or of "
+        "a kind, such as F=5 or mount_force_peak=10. Repeatable. Default: 10 of amplitude, F and "
+        "cabinet_force_peak, none of mount_force_peak.",
+        "NAME=PERCENT",
+    )
+    only: tuple[str, ...] = option(
+        (),
+        "What may change: a key path or its first parts, such as gasket or damper_types. "
+        "Repeatable. Default: springs, dampers, bushings, gasket, counterweights.",
+        "KEY",
+    )
     profile: Path | None = PROFILE
     seed: int = SEED
 

@@ -8,7 +8,7 @@ import xarray as xr
 from wm_drake.report import figure as fig
 from wm_drake.report.formatting import shape_name
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import SPEED, Quantity, of_measure, shown, text_of
+from wm_drake.report.quantity import HIDDEN, SPEED, Quantity, of_measure, shown, text_of
 from wm_drake.studies.answer import Answer, Part, Plot
 from wm_drake.studies.proposal_page import proposal_part
 from wm_drake.studies.stops import stops_sentence
@@ -143,7 +143,7 @@ def _short(
     if tried.sizes["key"]:
         rows.append(("What decides it", _influences_text(tried.isel(key=slice(MOST_NAMED)))))
     words = {response.name: response.title for response in question.responses}
-    made, why = proposal(question, states, tried), why_text(question, tried)
+    made, why = proposal(question, states), why_text(question, tried)
     part = proposal_part(made, why, words, rows)
     word = word_of(question, states, laundry)
     numbers = LabelledTable("numbers", numbers_of(question, states, word))
@@ -325,7 +325,14 @@ def influences_shown(
         {
             "quantity": ("key", words, Quantity("quantity").attributes()),
             **{f"gap_with_{side}": column for side, column in sides.items()},
+            "why_not": ("key", tried.why_not.values, Quantity("why not proposed").attributes()),
         },
-        {"key": keys},
+        {"key": ("key", keys, {HIDDEN: True})},
     )
-    return plot, LabelledTable("influences", data)
+    heading = "Changes that were tried, and why they are not proposed"
+    caption = (
+        f"Smallest gap of all loads with {change} less and more, and why the better side is not "
+        "proposed; empty: part of the proposal. --limit and --only set what a change may cost and "
+        "what may change."
+    )
+    return plot, LabelledTable("influences", data, heading, caption)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from wm_drake.parameters import MachineParameters
+from wm_drake.parameters import MachineParameters, with_value
 from wm_drake.parameters.elements import CurveTable
 from wm_drake.parameters.keys import quantities
 from wm_drake.parameters.types import FloatArray
@@ -21,7 +21,7 @@ from wm_drake.parameters.variation import value_at
 from wm_drake.report.formatting import shape_name
 from wm_drake.report.quantity import CHANGE, Quantity, of_measure
 from wm_drake.simulation.measures.kind import Better
-from wm_drake.simulation.measures.responses import Response
+from wm_drake.simulation.measures.responses import GAP, Response
 from wm_drake.studies.experiment import Experiment, in_three_digits, responses
 from wm_drake.studies.proposal import (
     AFTER,
@@ -50,6 +50,9 @@ MOST_COMBINED = 3
 MOST_TRIED = 10
 """Number of single changes, the best ones, that a combination may contain."""
 
+SMALLER = (0.5, 0.25)
+"""Parts of the change that are tried too of these: a limit may allow less of a change only."""
+
 SIDES = ("less", "more")
 STATES = ("as it is", "with the proposal")
 
@@ -62,6 +65,7 @@ class VerdictQuestion:
         clearance: Gap that must remain. [m]
         change: Change of a part that is tried, as a share of it.
         responses: Responses that tell what a change costs, and the gap.
+        limits: Largest rise of each of them, a share of that of the machine. [1]
         laundry: Description of the random laundry.
         command: Command that gives a verdict on the machine again.
         changes: Values of the proposed change, as text by key path; empty without a proposal.
@@ -71,6 +75,7 @@ class VerdictQuestion:
     clearance: float
     change: float
     responses: tuple[Response, ...]
+    limits: tuple[float, ...]
     laundry: str
     command: str
     changes: Mapping[str, str]
@@ -122,36 +127,118 @@ def influences(experiment: Experiment, keys: Iterable[str], change: float) -> xr
     return runs.assign(text=(("key", "side"), shown)).isel(key=np.argsort(-span, kind="stable"))
 
 
-def proposed(
-    experiment: Experiment, base: xr.Dataset, tried: xr.Dataset, chosen: Sequence[Response]
-) -> ChangedRuns | None:
-    """Return the proposed change, as of `wm_drake.studies.proposal`.
-
-    The candidates are the single changes, and the best one with the best additions to it.
+def aim_of(
+    base: xr.Dataset, tried: xr.Dataset, chosen: Sequence[Response], limits: Sequence[float]
+) -> Aim:
+    """Return what a change shall reach.
 
     Args:
-        experiment: Runs of the machine with all loads.
         base: Runs of the machine as it is, over `load`.
         tried: As of `influences`.
         chosen: Responses that a change may not make worse, and the gap.
+        limits: Largest rise of each, a share of that of the machine.
+    """
+    goals, parts = goals_of(chosen), [values_of(runs, chosen) for runs in (base, tried)]
+    ranges = np.concatenate([part.reshape(-1, len(goals)) for part in parts])
+    return Aim(goals, ranges, worst_of(parts[0], goals), np.array(limits))
+
+
+def proposed(
+    experiment: Experiment,
+    aim: Aim,
+    tried: xr.Dataset,
+    chosen: Sequence[Response],
+    change: float,
+) -> ChangedRuns | None:
+    """Return the proposed change, as of `wm_drake.studies.proposal`.
+
+    The candidates are the single changes, the strongest ones also smaller, and the best one with
+    the best additions to it.
+
+    Args:
+        experiment: Runs of the machine with all loads.
+        aim: As of `aim_of`.
+        tried: As of `influences`.
+        chosen: Responses.
+        change: Change of a number in `tried`, as a share of it.
 
     Returns:
         None if no change is clearly better.
     """
-    goals, parts = goals_of(chosen), [values_of(runs, chosen) for runs in (base, tried)]
-    ranges = np.concatenate([part.reshape(-1, len(goals)) for part in parts])
-    aim = Aim(goals, ranges, worst_of(parts[0], goals))
     if not aim.can_choose or not tried.sizes["key"]:
         return None
-    worst = worst_of(parts[1], goals)
-    value = aim.value(worst.reshape(-1, len(goals))).reshape(worst.shape[:2])
-    ranked = np.argsort(-value.max(axis=1), kind="stable")[:MOST_TRIED]
-    singles = [tried.isel(key=k, side=value[k].argmax()) for k in ranked.tolist()]
-    single = [ChangedRuns(one, {one["key"].item(): one.text.item()}) for one in singles]
+    single = _singles(experiment, aim, tried, chosen, change)
     candidates = [*single, *_combined(experiment, aim, single, chosen)]
-    values = np.array([worst_of(values_of(one.runs, chosen), goals) for one in candidates])
+    values = np.array([_worst(one, aim, chosen) for one in candidates])
     number = aim.proposed(values, [len(one.changes) for one in candidates])
     return None if number is None else candidates[number]
+
+
+def _worst(one: ChangedRuns, aim: Aim, chosen: Sequence[Response]) -> FloatArray:
+    return worst_of(values_of(one.runs, chosen), aim.goals)
+
+
+def _singles(
+    experiment: Experiment,
+    aim: Aim,
+    tried: xr.Dataset,
+    chosen: Sequence[Response],
+    change: float,
+) -> list[ChangedRuns]:
+    """Return the changes of one number that reach most, each as large as is best, best first."""
+    worst = worst_of(values_of(tried, chosen), aim.goals)
+    reached = np.nan_to_num(
+        aim.reached(worst.reshape(-1, len(aim.goals))).reshape(worst.shape[:2]), nan=-np.inf
+    )
+    ranked = np.argsort(-reached.max(axis=1), kind="stable")[:MOST_TRIED]
+    sizes: dict[str, list[ChangedRuns]] = {}
+    smaller: dict[str, tuple[str, str]] = {}
+    for k in ranked.tolist():
+        side = int(reached[k].argmax())
+        one = tried.isel(key=k, side=side)
+        key = one["key"].item()
+        sizes[key] = [ChangedRuns(one, {key: one.text.item()})]
+        for part in SMALLER:
+            factor = 1.0 + (2 * side - 1) * part * change
+            text = _text(experiment.machine.parameters, key, factor)
+            smaller[f"{key}={text}"] = key, text
+    machines = experiment.allowed({name: {key: text} for name, (key, text) in smaller.items()})
+    runs = experiment.at(list(machines), machines.values(), "smaller changes") if machines else None
+    for name in machines:
+        key, text = smaller[name]
+        assert runs is not None
+        sizes[key].append(ChangedRuns(runs.sel(point=name), {key: text}))
+    best = []
+    for of_key in sizes.values():
+        value = aim.value(np.array([_worst(one, aim, chosen) for one in of_key]))
+        best.append((float(value.max()), of_key[int(value.argmax())]))
+    return [one for _, one in sorted(best, key=lambda pair: -pair[0])]
+
+
+def reasons(
+    aim: Aim, tried: xr.Dataset, chosen: Sequence[Response], changed: ChangedRuns | None
+) -> list[str]:
+    """Return why the better side of each change that was tried is not proposed; "" if it is."""
+    worst = worst_of(values_of(tried, chosen), aim.goals)
+    gaps, machine = smallest(tried).values, aim.machine[list(aim.goals).index(GAP)]
+    made = {} if changed is None else changed.changes
+    texts = []
+    for k, key in enumerate(tried["key"].values.tolist()):
+        side = int(np.nan_to_num(gaps[k], nan=-np.inf).argmax())
+        rise = aim.rises(worst[k])[side]
+        beyond = int(np.argmax(rise - aim.limits))
+        if key in made:
+            texts.append("")
+        elif not np.isfinite(rise).all():
+            texts.append("a run fails")
+        elif gaps[k, side] <= machine:
+            texts.append("the gap does not grow")
+        elif rise[beyond] > np.broadcast_to(aim.limits, rise.shape)[beyond]:
+            amount = CHANGE.text(rise[beyond])
+            texts.append(f"{chosen[beyond].title} ({chosen[beyond].name}) changes by {amount}")
+        else:
+            texts.append("gains less" if made else "gains too little")
+    return texts
 
 
 def _combined(
@@ -198,13 +285,12 @@ def values_of(runs: xr.Dataset, chosen: Sequence[Response]) -> FloatArray:
     return np.stack([values[response.name].values for response in chosen], axis=-1)
 
 
-def proposal(question: VerdictQuestion, states: xr.Dataset, tried: xr.Dataset) -> xr.Dataset:
+def proposal(question: VerdictQuestion, states: xr.Dataset) -> xr.Dataset:
     """Return the proposal with its runs, as of `wm_drake.studies.proposal.proposal_of`.
 
     Args:
         question: What is judged.
         states: As of `states_of`.
-        tried: As of `influences`.
     """
     chosen, changes = question.responses, question.changes
     each, dims = in_three_digits(chosen), ("setting", "load", "response")
@@ -217,8 +303,7 @@ def proposal(question: VerdictQuestion, states: xr.Dataset, tried: xr.Dataset) -
     runs = compared(xr.DataArray(values, labels), goals_of(chosen))
     texts = []
     for key, text in changes.items():
-        is_less = tried.text.sel(key=key, side=SIDES[0]).item() == text
-        change = CHANGE.text(-question.change if is_less else question.change)
+        change = CHANGE.text(_ratio(question.machine, key, text) - 1.0)
         value = "of its table" if text.endswith("%") else f"({change})"
         texts.append((words_of(key), f"{text.replace('*', ' ')} {value}", key))
     sets = [f'--set "{key}={text}"' for key, text in changes.items()]
@@ -275,6 +360,13 @@ def _text(parameters: MachineParameters, key: str, factor: float) -> str:
         return f"{FACTOR.values(factor):.4g} %"
     unit = next(u for name, _, u in quantities(parameters) if name == key).for_reader
     return f"{unit.from_si(factor * value_at(parameters, key)):.4g} {unit.shown}"
+
+
+def _ratio(parameters: MachineParameters, key: str, text: str) -> float:
+    """Return a changed number over that of the machine; 1 for a table, which has its percents."""
+    value = value_at(parameters, key)
+    changed = value_at(with_value(parameters, key, text), key)
+    return 1.0 if isinstance(value, CurveTable) else changed / value
 
 
 def words_of(key: str) -> str:

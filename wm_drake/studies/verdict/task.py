@@ -1,21 +1,31 @@
 """Check the options of the verdict, and run it."""
 
+import math
+from collections.abc import Sequence
 from typing import Any
 
-from wm_drake.errors import input_error, problems_at
+from wm_drake.errors import input_error, nearest_names, problems_at
 from wm_drake.model.bodies import with_sdf_values
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
 from wm_drake.model.sdf_names import sdf_names
-from wm_drake.parameters import with_values
+from wm_drake.parameters import MachineParameters, with_values
+from wm_drake.parameters.units import plain_number
+from wm_drake.report.quantity import CHANGE
 from wm_drake.simulation.measures import MEASURES
-from wm_drake.simulation.measures.responses import GAP, has_gap, known_responses, measures_of
+from wm_drake.simulation.measures.responses import (
+    GAP,
+    Response,
+    has_gap,
+    known_responses,
+    measures_of,
+)
 from wm_drake.simulation.measures.stops import STOPS
 from wm_drake.studies.answer import Answer
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.experiment import Experiment
-from wm_drake.studies.inputs import profile_of, selected_cases
-from wm_drake.studies.proposal import command_text
+from wm_drake.studies.inputs import pairs_of, profile_of, selected_cases
+from wm_drake.studies.proposal import MOST_LOSS, command_text
 from wm_drake.studies.study import Task
 from wm_drake.studies.tolerance.options import ToleranceOptions
 from wm_drake.studies.tolerance.study import CONTACTS, laundry_masses
@@ -28,17 +38,23 @@ from wm_drake.studies.verdict.study import (
     SMALLEST_GAP,
     STATES,
     VerdictQuestion,
+    aim_of,
     changeable,
     influences,
     laundry_of,
     proposed,
+    reasons,
     states_of,
 )
 
 NO_SHAPES = "the SDF has no shapes on both tub and housing, so no verdict can be given"
 
-SHOWN_GROUPS = ("amplitude", "F", "mount_force_peak")
-"""Responses that tell what a change costs: displacement, force of the gasket, forces of mounts."""
+LIMITS = {"amplitude": MOST_LOSS, "F": MOST_LOSS, "cabinet_force_peak": MOST_LOSS, GAP: MOST_LOSS}
+"""Largest rise of what a change costs: displacement, force of the gasket, force on the cabinet."""
+
+SHOWN_GROUPS = (*LIMITS, "mount_force_peak")
+"""Responses that a proposal shows. The force of one mount has no limit by default: that of a damper
+is its friction, so that no stronger damper could be proposed."""
 
 
 class VerdictTask(Task):
@@ -57,7 +73,9 @@ class VerdictTask(Task):
         self.laundry = self._laundry(self.machine)
         self.cases = selected_cases(full, None, True, options.profile)
         known = known_responses(full, profile_of(full, options.profile))
-        self.responses = tuple(r for r in known if r.group in SHOWN_GROUPS or r.name == GAP)
+        self.responses = tuple(r for r in known if {r.group, r.name} & {*SHOWN_GROUPS})
+        self.limits = _limits(options.limit, self.responses)
+        self.keys = _changeable(options.only, full)
         measures = {*measures_of(full, self.responses), CONTACTS}
         measures |= {STOPS.name} if STOPS.applies(full) else set()
         self.measures = tuple(name for name in MEASURES if name in measures)
@@ -67,6 +85,8 @@ class VerdictTask(Task):
         """Return the command of this verdict, without sizes."""
         options = self.options
         more = [f"--clearance '{options.clearance}'"] if self.clearance else []
+        more += [f"--limit {limit}" for limit in options.limit]
+        more += [f"--only {key}" for key in options.only]
         return command_text(f"wm-drake verdict {options.machine}", options, *more)
 
     def _laundry(self, machine: Machine) -> ToleranceTask:
@@ -81,7 +101,9 @@ class VerdictTask(Task):
     @property
     def identity(self) -> dict[str, Any]:
         """Return what determines the runs."""
-        return {**self.laundry.identity, "change": f"{self.options.change:g} %"}
+        options = self.options
+        change = {"change": f"{options.change:g} %", "limits": self.limits, "only": options.only}
+        return {**self.laundry.identity, **change}
 
     def run(self, executor: Executor) -> Answer:
         """Run the loads, the changes, and the laundry before and after the proposed change."""
@@ -89,8 +111,9 @@ class VerdictTask(Task):
         experiment = Experiment(self.machine, self.measures, executor.simulate, tuple(self.cases))
         base = experiment.at(STATES[:1], [parameters], "loads").isel(point=0, drop=True)
         samples = [self.laundry.trials(executor).samples()]
-        tried = influences(experiment, changeable(parameters), change)
-        changed = proposed(experiment, base, tried, self.responses)
+        tried = influences(experiment, self.keys, change)
+        aim = aim_of(base, tried, self.responses, self.limits)
+        changed = proposed(experiment, aim, tried, self.responses, change)
         if changed is not None:
             better = build_machine(with_values(parameters, changed.changes))
             samples.append(self._laundry(better).trials(executor).samples())
@@ -99,6 +122,7 @@ class VerdictTask(Task):
             self.clearance,
             change,
             self.responses,
+            self.limits,
             self.laundry.file.about,
             self._command,
             {} if changed is None else changed.changes,
@@ -106,10 +130,38 @@ class VerdictTask(Task):
         return verdict_answer(
             question,
             states_of(base, changed),
-            tried,
+            tried.assign(why_not=("key", reasons(aim, tried, self.responses, changed))),
             laundry_of(samples, self.clearance),
             laundry_masses(samples[0]),
         )
+
+
+def _limits(entries: Sequence[str], chosen: Sequence[Response]) -> tuple[float, ...]:
+    """Return the largest rise of each response, infinite without a limit. [1]"""
+    names = {name for response in chosen for name in (response.name, response.group)}
+    given = dict(LIMITS)
+    for name, text in pairs_of(entries, "--limit"):
+        if name not in names:
+            message = f"unknown response{nearest_names(name, names)}"
+            raise input_error(message, where="--limit", key=name)
+        try:
+            given[name] = CHANGE.unit.to_si(plain_number(text.removesuffix("%").strip()))
+        except ValueError as error:
+            raise input_error(str(error), where="--limit", key=name) from None
+        if given[name] < 0.0:
+            raise input_error("is negative; allowed is 0 and above", where="--limit", key=name)
+    return tuple(given.get(r.name, given.get(r.group, math.inf)) for r in chosen)
+
+
+def _changeable(parts: Sequence[str], parameters: MachineParameters) -> list[str]:
+    """Return the key paths of what may change, below the given ones if there are any."""
+    every = list(changeable(parameters))
+    kept = [k for k in every if not parts or any(f"{k}.".startswith(f"{p}.") for p in parts)]
+    for part in parts:
+        if not any(f"{key}.".startswith(f"{part}.") for key in every):
+            hint = nearest_names(part, every)
+            raise input_error(f"nothing that can change{hint}", where="--only", key=part)
+    return kept
 
 
 def _length(text: str) -> float:
