@@ -40,7 +40,6 @@ from wm_drake.studies.calibrate.study import (
     Calibration,
     SearchPlan,
     calibrate,
-    identity_of,
 )
 from wm_drake.studies.calibrate.targets import Targets, targets_of
 from wm_drake.studies.experiment import Experiment
@@ -80,7 +79,7 @@ def main() -> None:
     targets = _targets_for(arguments, machine.parameters)
     prediction_plan = replace(plan, draws=QUICK_DRAWS) if arguments.quick else PREDICTION
     ledger_path = arguments.out.with_suffix(".sqlite")
-    with open_ledger(ledger_path, identity_of(machine, free, targets, plan), resume=True) as ledger:
+    with open_ledger(ledger_path(machine, free, targets, plan), resume=True) as ledger:
         experiment = Experiment(machine, (), kept_in(ledger))
         with progress_bars(["searches"]) as show:
             calibration = calibrate(

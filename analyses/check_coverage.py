@@ -16,7 +16,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from analysis_tools.ledgers import kept_in
+from analysis_tools.ledgers import calibration_identity, kept_in
 
 from wm_drake.batch.ledger import open_ledger
 from wm_drake.model.build import build_machine
@@ -27,7 +27,7 @@ from wm_drake.parameters.vary_file import VaryFile, load_vary
 from wm_drake.studies.calibrate.computed import Evaluation
 from wm_drake.studies.calibrate.options import CalibrateOptions
 from wm_drake.studies.calibrate.parameter_map import ParameterMap, parameter_map_of
-from wm_drake.studies.calibrate.study import Calibration, SearchPlan, calibrate, identity_of
+from wm_drake.studies.calibrate.study import Calibration, SearchPlan, calibrate
 from wm_drake.studies.calibrate.targets import Targets
 from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.tolerance.shares import share_of
@@ -104,7 +104,7 @@ def _calibrated(
     machine: Machine, free: VaryFile, targets: Targets, plan: SearchPlan
 ) -> Calibration:
     with tempfile.TemporaryDirectory() as folder:
-        identity = identity_of(machine, free, targets, plan)
+        identity = calibration_identity(machine, free, targets, plan)
         with open_ledger(Path(folder) / "ledger.sqlite", identity) as ledger:
             return calibrate(Experiment(machine, (), kept_in(ledger)), free, targets, plan)
 

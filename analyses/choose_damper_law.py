@@ -16,7 +16,7 @@ from typing import Any
 
 from analysis_tools import validation_page as page
 from analysis_tools.goals import sizes_text
-from analysis_tools.ledgers import kept_in
+from analysis_tools.ledgers import calibration_identity, kept_in
 from calibrate_reference import PLAN, REFERENCE, adams_targets
 
 from wm_drake.batch.ledger import open_ledger
@@ -27,7 +27,7 @@ from wm_drake.parameters.files import read_yaml, yaml_text
 from wm_drake.parameters.vary_file import VaryFile
 from wm_drake.report.progress import progress_bar
 from wm_drake.studies.calibrate.solutions import Solution
-from wm_drake.studies.calibrate.study import calibrate, identity_of
+from wm_drake.studies.calibrate.study import calibrate
 from wm_drake.studies.experiment import Experiment
 
 FREE = Path(__file__).with_name(f"{REFERENCE}_free.yaml")
@@ -168,7 +168,7 @@ def main() -> None:
                 few = ("damper_friction", "damper_damping", "motor_mass")
                 free = VaryFile(vary={name: free.vary[name] for name in few})
                 targets = targets.without("middle", "back", "front")
-            identity = identity_of(machine, free, targets, plan)
+            identity = calibration_identity(machine, free, targets, plan)
             kept = (arguments.out or path).with_name(f"{law}.sqlite")
             with open_ledger(kept, identity, resume=True) as ledger:
                 experiment = Experiment(machine, (), kept_in(ledger))

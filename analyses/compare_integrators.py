@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from analysis_tools.spin_profiles import faster_profile
 
 import wm_drake as wm
 from wm_drake.engines.drake import ACCURACY, ACCURATE, LARGEST_STEPS, run_drake
@@ -91,15 +92,10 @@ def error(sizes: np.ndarray, true: np.ndarray) -> float:
     return float(np.abs(sizes / true - 1.0)[3:].max())
 
 
-def quickened(profile: SpinProfile, factor: float) -> SpinProfile:
-    """Return a spin profile that is faster by a factor."""
-    return SpinProfile(time=tuple(np.array(profile.time) / factor), speed=profile.speed)
-
-
 def schemes(factor: float, repeats: int) -> Iterator[tuple[Setting, float, float]]:
     """Yield setting, processor time [s] and error of each scheme."""
     machine = wm.build_machine("reference")
-    profile = quickened(machine.parameters.profile, factor)
+    profile = faster_profile(machine.parameters.profile, factor)
     true = run(machine, "middle", profile, FINEST)[1]
     runs = [[run(machine, "middle", profile, each) for each in SETTINGS] for _ in range(repeats)]
     for setting, *of_setting in zip(SETTINGS, *runs, strict=True):
@@ -114,7 +110,7 @@ def machines() -> Iterator[str]:
         machine = wm.build_machine(name)
         load, step = next(iter(machine.parameters.loads)), machine.parameters.step
         whole = machine.parameters.profile
-        profile = quickened(whole, max(whole.duration / SHORT, 1.0))
+        profile = faster_profile(whole, max(whole.duration / SHORT, 1.0))
         settings = (
             Setting("runge_kutta3", ACCURACY, LARGEST_STEPS * step),
             Setting("runge_kutta3", ACCURATE, step),

@@ -18,6 +18,7 @@ import numpy as np
 import xarray as xr
 from analysis_tools import validation_page as page
 from analysis_tools.component_claims import ARITHMETIC, model_lines, tenth_lines, test_lines
+from analysis_tools.ledgers import spin_cycle_runs
 from analysis_tools.validation_page import NOT_COMPARABLE, listed, verdict
 from analysis_tools.validation_rows import spin_cycle_rows
 
@@ -25,7 +26,6 @@ from wm_drake import build_machine, load_machine, load_profile
 from wm_drake.parameters import MachineParameters, SpinProfile
 from wm_drake.parameters.unbalance_cases import UnbalanceCase, load_unbalance_cases
 from wm_drake.studies.spin_cycle.study import (
-    compiled_runs,
     run_spin_cycle,
 )
 
@@ -101,7 +101,7 @@ def displacements(
     machine: MachineParameters, cases: list[UnbalanceCase], profile: SpinProfile
 ) -> xr.DataArray:
     """Return the RMS displacements of a machine in a spin cycle."""
-    return run_spin_cycle(machine, cases, profile, compiled_runs(build_machine(machine))).rms
+    return run_spin_cycle(machine, cases, profile, spin_cycle_runs(build_machine(machine))).rms
 
 
 def main() -> None:

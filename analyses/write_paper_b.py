@@ -39,7 +39,7 @@ from wm_drake.parameters import (
 from wm_drake.parameters.measured import EXPERIMENT
 from wm_drake.parameters.vary_file import VaryFile
 from wm_drake.report.quantity import quantity_of, shown
-from wm_drake.studies.calibrate.study import SearchPlan, calibrate, identity_of
+from wm_drake.studies.calibrate.study import SearchPlan, calibrate
 from wm_drake.studies.calibrate.targets import targets_of
 from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.gasket.screening import at, labels_of, published_for, sign_differs
@@ -205,7 +205,7 @@ def damping_line(machine: MachineParameters, is_quick: bool) -> list[str]:
     )
     with tempfile.TemporaryDirectory() as folder:
         ledger_path = Path(folder) / "ledger.sqlite"
-        with open_ledger(ledger_path, identity_of(built, free, targets, plan)) as ledger:
+        with open_ledger(ledger_path(built, free, targets, plan)) as ledger:
             found = calibrate(Experiment(built, (), kept_in(ledger)), free, targets, plan)
     best, known = found.solutions[0], found.parameter_map
     misses = float(np.sqrt(np.nanmean(np.log1p(best.errors) ** 2)))

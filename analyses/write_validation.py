@@ -27,6 +27,7 @@ from analysis_tools import validation_page as page
 from analysis_tools import validation_rows as rows
 from analysis_tools.coulomb_table import coulomb_fits, mstv_motions, mstv_of_c, printed_table
 from analysis_tools.gasket_study import ORTHOGONAL, screening_of
+from analysis_tools.ledgers import spin_cycle_runs
 from ruamel.yaml import YAML
 
 from wm_drake import Case, build_machine, load_machine, load_profile
@@ -36,7 +37,7 @@ from wm_drake.parameters.unbalance_cases import load_unbalance_cases
 from wm_drake.rigs import Harmonic
 from wm_drake.studies.spin.comparison import differences_of
 from wm_drake.studies.spin.study import run_spin
-from wm_drake.studies.spin_cycle.study import compiled_runs, run_spin_cycle
+from wm_drake.studies.spin_cycle.study import run_spin_cycle
 
 HERE = Path(__file__).parent
 REASONS, VERIFICATION = HERE / "validation_reasons.yaml", HERE / "verification.yaml"
@@ -73,7 +74,7 @@ def compared(reference: MachineParameters, quick: bool, means_kind: str) -> list
     if not quick:
         chosen = [case for case in load_unbalance_cases() if case.name in SHOWN_BY_A]
         free = load_machine("free_stroke")
-        runs = compiled_runs(build_machine(free))
+        runs = spin_cycle_runs(build_machine(free))
         cycle = run_spin_cycle(free, chosen, load_profile("spin_cycle"), runs)
         table += rows.spin_cycle_rows(cycle.rms)
     return table + rows.coulomb_rows(coulomb(quick))

@@ -12,7 +12,7 @@ from calibrate_reference import PLAN, REFERENCE, adams_targets
 from choose_damper_law import FREE
 
 from analysis_tools.goals import changes_of, printed_changes
-from analysis_tools.ledgers import kept_in
+from analysis_tools.ledgers import calibration_identity, kept_in
 from analysis_tools.steady_net import SteadyNet
 from wm_drake.batch.ledger import open_ledger
 from wm_drake.model.build import build_machine
@@ -22,7 +22,7 @@ from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.vary_file import VaryFile, load_vary
 from wm_drake.studies.calibrate.computed import Evaluation
 from wm_drake.studies.calibrate.parameter_map import ParameterMap, parameter_map_of
-from wm_drake.studies.calibrate.study import calibration_problem, identity_of
+from wm_drake.studies.calibrate.study import calibration_problem
 from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.fitting.problem import FitProblem, Measurement, ModelValues
 from wm_drake.studies.fitting.search import Search, descended
@@ -74,7 +74,7 @@ class FitByRuns:
     @contextmanager
     def _problem(self) -> Iterator[FitProblem]:
         targets = adams_targets(load_machine(REFERENCE))
-        identity = identity_of(self.machine, self.free, targets, PLAN)
+        identity = calibration_identity(self.machine, self.free, targets, PLAN)
         with open_ledger(self.ledger_path, identity, resume=True) as ledger:
             experiment = Experiment(self.machine, (), kept_in(ledger, workers=1))
             parameter_map = parameter_map_of(self.machine, self.free)

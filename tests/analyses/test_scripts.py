@@ -17,7 +17,7 @@ LONG = {  # more than five seconds
     "check_next.py", "check_record_coverage.py",
     "compare_ball_balancer.py", "compare_dampers.py", "compare_measured_balls.py", "compare_rotor_rig.py",
     "spin_up_fmu.py",
-    "compare_designs.py", "compare_mujoco.py", "compare_searches.py", "compare_speed.py",
+    "compare_designs.py", "compare_integrators.py", "compare_mujoco.py", "compare_searches.py", "compare_speed.py",
     "fit_coulomb_to_mstv.py", "write_paper_a.py", "write_paper_b.py",
     "show_timeline.py", "time_page.py", "write_paper_c.py", "write_validation.py",
 }  # fmt: skip
