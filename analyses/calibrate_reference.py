@@ -19,7 +19,7 @@ from pathlib import Path
 
 import pandas as pd
 from analysis_tools.gasket_study import LOADS, agreement, screening_of
-from analysis_tools.ledgers import kept_in
+from analysis_tools.ledgers import calibration_identity, kept_in
 from analysis_tools.sdf_text import sdf_with
 from analysis_tools.study_targets import study_targets
 
@@ -79,7 +79,9 @@ def main() -> None:
     targets = _targets_for(arguments, machine.parameters)
     prediction_plan = replace(plan, draws=QUICK_DRAWS) if arguments.quick else PREDICTION
     ledger_path = arguments.out.with_suffix(".sqlite")
-    with open_ledger(ledger_path(machine, free, targets, plan), resume=True) as ledger:
+    with open_ledger(
+        ledger_path, calibration_identity(machine, free, targets, plan), resume=True
+    ) as ledger:
         experiment = Experiment(machine, (), kept_in(ledger))
         with progress_bars(["searches"]) as show:
             calibration = calibrate(

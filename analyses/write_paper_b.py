@@ -25,7 +25,7 @@ from analysis_tools.claims import (
     numbers,
 )
 from analysis_tools.gasket_study import LOADS, agreement, screening_of
-from analysis_tools.ledgers import kept_in
+from analysis_tools.ledgers import calibration_identity, kept_in
 
 from wm_drake import Case, build_machine, load_machine, modes, simulate_many
 from wm_drake.batch.ledger import open_ledger
@@ -205,7 +205,7 @@ def damping_line(machine: MachineParameters, is_quick: bool) -> list[str]:
     )
     with tempfile.TemporaryDirectory() as folder:
         ledger_path = Path(folder) / "ledger.sqlite"
-        with open_ledger(ledger_path(built, free, targets, plan)) as ledger:
+        with open_ledger(ledger_path, calibration_identity(built, free, targets, plan)) as ledger:
             found = calibrate(Experiment(built, (), kept_in(ledger)), free, targets, plan)
     best, known = found.solutions[0], found.parameter_map
     misses = float(np.sqrt(np.nanmean(np.log1p(best.errors) ** 2)))
