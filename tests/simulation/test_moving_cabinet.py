@@ -247,7 +247,10 @@ def test_a_cabinet_that_tips_over_is_said_to():
     )
     with pytest.warns(DivergenceWarning):
         in_drake = simulate(machine, case, "drake-accurate").attrs["diverged"]
-    assert in_drake.partition(";")[0] == told.partition(";")[0]
+    ours, drakes = (re.split(r"(\d\.\d{3}) s", text.partition(";")[0]) for text in (told, in_drake))
+    assert ours[::2] == drakes[::2]
+    # our run is repeated with closer samples, one of which is the first beyond the bound
+    assert float(ours[1]) == pytest.approx(float(drakes[1]), abs=0.005)
     table = simulate_many(machine, [case], measures=["extremes"], histories=False)
     assert list(table.diverged) == [told]
 

@@ -232,7 +232,7 @@ def test_diverging_run_stops_keeps_its_record_and_reports_time_and_reason(machin
     with pytest.warns(DivergenceWarning, match=r"diverged at .* s: (roll|pitch|yaw|x|y|z) = "):
         record = simulate(machine, violent, engine)
     assert "last good state at" in record.attrs["diverged"]
-    assert 10 < record.sizes["time"] < 1800
+    assert 0.05 < record.time[-1] < FAST_RUN_UP.duration
     assert np.isfinite(record.displacement).all()
     assert np.max(np.abs(record.tub_position)) <= 0.5
 
