@@ -93,7 +93,7 @@ def planted(count, seed, spread=0.1):
 
 
 def test_the_risk_of_a_chosen_threshold_is_the_tolerated_one_and_its_intervals_hold():
-    """Of 300 repeats: the mean risk, and how often the interval has the risk of 20,000 loads."""
+    """Check the mean risk of 300 repeats, and how often the interval has the risk of 20,000 loads."""
     true_score, true_touch = planted(20000, 10**6)
     risks, holds = [], []
     for seed in range(300):

@@ -211,7 +211,7 @@ def test_candidates_add_loads_and_sensors_to_the_machine(tmp_path):
 
 
 def test_a_calibration_to_records_is_known_without_its_recorder(tmp_path):
-    """Of a normal distribution of three, two have their part of the covariance."""
+    """Keep, of a normal distribution of three, the part of the covariance of two."""
     force, mass = "damper_types.friction.friction_force", "bodies.motor.mass"
     vary = tmp_path / "vary.yaml"
     vary.write_text(

@@ -68,7 +68,7 @@ class Response:
 
     @property
     def better(self) -> Better:
-        """The change that is an improvement."""
+        """Return the change that is an improvement."""
         return self.variable.better
 
     @property

@@ -168,7 +168,7 @@ class MachineDesigns:
 
     @property
     def parameters(self) -> MachineParameters:
-        """The machine."""
+        """Return the machine."""
         return self.varying.machine
 
     @cached_property

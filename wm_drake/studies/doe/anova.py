@@ -93,12 +93,12 @@ class SumCoding:
 
     @functools.cached_property
     def covariance(self) -> FloatArray:
-        """The covariance of the coefficients for responses of unit variance."""
+        """Return the covariance of the coefficients for responses of unit variance."""
         return np.asarray(self.inverse @ self.inverse.T)
 
     @functools.cached_property
     def leverages(self) -> FloatArray:
-        """The diagonal of the hat matrix. (trials,)"""
+        """Return the diagonal of the hat matrix. (trials,)"""
         return np.asarray(np.einsum("ij,ji->i", self.matrix, self.inverse))
 
     @functools.cached_property
