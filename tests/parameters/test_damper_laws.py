@@ -24,7 +24,9 @@ def test_arguments_of_the_law_are_the_fields_of_the_class_in_their_order(name):
 @pytest.mark.parametrize("name", DAMPER_LAWS)
 def test_law_and_class_cite_the_equations_of_the_entry(name):
     law = DAMPER_LAWS[name]
-    paper, numbers = re.match(r"(\[\w\]) (.*)", law.equations).groups()
+    cited = re.fullmatch(r"(\[\w+\]|own derivation)(?: (.+))?", law.equations)
+    assert cited, f"{name}: write equations='[C] (4)' or 'own derivation', not '{law.equations}'"
+    paper, numbers = cited[1], cited[2] or ""
     for text in (law.response.py_func.__doc__, law.parameters.__doc__):
         assert paper in text
         assert numbers.split(", ")[0] in text
