@@ -68,6 +68,7 @@ FILES = {  # what a block with a file is called in the commands of its page
     "docs/how-to/compliant-bearing.md": ["whirling.yaml", "loose.yaml"],
     "docs/how-to/cycle.md": ["towels.yaml"],
     "docs/how-to/designs.md": ["mine.yaml"],
+    "docs/how-to/detect-unbalance.md": ["monitor.yaml"],
     "docs/how-to/drive.md": ["drive.yaml"],
     "docs/how-to/floor.md": ["on_my_floor.yaml", "on_soft_feet.yaml"],
     "docs/how-to/gasket-drawing.md": ["one_fold.yaml", "measured_rubber.yaml"],

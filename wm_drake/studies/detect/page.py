@@ -88,8 +88,10 @@ def detect_answer(question: RiskQuestion, draws: Draws, more: Sequence[Controlle
         answer_text(question, draws, chosen, verdict),
         question.machine,
         (
-            Part("The threshold", (decision_plot(table, chosen), _decisions(table, chosen))),
-            Part("Truth and estimate", (truth_plot(errors, touches[judged]), _errors(errors))),
+            Part("The threshold", (decision_plot(table, chosen),)),
+            Part("Truth and estimate", (truth_plot(errors, touches[judged]),)),
+            Part("Thresholds", (_decisions(table, chosen),)),
+            Part("Errors", (_errors(errors),)),
             Part("What would gain most", (_ranking(ranking),), text=ABOUT_RANKING),
             Part(
                 "Speed limits",
