@@ -117,7 +117,8 @@ def test_a_run_that_diverges_says_what_drakes_says(machine):
     drake, compiled = records
     coordinates = [record.attrs["diverged"].split(":")[1].split("=")[0] for record in records]
     assert coordinates[0] == coordinates[1]
-    assert abs(compiled.sizes["time"] - drake.sizes["time"]) <= 2
+    ends = [record.time[-1].item() for record in records]  # s; a repeated run has closer samples
+    assert ends[0] == pytest.approx(ends[1], abs=0.01)
     assert np.isfinite(compiled.displacement).all()
 
 
