@@ -2,7 +2,6 @@
 
 import io
 import itertools
-import re
 import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,9 +15,6 @@ from wm_drake.parameters.units import LARGEST_NUMBER, comma_hint
 
 if TYPE_CHECKING:  # slow to import: CSV files
     import pandas as pd
-
-_BRACKETS = re.compile(r"\s*\[([^\[\]\s]+)\]$")
-"""Unit in brackets at the end of a column's name."""
 
 _SIGNS = "; columns are separated by commas, and the decimal sign is a point"
 
@@ -141,7 +137,10 @@ def _table(text: str, **options: Any) -> "pd.DataFrame":
 
 def _with_unit(name: str) -> str:
     """Return a column's name with its unit as our tables write it: `time_s` of `time [s]`."""
-    return _BRACKETS.sub(lambda match: f"_{match[1].replace('/', '_per_')}", name)
+    words, bracket, unit = name.rpartition("[")
+    if not bracket or not unit.endswith("]"):
+        return name
+    return f"{words.rstrip()}_{unit[:-1].strip().replace('/', '_per_')}"
 
 
 def with_distinct_times(samples: FloatArray, where: str) -> FloatArray:
