@@ -103,7 +103,7 @@ class SumCoding:
 
     @functools.cached_property
     def rank(self) -> int:
-        """The number of coefficients that the design determines."""
+        """Return the number of coefficients that the design determines."""
         return int(np.linalg.matrix_rank(self.matrix))
 
     def residual_variance(self, sum_sq: float) -> float:

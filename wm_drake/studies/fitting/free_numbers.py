@@ -37,7 +37,7 @@ class FreeNumbers:
 
     @property
     def base(self) -> MachineParameters:
-        """The machine."""
+        """Return the machine."""
         return self.varying.machine
 
     @property

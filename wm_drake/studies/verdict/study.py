@@ -65,7 +65,6 @@ class VerdictQuestion:
         clearance: Gap that must remain. [m]
         change: Change of a part that is tried, as a share of it.
         responses: Responses that tell what a change costs, and the gap.
-        limits: Largest rise of each of them, a share of that of the machine. [1]
         laundry: Description of the random laundry.
         command: Command that gives a verdict on the machine again.
         changes: Values of the proposed change, as text by key path; empty without a proposal.
@@ -75,7 +74,6 @@ class VerdictQuestion:
     clearance: float
     change: float
     responses: tuple[Response, ...]
-    limits: tuple[float, ...]
     laundry: str
     command: str
     changes: Mapping[str, str]

@@ -122,7 +122,6 @@ class VerdictTask(Task):
             self.clearance,
             change,
             self.responses,
-            self.limits,
             self.laundry.file.about,
             self._command,
             {} if changed is None else changed.changes,
