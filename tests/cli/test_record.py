@@ -78,6 +78,21 @@ def test_windows_with_missing_samples_are_empty(wm_drake):
     np.testing.assert_allclose(first[~empty], 0.3, rtol=0.01)
 
 
+@pytest.mark.parametrize("value", [0.0, -9999.0, 65535.0])
+def test_windows_of_a_dropout_are_empty(wm_drake, value):
+    """Fill one and a half seconds as a wireless recorder does, or as one without a signal."""
+    generator = np.random.default_rng(3)
+    wave = 0.3 * np.cos(2.0 * np.pi * 5.0 * TIME) + 1e-3 * generator.standard_normal(len(TIME))
+    wave[1100:1250] = value
+    speed = np.full(len(TIME), 300.0)
+    CLOCKS[".csv"](Path("x.csv"), {"speed": (TIME, speed, "rpm"), "Acc 1": (TIME, wave, "g")})
+    ended = wm_drake("record", "orders", "x.csv", "--json", "--out", "o")
+    assert "150 samples are left out" in ended.err
+    first = amplitudes_of(ended)
+    assert first[(first.index > 11.0) & (first.index < 12.5)].isna().all()
+    np.testing.assert_allclose(first.dropna(), 0.3, rtol=0.01)
+
+
 def test_units_are_named_where_a_file_has_none(wm_drake):
     written("x.mat", unit="-")
     ended = wm_drake("record", "orders", "x.mat", "--json", "--out", "o")

@@ -27,8 +27,11 @@ NOISE, GAIN, OFFSET, TILT = 0.02, 0.01, 0.1, np.deg2rad(2.0)
 """Noise [m/s^2], deviations of gains and offsets [1, m/s^2], and tilt [rad] of the sensors."""
 
 
-def plant(changes, seed=1, repeats=3, angle=0.0, stem="run", of_load="middle"):
-    """Write records of the reference machine with other numbers, by sensors that are not ideal."""
+def plant(changes, seed=1, repeats=3, angle=0.0, stem="run", of_load="middle", off=(0.0, 0.0, 0.0)):
+    """Write records of the reference machine with other numbers, by sensors that are not ideal.
+
+    `off` is by what the place of each sensor is off. [m]
+    """
     parameters = load_machine("reference")
     Path("p.yaml").write_text(PROFILE)
     machine = build_machine(with_values(parameters, changes))
@@ -43,7 +46,7 @@ def plant(changes, seed=1, repeats=3, angle=0.0, stem="run", of_load="middle"):
         tilt = TILT * generator.choice([-1.0, 1.0], 3) / np.sqrt(3.0)
         fields = {"frame": "any", "axis": name[-1], "tilt": tilt.tolist()}
         sensor = RecordedSensor.model_validate(fields)
-        signals[f"Acc {number}"] = recorded_signal(record, sensor, points[name[:2]])
+        signals[f"Acc {number}"] = recorded_signal(record, sensor, points[name[:2]] + np.array(off))
         place = f"frame: {frames[name[:2]]}, axis: {name[-1]}"
         lines.append(f"  {name}: {{channel: Acc {number}, {place}}}\n")
     Path("test.yaml").write_text("".join(lines))
@@ -100,6 +103,33 @@ def test_a_planted_friction_is_found(calibrate, by):
     knowledge = of_calibration_folder(machine, "out/calibrated_vary.yaml", Path("out"))
     assert list(knowledge.names) == [FRICTION]
     assert knowledge.values(np.zeros((1, 1))).item() == pytest.approx(found["value"], rel=1e-5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("changes", "off", "old", "new", "number", "value"),
+    [
+        (1.05, (0.0, 0.0, 0.0), "load:", "load_deviation: 5 %\nload:", "mass of load middle", 1.05),
+        (1.0, (0.0, 0.03, 0.0), "axis:", "place_deviation: 20 mm, axis:", "y of S1_x", 30.0),
+    ],
+)
+def test_what_is_not_known_of_load_and_places_is_found_or_said(
+    calibrate, changes, off, old, new, number, value
+):
+    """Plant a load, or places of sensors, that are off; the friction is within its interval."""
+    machine = load_machine("reference")
+    key, mass = "loads.middle.unbalances.0.mass", machine.loads["middle"].unbalances[0].mass
+    truth = 1.35 * machine.damper_types["friction"].friction_force
+    files = plant({FRICTION: truth, key: changes * mass}, off=off)
+    words = ("--unknown", FRICTION)
+    wrong = calibrate(files, *words)["estimates"][0]
+    assert not wrong["lower_95"] < truth < wrong["upper_95"]
+    text = Path("test.yaml").read_text()
+    Path("test.yaml").write_text(text.replace(old, new))
+    found = {row["unknown"]: row for row in calibrate(files, *words)["estimates"]}
+    assert found[FRICTION]["lower_95"] < truth < found[FRICTION]["upper_95"]
+    assert found[FRICTION]["value"] == pytest.approx(truth, rel=0.03)
+    assert found[number]["lower_95"] < value < found[number]["upper_95"]
 
 
 SOON = ("springs", "envelope")

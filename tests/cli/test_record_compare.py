@@ -21,11 +21,9 @@ regions: [{name: R1, begin: 4 s, end: 10 s}, {name: R2, begin: 10 s, end: 16 s},
 SENSORS = ("S1_x", "S1_z", "S2_y")
 
 
-@pytest.fixture(scope="module")
-def laboratory(tmp_path_factory):
-    """Return time, channels with names of a recorder, and the times of the run of the samples."""
-    folder = tmp_path_factory.mktemp("profile")
-    (folder / "p.yaml").write_text(PROFILE)
+def measured(folder, profile=PROFILE):
+    """Return time, channels with names of a recorder, and the drum speed. [s, g, rpm]"""
+    (folder / "p.yaml").write_text(profile)
     fine = with_values(load_machine("reference"), {"step": 1.25e-3, "output_period": 1.25e-3})
     machine = build_machine(fine)
     case = Case("middle", fine.loads["middle"], load_profile(folder / "p.yaml"))
@@ -36,6 +34,12 @@ def laboratory(tmp_path_factory):
     rpm = np.interp(at, record.time.values, record.drum_speed.values) * 30.0 / np.pi
     renamed = {f"Acc {k}": channels[name] for k, name in enumerate(SENSORS, 1)}
     return time, renamed, rpm
+
+
+@pytest.fixture(scope="module")
+def laboratory(tmp_path_factory):
+    """Return what is measured of the profile."""
+    return measured(tmp_path_factory.mktemp("profile"))
 
 
 @pytest.fixture
@@ -70,7 +74,8 @@ def write_test(speed="speed: {channel: Drum}\n", load="load: middle\n", **change
 def write_csv(path, time, channels):
     names = ",".join(f"{name} [{unit}]" for name, (_, unit) in channels.items())
     table = np.column_stack([time, *(values for values, _ in channels.values())])
-    np.savetxt(path, table, delimiter=",", header=f"time [s],{names}", comments="", fmt="%.17g")
+    header = f"time [s],{names}".replace(" []", "")
+    np.savetxt(path, table, delimiter=",", header=header, comments="", fmt="%.17g")
 
 
 def rows(result, name, key):
@@ -237,6 +242,14 @@ def twice_the_speed(of):
     of["Drum"] = (2.0 * of["Drum"][0], "rpm")
 
 
+def without_a_unit(of):
+    of["Acc 1"] = (of["Acc 1"][0], "")
+
+
+def in_ticks(of):
+    of["time"] = np.floor(of["time"] / 0.05) * 0.05
+
+
 def ac_coupled(of):
     of["Acc 2"] = (of["Acc 2"][0] - 1.0, "g")
 
@@ -251,7 +264,9 @@ def ac_coupled(of):
         (clipped, "S1_z: is clipped", 0.0),
         (speed_off, "speed: stays at exactly 0", 0.0),
         (ac_coupled, "S1_z: gravity is taken out of it (gravity: removed)", 0.0),
+        (in_ticks, "its time stamps are ticks of 0.05 s", 0.0),
         (set_forward, "time jumps by 0.7 s", None),
+        (without_a_unit, "Acc 1: has no unit; write 'Acc 1 [m/s^2]' in the header", None),
         (exchanged, "the channels of S1_x and S1_z are exchanged", None),
         (reversed_x, "S1_x: it has the other sign (polarity: negative)", None),
         (reversed_z, "S1_z: it has the other sign (polarity: negative)", None),
@@ -279,6 +294,80 @@ def test_planted_faults_are_named_or_left_out(wm_drake, laboratory, plant, messa
     for row in result["sensors_acceleration"]:
         assert abs(row["difference_percent"]) < 1.0
         assert row["within_percent"] > 95.0
+
+
+def test_milliseconds_without_a_unit_are_asked_for(compare, laboratory):
+    time, channels, rpm = laboratory
+    write_csv("run.csv", 1e3 * time, {**channels, "Drum": (rpm, "rpm")})
+    Path("run.csv").write_text(Path("run.csv").read_text().replace("time [s]", "time", 1))
+    assert "--unit time=ms" in compare("run.csv", "--test", "test.yaml", code=2)
+    result = compare("run.csv", "--test", "test.yaml", "--unit", "time=ms")
+    assert max(row["error_percent"] for row in result["errors_acceleration"]) < 0.1
+
+
+def test_a_drum_that_turned_the_other_way_is_named(compare, tmp_path_factory):
+    """Record with a tacho that does not tell the direction, then name a profile of it."""
+    backwards = PROFILE.replace("320, 320", "-320, -320")
+    time, channels, rpm = measured(tmp_path_factory.mktemp("backwards"), backwards)
+    write_csv("run.csv", time, {**channels, "Drum": (np.abs(rpm), "rpm")})
+    error = compare("run.csv", "--test", "test.yaml", code=2)
+    assert error.count("what explains it: the drum turned the other way") == 1
+    assert error.count(";") < 3  # one cause is named, no other
+    Path("back.yaml").write_text(backwards)
+    result = compare("run.csv", "--test", "test.yaml", "--profile", "back.yaml")
+    assert max(row["error_percent"] for row in result["errors_acceleration"]) < 0.3
+
+
+def rounded(time, channels):
+    return time, {n: (np.round(v, 3), u) for n, (v, u) in channels.items()}
+
+
+def cut_and_later(time, channels):
+    return 5.0 + time[700:], {n: (v[700:], u) for n, (v, u) in channels.items()}
+
+
+@pytest.mark.parametrize("changed", [lambda *record: record, rounded, cut_and_later])
+def test_a_copy_is_no_repeat(compare, laboratory, changed):
+    """Copy a record, also with fewer digits, or cut, with other time stamps."""
+    time, channels, _ = laboratory
+    generator = np.random.default_rng(4)
+
+    def noisy():
+        return {
+            n: (v + 0.002 * generator.standard_normal(len(v)), u) for n, (v, u) in channels.items()
+        }
+
+    write_test(speed="")
+    first = noisy()
+    write_csv("run.csv", time, first)
+    write_csv("copy.csv", *changed(time, first))
+    write_csv("repeat.csv", time, noisy())
+    words = ("--test", "test.yaml")
+    error = compare("run.csv", "repeat.csv", "copy.csv", *words, code=2)
+    assert "copy.csv: has the same samples as run.csv" in error
+    compare("run.csv", "repeat.csv", *words)
+
+
+@pytest.mark.parametrize("speed", ["profile", "measured"])
+def test_missing_pulses_of_a_tacho_are_counted(wm_drake, laboratory, speed):
+    """Take four of some eighty pulses away, two of them neighbours."""
+    time, channels, rpm = laboratory
+    angle = np.cumsum(rpm * np.pi / 30.0 * np.gradient(time))
+    high = np.flatnonzero(np.diff((np.sin(angle) > 0.0).astype(int)) > 0)
+    pulses = np.zeros(len(time))
+    for number, at in enumerate(high):
+        if number not in (12, 13, 24, 35):
+            pulses[at + 1 : at + 20] = 5.0
+    write_csv("run.csv", time, {**channels, "Drum": (pulses, "V")})
+    write_test(speed="speed: {channel: Drum, kind: pulses, pulses_per_turn: 1}\n")
+    words = ("--test", "test.yaml", "--speed", speed, "--profile", "p.yaml", "--json")
+    ended = wm_drake("record", "compare", "run.csv", *words)
+    assert "4 pulses are missing; they are counted" in ended.err
+    result = json.loads(ended.out)
+    for row in result["sensors_acceleration"]:
+        assert abs(row["difference_percent"]) < (0.5 if speed == "profile" else 1.0)
+    errors = [row["error_percent"] for row in result["errors_acceleration"]]
+    assert max(errors) < (0.3 if speed == "profile" else 2.0)
 
 
 @pytest.mark.parametrize("has_speed", [True, False])

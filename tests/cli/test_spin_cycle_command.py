@@ -157,24 +157,54 @@ def test_measured_accelerations_are_integrated(study):
     assert error == pytest.approx(expected, rel=0.02)
 
 
-def test_accelerometers_with_gravity_agree_with_a_perfect_machine(study):
-    """Record the machine itself, with gravity along axes that turn with the tub."""
-    study("--case", "front")
+def accelerations_of_the_machine():
+    """Return time and signals of accelerometers with gravity, of the machine itself."""
+    Path("c.csv").write_text(CASES)
+    Path("p.yaml").write_text(PROFILE)
     machine = build_machine(load_machine("reference"))
     (case,) = (c for c in load_unbalance_cases(Path("c.csv")) if c.name == "front")
     run = simulate(machine, Case("front", case.load(machine.parameters), load_profile("p.yaml")))
     test = recorded_test_of(machine.parameters)
     points = sensor_points(machine, test)
-    signals = {
-        n: recorded_signal(run, s, points[n]) for n, s in test.sensors.items() if n[2:3] == "_"
-    }
+    sensors = {n: s for n, s in test.sensors.items() if n[2:3] == "_"}
+    signals = {n: recorded_signal(run, s, points[n]) for n, s in sensors.items()}
+    return {"time_s": run.time.values, **signals}
+
+
+def with_accelerations(study, signals, *words):
+    """Return how the study ends with records of a case."""
     Path("records").mkdir()
-    pd.DataFrame({"time_s": run.time.values, **signals}).to_csv("records/front.csv", index=False)
-    ended = study("--json", "--case", "front", "--accelerations", "records", "--overwrite")
+    pd.DataFrame(signals).to_csv("records/front.csv", index=False)
+    return study("--json", "--case", "front", "--accelerations", "records", *words)
+
+
+def test_accelerometers_with_gravity_agree_with_a_perfect_machine(study):
+    """Record the machine itself, with gravity along axes that turn with the tub."""
+    ended = with_accelerations(study, accelerations_of_the_machine())
     shown = json.loads(ended.out)
     assert max(row["mean_error_percent"] for row in shown["regions"]) < 0.1
+    assert "not like its prediction" not in ended.err
     without = rms_of(shown, "rms_recorded") / rms_of(shown) - 1.0
     assert np.abs(without).max() > 0.02  # what the sensors add to the motion
+
+
+@pytest.mark.parametrize(
+    ("channels", "factor", "cause"),
+    [
+        ({"S1_x": "S1_z", "S1_z": "S1_x"}, 1.0, "the channels of S1_x and S1_z are exchanged"),
+        ({"S2_y": "S3_z", "S3_z": "S2_y"}, 1.0, "the channels of S2_y and S3_z are exchanged"),
+        ({}, 1.0 / 9.80665, "are larger than declared by the factor 0.102 (g)"),
+    ],
+)
+def test_accelerations_unlike_the_model_are_explained(study, channels, factor, cause):
+    signals = accelerations_of_the_machine()
+    time = signals.pop("time_s")
+    turned = {name: factor * signals[channels.get(name, name)] for name in signals}
+    ended = with_accelerations(study, {"time_s": time, **turned})
+    assert ended.code == 0
+    assert json.loads(ended.out)["regions"][1]["mean_error_percent"] > 1.0
+    (text,) = (line for line in ended.err.splitlines() if "not like its prediction" in line)
+    assert cause in text
 
 
 @pytest.mark.slow

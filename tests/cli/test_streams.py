@@ -1,5 +1,6 @@
 """Closed and full streams lose no results, and Ctrl-C ends with one line from the first line on."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -21,6 +22,14 @@ def test_streams_that_are_closed_or_full_lose_no_results(tmp_path, streams, code
     assert ended.returncode == code
     assert not ended.stderr
     assert {"run.json", "report.html"} <= {path.name for path in (tmp_path / "out").iterdir()}
+
+
+def test_a_locale_of_a_batch_system_is_no_obstacle(tmp_path):
+    plain = {"LC_ALL": "C", "PYTHONUTF8": "0", "PATH": os.environ["PATH"], "HOME": str(tmp_path)}
+    words = [sys.executable, "-m", "wm_drake", "machine", "check", "reference"]
+    ended = subprocess.run(words, cwd=tmp_path, env=plain, capture_output=True, check=False)
+    assert (ended.returncode, ended.stderr) == (0, b"")
+    assert b"valid" in ended.stdout
 
 
 NUMBER = """

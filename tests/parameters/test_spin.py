@@ -238,3 +238,18 @@ def test_a_share_of_water_may_be_in_percent(text, share):
     (found,) = Load.model_validate({"unbalances": [mass]}).unbalances
     assert found.water.share == pytest.approx(share)
     assert found.water.left == pytest.approx((1.0, 0.6))
+
+
+def test_a_profile_up_to_a_time_has_the_regions_that_end_by_then():
+    text = {"time": "(0, 10, 20) s", "speed": "(0, 100, 300) rpm"}
+    parts = [
+        {"name": name, "begin": f"{begin} s", "end": f"{end} s"}
+        for name, begin, end in (("A", 0, 5), ("B", 5, 15), ("C", 15, 20))
+    ]
+    profile = SpinProfile.model_validate({**text, "regions": parts})
+    short = profile.until(15.0)
+    assert short.time == (0.0, 10.0, 15.0)
+    assert short.speed == pytest.approx(np.array([0.0, 100.0, 200.0]) * math.pi / 30.0)
+    assert [region.name for region in short.regions] == ["A", "B"]
+    assert profile.until(10.0).time == (0.0, 10.0)
+    assert profile.until(25.0) is profile

@@ -388,6 +388,19 @@ class SpinProfile(Frozen):
         halvings = np.ceil(np.log2(max(1.0, in_turn)) - 1e-9)
         return float(longest / 2.0**halvings)
 
+    def until(self, end: float) -> "SpinProfile":
+        """Return the profile up to a time, with the regions that end by then.
+
+        Args:
+            end: Later than the first point. [s]
+        """
+        if end >= self.duration:
+            return self
+        time = (*(t for t in self.time if t < end), end)
+        speed = tuple(np.interp(time, self.time, self.speed).tolist())
+        regions = tuple(region for region in self.regions if region.end <= end)
+        return self.model_copy(update={"time": time, "speed": speed, "regions": regions})
+
     def acceleration(self) -> list[float]:
         """Return the angular acceleration between each two points. [rad/s^2]"""
         return [float(a) for a in np.diff(self.speed) / np.diff(self.time)]

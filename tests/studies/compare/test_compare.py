@@ -21,7 +21,7 @@ from wm_drake.studies.compare.checks import (
     largest_share_of_noise,
     shares_of_order_one,
 )
-from wm_drake.studies.compare.pairs import Pair
+from wm_drake.studies.compare.pairs import Pair, measured_profile
 from wm_drake.studies.compare.recordings import TestRecording as Recorded
 from wm_drake.studies.compare.signals import band_passed, envelopes_of, in_pieces, means_at
 from wm_drake.studies.compare.study import LEAST_TOLERANCE, amplitudes_of
@@ -186,3 +186,22 @@ def test_a_record_of_few_revolutions_tells_nothing():
     run, wave = steady(3.0, seconds=2.5)
     with pytest.raises(InputError, match="8 revolutions"):
         check_pair(pair_of(run, wave, wave))
+
+
+@pytest.mark.parametrize(
+    ("first", "slope", "lead"),
+    [(2.5, 2.5, 1.0), (0.0, 2.5, 0.0), (20.0, 0.0, 11.0), (100.0, 0.0, 13.0), (25.0, -1.0, 13.0)],
+)
+def test_a_measured_speed_is_led_to_from_rest(first, slope, lead):
+    """Begin while the drum turns: rising from rest, at rest, steady, fast, and falling. [rad/s]"""
+    time = 0.01 * np.arange(2000)
+    speed = first + slope * (time - 0.125)  # points lie in the middle of a quarter of a second
+    recording = Recorded(Synchronous(Path("x.csv"), time, {}), speed)
+    profile, alignment, begin = measured_profile(recording, speed)
+    assert begin == pytest.approx(lead, abs=0.05)
+    assert profile.speed[0] == 0.0
+    assert alignment.of_run(0.125) == pytest.approx(begin, abs=0.006)
+    at = np.linspace(2.0, 17.0, 50)
+    np.testing.assert_allclose(
+        profile.speed_at(alignment.of_run(at)), np.interp(at, time, speed), atol=0.03
+    )

@@ -26,17 +26,19 @@ NAMES = ("S1_x", "S1_y", "S1_z", "S2_x", "S3_z")
 def runs():
     """Return sensors, points, and runs: as declared, backwards, of another load and machine."""
     parameters = load_machine("reference")
-    soft = {
+    changes = {
         f"spring_types.{n}.stiffness": 0.6 * s.stiffness for n, s in parameters.spring_types.items()
     }
-    machine, other = build_machine(parameters), build_machine(with_values(parameters, soft))
+    friction = "damper_types.friction.friction_force"
+    changes[friction] = 2.5 * parameters.damper_types["friction"].friction_force
+    machine, other = build_machine(parameters), build_machine(with_values(parameters, changes))
     loads = parameters.loads
     backwards = PROFILE.model_copy(update={"speed": tuple(-w for w in PROFILE.speed)})
     cases = {
         "declared": (machine, loads["middle"], PROFILE),
         "backwards": (machine, loads["middle"], backwards),
         "counter": (machine, loads["counter"], PROFILE),
-        "soft": (other, loads["middle"], PROFILE),
+        "other": (other, loads["middle"], PROFILE),
     }
     records = {n: simulate(m, Case(n, load, profile)) for n, (m, load, profile) in cases.items()}
     sensors = recorded_test_of(parameters).sensors
@@ -105,7 +107,7 @@ def test_as_declared_nothing_is_tried(runs):
 
 
 def test_another_machine_is_explained_by_none(runs):
-    found = diagnosis(runs, recorded(runs, "soft"))
+    found = diagnosis(runs, recorded(runs, "other"))
     assert found.unlike
     assert not found.explanations
     assert "none of these explains it" in found.text

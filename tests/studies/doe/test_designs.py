@@ -176,6 +176,7 @@ JMP = "Pattern\ta\tb\tY\n" + "".join(
 OF_PROGRAMS = {
     "Excel": PLAIN.replace(",", ";").replace("-1", "-1,0").encode("utf-8-sig"),
     "Excel, sep": ("sep=;\n" + PLAIN.replace(",", ";")).replace("\n", "\r\n").encode(),
+    "Excel, empty rows": (PLAIN + ",\r\n,\r\n").encode(),
     "Excel, Unicode": PLAIN.replace(",", "\t").encode("utf-16"),
     "Minitab": MINITAB.encode(),
     "JMP": JMP.encode(),

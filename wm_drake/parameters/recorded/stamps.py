@@ -8,6 +8,7 @@ import numpy as np
 from wm_drake.errors import input_error
 from wm_drake.parameters.csv_files import with_distinct_times
 from wm_drake.parameters.recorded.health import Channel, Finding
+from wm_drake.parameters.recorded.pulses import rises
 from wm_drake.parameters.types import FloatArray
 
 HOLE = 10.0
@@ -25,6 +26,18 @@ NEAR_GAP = 40
 SMOOTH, ROUGH = 4.0, 10.0
 """Square of second differences over a gap, by those beside it, up to which signals go on as if no
 time had passed; and least median where other samples are put together."""
+
+NEAR_SPEED = 1.5
+"""Time on each side of a gap in which the change of the drum speed is taken: a motor makes it vary
+within a turn. [s]"""
+
+CYCLES, LEAST_CYCLES, NEAR_CYCLES = 6, 4, 5.0
+"""Cycles on each side of a gap that tell whether time passed in it, the least number of them, and
+how far from the gap they are searched. [s]"""
+
+FITS, BETTER = 0.05, 0.7
+"""Largest RMS of the phases of such cycles by their fit, in cycles; and largest ratio of that
+without time in the gap to that with it."""
 
 SAME, OTHER = 0.3, 6.0
 """Part of the change that a drum speed would have had in a gap, up to which no time passed; and
@@ -98,6 +111,7 @@ def clock_jumps(channels: Sequence[Channel]) -> Iterator[Finding]:
             goes_on = known[0] < SAME
         else:
             goes_on = bool(signals) and _goes_on(np.stack(signals, axis=1), int(at))
+            goes_on = goes_on and _cycles_go_on(time, signals, int(at), usual)
         if goes_on:
             gap, begin = float(steps[at]), float(time[at])
             text = (
@@ -110,18 +124,21 @@ def clock_jumps(channels: Sequence[Channel]) -> Iterator[Finding]:
 
 def _passed(speed: Channel, at: int, usual: float) -> float | None:
     """Return the change of a drum speed over a gap, by that of a steady change; None if unknown."""
-    begin, end = max(0, at + 1 - NEAR_GAP), min(len(speed.values), at + 1 + NEAR_GAP)
+    near = max(NEAR_GAP, int(NEAR_SPEED / usual))
+    begin, end = max(0, at + 1 - near), min(len(speed.values), at + 1 + near)
     parts = speed.values[begin : at + 1], speed.values[at + 1 : end]
     if min(map(len, parts)) < NEAR_GAP // 2 or not all(np.isfinite(part).all() for part in parts):
         return None
-    fits = [np.polyfit(usual * np.arange(len(part)), part, 1) for part in parts]
-    noise = max(float(np.std(np.diff(part, 2))) / np.sqrt(6.0) for part in parts)
-    slope = 0.5 * (fits[0][0] + fits[1][0])
+    stamps = [usual * np.arange(len(part)) for part in parts]
+    fits = [np.polyfit(t, part, 1) for t, part in zip(stamps, parts, strict=True)]
+    lines = [np.polyval(fit, t) for fit, t in zip(fits, stamps, strict=True)]
+    noise = max(float(np.std(part - line)) for part, line in zip(parts, lines, strict=True))
     gap = float(speed.time[at + 1] - speed.time[at])
-    if abs(slope) * gap < OTHER * noise or slope == 0.0:
+    before, after = (float(slope) * gap for slope, _ in fits)
+    steady = min(before, after, key=abs)
+    if before * after <= 0.0 or abs(steady) < OTHER * noise:
         return None
-    last = np.polyval(fits[0], usual * len(parts[0]))
-    return float((fits[1][1] - last) / (slope * gap))
+    return float((lines[1][0] - lines[0][-1]) / steady)
 
 
 def _goes_on(signals: FloatArray, at: int) -> bool:
@@ -139,3 +156,41 @@ def _goes_on(signals: FloatArray, at: int) -> bool:
     here = rough(before, after)
     rarer = np.mean([other <= here for other in others])
     return here < SMOOTH and float(np.median(others)) > ROUGH and float(rarer) < 0.1
+
+
+def _cycles_go_on(time: FloatArray, signals: Sequence[FloatArray], at: int, usual: float) -> bool:
+    """Return whether the cycles of signals fit better if no time passed in a gap, or do not tell.
+
+    The phase of a signal is a quadratic function of time: it counts the cycles before the gap, a
+    whole number of them in it, and those after it.
+    """
+    begin, end = np.searchsorted(time, [time[at] - NEAR_CYCLES, time[at + 1] + NEAR_CYCLES])
+    misfits = []
+    for values in signals:
+        before = rises(time[begin : at + 1], values[begin : at + 1])[-CYCLES:]
+        after = rises(time[at + 1 : end], values[at + 1 : end])[:CYCLES]
+        if min(len(before), len(after)) >= LEAST_CYCLES:
+            later = after - (time[at + 1] - time[at] - usual)
+            misfits.append([_misfit_of_cycles(before, each) for each in (later, after)])
+    if not misfits:
+        return True
+    without, with_time = np.median(misfits, axis=0)
+    return bool(without < BETTER * with_time or with_time > FITS)
+
+
+def _misfit_of_cycles(before: FloatArray, after: FloatArray) -> float:
+    """Return the RMS of the phases of cycles by a quadratic function, with the best number between.
+
+    Args:
+        before, after: Times of equal phase. [s]
+    """
+    times = np.append(before, after)
+    powers = np.vander((times - times.mean()) / np.ptp(times), 3)
+    counts = np.append(np.arange(len(before)), len(before) + np.arange(len(after)))
+    between = np.append(np.zeros(len(before)), np.ones(len(after)))
+    rests = [y - powers @ np.linalg.lstsq(powers, y, rcond=None)[0] for y in (counts, between)]
+    most = 2.0 * (after[0] - before[-1]) / min(np.diff(before)[-1], np.diff(after)[0])
+    numbers = np.arange(np.ceil(most) + 1.0)
+    return float(
+        np.sqrt(np.mean((rests[0][:, None] + np.outer(rests[1], numbers)) ** 2, axis=0)).min()
+    )

@@ -91,7 +91,7 @@ def _with_unit(signal: Signal, below: str) -> Signal:
 
 
 def table_rows(path: Path) -> list[TextRow]:
-    """Return the rows of a table; lines that are empty or begin with # are left out.
+    """Return the rows of a table but lines without content and those that begin with #.
 
     Raises:
         InputError: it is no table, or a workbook that cannot be read.
@@ -101,7 +101,7 @@ def table_rows(path: Path) -> list[TextRow]:
     kept = [
         (at, line)
         for at, line in enumerate(read_any_text(path).splitlines(), 1)
-        if line.strip() and not line.lstrip().startswith("#")
+        if line.strip(' \t,;"') and not line.lstrip().startswith("#")
     ]
     if not kept:
         return []

@@ -1,6 +1,6 @@
 """Data of recordings for a fit: signals over time, or their amplitudes, with their deviations."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal, TypeAlias
@@ -99,6 +99,24 @@ def without_edges(pair: Pair) -> Pair:
     begin, end = time[inside[0]] + EDGE, time[inside[-1]] - EDGE
     kept = (time >= begin) & (time <= end)
     return replace(pair, measured=np.where(kept[:, None], pair.measured, np.nan))
+
+
+def until_last_sample(pairs: Sequence[Pair]) -> tuple[Pair, ...]:
+    """Return repeats whose runs end with the last measured sample of all of them.
+
+    Further runs at other numbers of the machine are as long. Repeats keep a common end, since those
+    of one profile share their runs.
+    """
+    known = [np.flatnonzero(np.isfinite(pair.measured).any(axis=1)) for pair in pairs]
+    count = max((int(places[-1]) + 1 for places in known if len(places)), default=2)
+    shortened = []
+    for pair in pairs:
+        run = pair.run.isel(time=slice(count))
+        profile = profile_of(pair.run).until(float(run.time[-1]))
+        run = run.assign_attrs(profile=profile.model_dump_json())
+        measured, predicted = pair.measured[:count], pair.predicted[:count]
+        shortened.append(replace(pair, run=run, measured=measured, predicted=predicted))
+    return tuple(shortened)
 
 
 def mean_of(values: FloatArray) -> FloatArray:

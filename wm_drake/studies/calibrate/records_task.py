@@ -15,7 +15,7 @@ from wm_drake.studies.calibrate.blocks import calibrated
 from wm_drake.studies.calibrate.fit_page import FitWords, compared, fit_answer
 from wm_drake.studies.calibrate.options import CalibrateOptions
 from wm_drake.studies.calibrate.parameter_map import read_parameter_map
-from wm_drake.studies.calibrate.recorded import RecordedLoad, without_edges
+from wm_drake.studies.calibrate.recorded import RecordedLoad, until_last_sample, without_edges
 from wm_drake.studies.calibrate.records import RecordModel
 from wm_drake.studies.calibrate.test_file import (
     calibrated_test,
@@ -141,7 +141,7 @@ def recorded_load(test: CompareTask, executor: Executor, load_at: Any) -> Record
     Args:
         load_at: Function of a machine with the load.
     """
-    pairs = tuple(map(without_edges, test.pairs(executor)))
+    pairs = until_last_sample([without_edges(pair) for pair in test.pairs(executor)])
     return RecordedLoad(test.case.name, load_at, pairs)
 
 

@@ -29,8 +29,15 @@ and most models are off by."""
 UNLIKE_MEAN = 0.1
 """Difference of the means of an accelerometer, by gravity, from which causes are tried."""
 
+TILTED = 0.07
+"""Part of the vibration along the other axes that a sensor may show: 4 degrees, twice the deviation
+of a tilt in fits to records."""
+
 EXPLAINS, EXPLAINED = 0.4, 0.4
 """Largest misfit with a cause, by that without, and in all: an assumption."""
+
+SURE = 0.1
+"""Misfit with a single cause up to which no other run is tried."""
 
 MOST_CAUSES = 3
 """Most causes that are tried together."""
@@ -111,6 +118,12 @@ class Diagnosis:
         return [name for name, value in self.means.items() if value > UNLIKE_MEAN]
 
     @property
+    def is_sure(self) -> bool:
+        """Whether one cause explains the recording so well that no other run is worth trying."""
+        best = self.explanations[0] if self.explanations else None
+        return best is not None and len(best.causes) == 1 and best.misfit <= SURE
+
+    @property
     def text(self) -> str:
         """Return what explains the recording, or that nothing does."""
         names = ", ".join(dict.fromkeys([*self.unlike, *self.shifted]))
@@ -159,6 +172,7 @@ class Suspect:
         words: What is other about it; "" for the run as declared.
         pair: The recording on the times of the run.
         sensors, points: Sensors by name, and their positions in T. [m]
+        across: Least power by which a difference is divided (k,).
     """
 
     words: str
@@ -168,6 +182,7 @@ class Suspect:
     variants: tuple[tuple[Variant, ...], ...] = field(init=False)
     measured: _Seen = field(init=False)
     predicted: tuple[_Seen, ...] = field(init=False)
+    across: FloatArray = field(init=False)
 
     def __post_init__(self) -> None:
         """Compute what is compared, once."""
@@ -180,6 +195,8 @@ class Suspect:
             columns = [recorded_signal(run, v.sensor, self.points[name]) for v in of_sensor]
             predicted.append(_seen(np.stack(columns, axis=1), self.pair))
         put(self, "predicted", tuple(predicted))
+        powers = [np.nansum(np.abs(seen.vectors) ** 2, axis=0).max() for seen in predicted]
+        put(self, "across", np.maximum((TILTED / UNLIKE) ** 2 * np.array(powers), 1e-300))
 
     @property
     def declared(self) -> _Trial:
@@ -192,7 +209,8 @@ class Suspect:
         """Return misfits of order 1 and of the means of the sensors (k,) each, and the shift. [s]
 
         Order 1 may be turned by the unknown angle of the drum at the start, and by a small shift of
-        the clock; its difference is divided by the larger of both.
+        the clock; its difference is divided by the larger of both, or by what makes a tilt of a
+        sensor with little vibration of its own alike.
         """
         columns = list(trial.channels)
         chosen = list(zip(self.predicted, trial.variants, trial.factors, strict=True))
@@ -201,7 +219,7 @@ class Suspect:
         known = np.isfinite(measured) & np.isfinite(computed)
         m, c = np.where(known, measured, 0.0), np.where(known, computed, 0.0)
         powers = np.sum(np.abs(m) ** 2, axis=0), np.sum(np.abs(c) ** 2, axis=0)
-        size = np.maximum(np.maximum(*powers), 1e-300)
+        size = np.maximum(np.maximum(*powers), self.across)
         turns = np.exp(1j * np.outer(SHIFTS, self.measured.speed))
         alike = (turns @ (m * np.conj(c))) / size  # shift, sensor
         start = np.exp(-1j * np.angle(alike.sum(axis=1)))[:, None]

@@ -27,6 +27,11 @@ from wm_drake.studies.compare.recordings import TestRecording, pulse_angle
 SPEED_STEP = 0.25
 """Time between the points of a measured profile. [s]"""
 
+LEAD_ACCELERATION, LEAD_LONGEST, LEAD_HELD = 2.5, 10.0, 3.0
+"""How a model comes to the first recorded speed if that does not rise by itself: the acceleration,
+24 rpm in a second, and longest time of a rise from rest, and the time at the speed until its
+beginning has died away. [rad/s^2, s, s] Assumptions: those of usual run-ups."""
+
 QUANTITIES = {
     "displacement": Quantity("displacement", Unit("m", "mm"), 3),
     "velocity": Quantity("velocity", Unit("m/s", "mm/s"), 2),
@@ -85,11 +90,20 @@ def paired(recording: TestRecording, run: Record, predicted: FloatArray) -> Pair
 
 
 def pair_at(
-    recording: TestRecording, run: Record, predicted: FloatArray, alignment: Alignment
+    recording: TestRecording,
+    run: Record,
+    predicted: FloatArray,
+    alignment: Alignment,
+    begin: float = 0.0,
 ) -> Pair:
-    """Return a recording on the times of a run, by a known alignment."""
+    """Return a recording on the times of a run, by a known alignment.
+
+    Args:
+        begin: Time of the run at which it begins to follow the recording. [s]
+    """
     values = np.stack([*recording.channels.values.values()], axis=1)
     measured = at_run(recording.channels.time, values, run.time.values, alignment)
+    measured[run.time.values < begin] = np.nan
     return Pair(recording, run, alignment, measured, predicted)
 
 
@@ -103,11 +117,18 @@ def _alignment(recording: TestRecording, run: Record, predicted: FloatArray) -> 
     return align_speed(time, speed, run)
 
 
-def measured_profile(recording: TestRecording, speed: FloatArray) -> tuple[SpinProfile, Alignment]:
+def measured_profile(
+    recording: TestRecording, speed: FloatArray
+) -> tuple[SpinProfile, Alignment, float]:
     """Return the recorded drum speed as a profile, and the alignment of a run that follows it.
+
+    A drum does not start at the first recorded speed, so the profile leads there from rest.
 
     Args:
         speed: At the samples of the recording, NaN where there is none. (n,) [rad/s]
+
+    Returns:
+        Profile, alignment, and the time of the profile at which the recorded speed begins. [s]
 
     Raises:
         InputError: it is known for less than ten points.
@@ -126,8 +147,25 @@ def measured_profile(recording: TestRecording, speed: FloatArray) -> tuple[SpinP
     middles = edges + 0.5 * SPEED_STEP
     filled = np.interp(middles, middles[counts > 0], means[counts > 0])
     smooth = np.maximum(savgol_filter(filled, 9, 2), 0.0)
-    profile = SpinProfile(time=tuple((middles - middles[0]).tolist()), speed=tuple(smooth.tolist()))
-    return profile, Alignment(-float(middles[0]))
+    lead = _lead(smooth)
+    *times, begin = np.cumsum([0.0, *(duration for duration, _ in lead)]).tolist()
+    profile = SpinProfile(
+        time=(*times, *(middles - middles[0] + begin).tolist()),
+        speed=(*(start for _, start in lead), *smooth.tolist()),
+    )
+    return profile, Alignment(begin - float(middles[0])), begin
+
+
+def _lead(speed: FloatArray) -> list[tuple[float, float]]:
+    """Return duration [s] and speed at the start [rad/s] of each part before a recorded speed.
+
+    Args:
+        speed: Recorded speed every `SPEED_STEP`. [rad/s]
+    """
+    first, slope = float(speed[0]), float(speed[8] - speed[0]) / (8 * SPEED_STEP)
+    if first <= LEAD_LONGEST * slope:
+        return [(first / slope, 0.0)] if first > 0.0 else []
+    return [(min(first / LEAD_ACCELERATION, LEAD_LONGEST), 0.0), (LEAD_HELD, first)]
 
 
 def speed_of_order_one(pair: Pair) -> FloatArray:

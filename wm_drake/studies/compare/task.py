@@ -129,11 +129,19 @@ class CompareTask(Task):
         self.warnings = tuple(filter(None, said))
         return pairs
 
+    def doubt(self, executor: Executor) -> str:
+        """Return why the recordings are not like their predictions; "" if they are."""
+        try:
+            self.pairs(executor)
+        except InputError as error:
+            return f"{error}."
+        return " ".join(self.warnings)
+
     def diagnosis(self, executor: Executor, pair: Pair) -> Diagnosis:
         """Return what explains a recording that is not like its prediction."""
         declared = Suspect("", pair, self.sensors, self.points)
         first = diagnosed(declared)
-        if not first.unlike or (first.explanations and len(first.explanations[0].causes) == 1):
+        if not first.unlike or first.is_sure:
             return first
         profile = profile_of(pair.run)
         backwards = profile.model_copy(update={"speed": tuple(-w for w in profile.speed)})
@@ -166,10 +174,10 @@ class CompareTask(Task):
             measured_profile(one, speed_of_order_one(pairs[k]) if speed is None else speed)
             for k, (one, speed) in enumerate(zip(self.recordings, speeds, strict=True))
         ]
-        runs = self._runs(executor, [profile for profile, _ in followed])
+        runs = self._runs(executor, [profile for profile, _, _ in followed])
         return [
-            pair_at(one, run, predicted_signals(run, self.sensors, self.points), alignment)
-            for one, run, (_, alignment) in zip(self.recordings, runs, followed, strict=True)
+            pair_at(one, run, predicted_signals(run, self.sensors, self.points), clock, begin)
+            for one, run, (_, clock, begin) in zip(self.recordings, runs, followed, strict=True)
         ]
 
     def _runs(self, executor: Executor, profiles: Sequence[SpinProfile]) -> list[Record]:

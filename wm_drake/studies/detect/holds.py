@@ -91,7 +91,7 @@ def hold_of(text: str | None, profile: SpinProfile, duration: float, turns: int)
         )
     if first is not None:
         begin, end = profile.time[first], profile.time[first + 1]
-        ramp, length = until(profile, first + 1), end - begin
+        ramp, length = profile.until(end).model_copy(update={"regions": ()}), end - begin
     else:
         speed = DISTRIBUTION if text in (None, OF_PROFILE) else _speed(str(text), profile)
         ramp, length = ramp_to(speed, profile, duration), duration
@@ -125,12 +125,6 @@ def first_hold(profile: SpinProfile) -> int | None:
     is_hold = (np.diff(speed) == 0.0) & (np.diff(time) >= SHORTEST)
     places = np.flatnonzero(is_hold & (speed[:-1] > 0.0) & (speed[:-1] < profile.highest_speed))
     return int(places[0]) if len(places) else None
-
-
-def until(profile: SpinProfile, point: int) -> SpinProfile:
-    """Return a profile up to one of its points."""
-    time, speed = profile.time[: point + 1], profile.speed[: point + 1]
-    return profile.model_copy(update={"time": time, "speed": speed, "regions": ()})
 
 
 def ramp_to(speed: float, profile: SpinProfile, duration: float) -> SpinProfile:

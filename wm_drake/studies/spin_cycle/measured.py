@@ -94,26 +94,33 @@ def read_accelerations(
     known = {"time", *_words(labels)}
     for word in names.channels:
         check_known(word, known, f"no word '{word}'", where="--channels")
-    paths = {name: _file_of(folder, name) for name in labels["case"]}
+    paths = {name: file_of_case(folder, name) for name in labels["case"]}
     if not any(paths.values()):
         raise input_error(
             "has no file CASE.csv with accelerations of a case of this study; give at least one",
             where=str(folder),
         )
     empty = np.full([len(labels[dim]) for dim in DIMS[1:]], np.nan)
-    rows = []
+    rows, seen = [], dict[Path, FloatArray]()
     for path in paths.values():
         if path is None:
             rows.append(empty)
             continue
         time, acceleration = _samples(path, _words(labels), names, unit or ACCELERATION.si)
+        for other, samples in seen.items():
+            if np.array_equal(samples, acceleration):
+                raise input_error(
+                    f"has the same samples as {other}; a copy tells nothing of another case",
+                    where=str(path),
+                )
+        seen[path] = acceleration
         period = float((time[-1] - time[0]) / (len(time) - 1))
         rms = region_rms(displacement_of(acceleration, period), period, profile)
         rows.append(rms.reshape(empty.shape))
     return xr.DataArray(np.array(rows), labels, DIMS)
 
 
-def _file_of(folder: Path, case: str) -> Path | None:
+def file_of_case(folder: Path, case: str) -> Path | None:
     """Return the file of a case; None if there is none.
 
     Raises:

@@ -1,5 +1,6 @@
 """Check the options of the identification from a spin cycle, and run it."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +14,13 @@ from wm_drake.studies.calibrate.records_task import (
     recorded_load,
 )
 from wm_drake.studies.compare.options import CompareOptions
+from wm_drake.studies.compare.recordings import check_distinct
 from wm_drake.studies.compare.task import CompareTask
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.experiment import Experiment
 from wm_drake.studies.inputs import pairs_of, runnable_profile
 from wm_drake.studies.spin_cycle.study import cases_of_table, measured_displacements, runs_of
+from wm_drake.studies.spin_cycle.task import acceleration_doubts
 from wm_drake.studies.spin_identify.options import SpinIdentifyOptions
 from wm_drake.studies.spin_identify.page import spin_identify_answer
 from wm_drake.studies.spin_identify.study import (
@@ -70,10 +73,12 @@ class SpinIdentifyTask(Task):
             check_known(name, runs, f"unknown case '{name}'", where="--record")
             files.setdefault(name, []).append(Path(path))
         shared = {"test": options.test, "unit": options.unit, "channels": options.channels}
-        return {
+        tests = {
             name: CompareTask(CompareOptions(records=paths, **shared), self.machine, runs[name])
             for name, paths in files.items()
         }
+        check_distinct([recording for test in tests.values() for recording in test.recordings])
+        return tests
 
     @property
     def identity(self) -> dict[str, Any]:
@@ -96,6 +101,8 @@ class SpinIdentifyTask(Task):
         if self.tests:
             return self._fitted(executor)
         seed, truth = self.options.seed, None
+        runs = runs_of(self.machine.parameters, self.cases, self.profile)
+        doubts = acceleration_doubts(executor, self.machine, self.options, runs)
         with executor.fraction("search") as report:
             experiment = Experiment(self.machine, self.measures, executor.simulate)
             model = spin_model(experiment, self.free, self.profile, self.cases, self.measured)
@@ -104,7 +111,8 @@ class SpinIdentifyTask(Task):
                 truth = dict(zip(self.free.names, planted.tolist(), strict=True))
                 model = with_virtual_experiment(model, planted, self.options.noise, seed)
             fit, data = calibrated(model, seed, lambda fraction, least: report(fraction), starts=1)
-        return spin_identify_answer(model, fit, data, truth)
+        answer = spin_identify_answer(model, fit, data, truth)
+        return replace(answer, warned=(*answer.warned, *doubts))
 
     def _fitted(self, executor: Executor) -> Answer:
         """Fit the unknowns to the records."""
