@@ -87,6 +87,17 @@ def recorded_loads(bench: BushingBench, motion: RecordedMotion) -> FloatArray:
     return force + _of_branches(bench, motion.step, place, motion.repeats)[motion.samples]
 
 
+def ramped_loads(bench: BushingBench, time: FloatArray, position: FloatArray) -> FloatArray:
+    """Return force or moment at the samples of a motion of straight pieces (n,). [N; N m]
+
+    Branches begin relaxed.
+    """
+    step = np.diff(time)
+    rate = np.append(0.0, np.diff(position) / step)
+    force = bushing_loads(bench, position, rate)
+    return force if bench.branches is None else force + _of_branches(bench, step, position, 0)
+
+
 def _of_branches(
     bench: BushingBench, step: FloatArray, position: FloatArray, period: int
 ) -> FloatArray:

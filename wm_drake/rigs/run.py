@@ -82,10 +82,14 @@ def run_rig(
     return RigRun(title, bench, numbers, loops, tuple(map(measures_of, loops)))
 
 
-def beyond_tables(bench: Bench, motions: Sequence[Harmonic]) -> list[str]:
+def beyond_tables(bench: Bench, widest: float) -> list[str]:
     """Return a sentence for a table of a bushing that motions leave, with how far they go.
 
     A deformation of a sponge is not known before its loop, so dampers have none here.
+
+    Args:
+        bench: Component on the bench.
+        widest: Displacement or angle of the widest motion. [m; rad]
     """
     if not isinstance(bench, BushingBench):
         return []
@@ -94,7 +98,6 @@ def beyond_tables(bench: Bench, motions: Sequence[Harmonic]) -> list[str]:
     low, high = table_range(  # type: ignore[no-untyped-call]
         *getattr(BUSHING_LAW.unpack(bench.packed), field)
     )
-    widest = max(motion.amplitude for motion in motions)
     reach = float(np.arcsin(min(widest / bench.arm, 1.0))) if bench.arm else widest
     if reach <= min(-low, high) * (1.0 + 1e-9):
         return []

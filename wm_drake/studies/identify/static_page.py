@@ -47,7 +47,6 @@ def static_answer(
         knots: Points of a table on each side of zero.
         destination: Where the tables go.
     """
-    measured = sorted(curves.values(), key=_place)
     entries = {
         field_of(axis): table_entry(table_of_curve(curve, knots), _source(curve, tests[axes]))
         for axes, curve in curves.items()
@@ -55,32 +54,43 @@ def static_answer(
     }
     head = ["Tables from quasi-static tests: mean of loading and unloading."]
     loops = {axes[0]: of_axis for axes, of_axis in tests.items()}
+    measured = sorted(curves.values(), key=_place)
+    return Answer(
+        f"Quasi-static tests of {title}",
+        summary(measured),
+        None,
+        curve_parts(measured, loops),
+        (("Files", ", ".join(loop.path for of_axis in tests.values() for loop in of_axis)),),
+        METHOD,
+        {"identified.yaml": written_fragment(entries, head, destination)},
+        tuple(_fallen(curve) for curve in measured if _falls(curve)),
+    )
+
+
+def curve_parts(
+    curves: Sequence[xr.Dataset], loops: Mapping[str, Sequence[MeasuredLoop]]
+) -> tuple[Part, ...]:
+    """Return picture, curves and measures of quasi-static tests.
+
+    Args:
+        curves: As of `static_curve` in `wm_drake.studies.identify.static`.
+        loops: Tests by axis.
+    """
     plot = Plot(
-        _figure(measured, loops),
+        _figure(curves, loops),
         "Force over displacement and moment over angle of each axis.",
         "Force over displacement and moment over angle (form of [B] Fig. 6): samples, loading and "
         "unloading, and their mean, which is the table. The offset of the instrument is removed.",
     )
     of_kinds = {
-        prefix: [curve for curve in measured if is_about(curve.axis) == about]
+        prefix: [curve for curve in curves if is_about(curve.axis) == about]
         for about, prefix in PREFIXES.items()
     }
     kinds = {prefix: of_kind for prefix, of_kind in of_kinds.items() if of_kind}
-    return Answer(
-        f"Quasi-static tests of {title}",
-        summary(measured),
-        None,
-        (
-            Part(
-                "Force and hysteresis",
-                (plot, *(_curves(prefix, of_kind) for prefix, of_kind in kinds.items())),
-            ),
-            Part("Values", [_measures(prefix, of_kind) for prefix, of_kind in kinds.items()]),
-        ),
-        (("Files", ", ".join(loop.path for of_axis in tests.values() for loop in of_axis)),),
-        METHOD,
-        {"identified.yaml": written_fragment(entries, head, destination)},
-        tuple(_fallen(curve) for curve in measured if _falls(curve)),
+    tables = [_curves(prefix, of_kind) for prefix, of_kind in kinds.items()]
+    return (
+        Part("Force and hysteresis", (plot, *tables)),
+        Part("Values", [_measures(prefix, of_kind) for prefix, of_kind in kinds.items()]),
     )
 
 

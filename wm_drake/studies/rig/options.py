@@ -37,6 +37,17 @@ class RigAxisOptions(RigOptions):
 
     axis: str = option(..., AXIS, "AXIS")
     arm: str | None = ARM
+    static: bool = option(
+        False, "Quasi-static test ([B] 3.1.1): to --amplitude on both sides and back at --rate."
+    )
+    rate: str | None = option(
+        None, "Of a quasi-static test; as in [B] 100 mm/min where none is given.", "RATE"
+    )
+    preload: str | None = option(
+        None,
+        "Displacement at which the component is clamped: a quasi-static test begins there.",
+        "LENGTH",
+    )
 
 
 RIG = tuple(

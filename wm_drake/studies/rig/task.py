@@ -23,6 +23,7 @@ from wm_drake.studies.inputs import quantities_of
 from wm_drake.studies.rig.options import RigAxisOptions, RigDamperOptions, RigOptions
 from wm_drake.studies.rig.page import rig_answer
 from wm_drake.studies.rig.quantities import LINEAR, loop_quantities
+from wm_drake.studies.rig.static import static_numbers, static_rig_answer
 from wm_drake.studies.rig.study import (
     DRIVEN_MASS,
     FREQUENCY,
@@ -43,12 +44,14 @@ class RigTask(Task):
         """Find the component, put it on the bench, and read its motions."""
         self.component = target_of(kind, options).component
         self.massless: Bench | None = None
+        self.static: tuple[float, float, float] | None = None
         if isinstance(options, RigDamperOptions):
             self._set_damper(options)
         else:
             assert isinstance(options, RigAxisOptions)
             self._set_axis(kind, options)
-        self.motions = _motions(kind, self.bench, options)
+        if self.static is None:
+            self.motions = _motions(kind, self.bench, options)
         self.kind, self.is_of_a = kind, options.matrix == "A"
 
     def _set_damper(self, options: RigDamperOptions) -> None:
@@ -75,9 +78,13 @@ class RigTask(Task):
         what = kind if name == kind else f"{kind} {name}"
         through = f", through an arm of {length.text(arm)}" if arm else ""
         self.title = f"{what}, axis {axis.replace('_', ' ')}{through}"
+        self.static = static_numbers(self.bench, options)
 
     def run(self, executor: Executor) -> Answer:
-        """Run all motions, also without the masses if there are any."""
+        """Run a quasi-static test, or all motions, also without the masses if there are any."""
+        if self.static is not None:
+            assert isinstance(self.bench, BushingBench)
+            return static_rig_answer(self.title, self.bench, self.static)
         numbers = _numbers(self.component)
         with executor.progress(len(self.motions), "loops") as progress:
             run = run_rig(self.title, self.bench, self.motions, numbers, progress)
@@ -88,7 +95,7 @@ class RigTask(Task):
             verdict = printed_verdict(self.kind, self.bench)
         if self.massless is not None:
             masses = effect_of_masses(run, run_rig(self.title, self.massless, self.motions))
-        beyond = beyond_tables(self.bench, self.motions)
+        beyond = beyond_tables(self.bench, max(motion.amplitude for motion in self.motions))
         return rig_answer(run, measures, masses, beyond, verdict)
 
 
