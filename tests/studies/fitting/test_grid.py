@@ -89,6 +89,22 @@ def test_each_grid_finds_a_better_point_or_is_halved():
     assert values[-1] == values[-2]
 
 
+def test_rule_of_the_paper_halves_each_grid_and_ends_at_a_small_fall():
+    """End beside the bottom of a diagonal valley, which the search that moves on reaches."""
+    best, least = np.array([1.9, 3.4]), 0.002
+    problem = valley(best, -45.0, 10.0)
+    end, rounds = grid_search(problem, 0.0, least_fall=least)
+    assert [grid.spacing for grid in rounds] == [0.25 * 0.5**k for k in range(len(rounds))]
+    falls = -np.diff(np.minimum.accumulate([np.min(grid.values) for grid in rounds]))
+    assert np.all(falls[:-1] >= least)
+    assert falls[-1] < least
+    assert end.cost > 10.0 * grid_search(problem, 1e-3)[0].cost
+
+
+def test_rule_of_the_paper_ends_where_every_point_diverges():
+    assert len(grid_search(problem_of(lambda point: np.nan), 0.0, least_fall=0.1)[1]) <= 2
+
+
 def test_points_that_diverge_are_not_a_minimum():
     partly = problem_of(lambda point: np.nan if point[0] < 1.0 else point @ point)
     end, _ = grid_search(partly, 1e-3)

@@ -5,7 +5,7 @@ without a better point ends it. Here the first grid covers the region. Each furt
 at the best point so far. Its spacing is halved only if the last grid gave no better point;
 otherwise the grid moves on with the same spacing. So the search follows a diagonal valley, where
 the best point of a grid is far from the optimum. This is a pattern search; it ends when the spacing
-is as fine as demanded.
+is as fine as demanded. The rule of [B] can be chosen.
 """
 
 from dataclasses import dataclass
@@ -37,7 +37,9 @@ class Round:
     spacing: float
 
 
-def grid_search(problem: FitProblem, mesh: float) -> tuple[Optimum, tuple[Round, ...]]:
+def grid_search(
+    problem: FitProblem, mesh: float, *, least_fall: float | None = None
+) -> tuple[Optimum, tuple[Round, ...]]:
     """Minimize the cost by grids that move to the best point and are refined there.
 
     Points of a grid that are outside the region are omitted. Points that are known already are not
@@ -48,6 +50,8 @@ def grid_search(problem: FitProblem, mesh: float) -> tuple[Optimum, tuple[Round,
         problem: A problem whose unknowns have no priors: the region is the unit cube.
         mesh: Spacing at which the search ends, as a part of the region, > 0. The last grid has at
             most this spacing, and no point of it is better than its centre.
+        least_fall: Rule of [B] in place of the mesh: each grid has half the spacing of the one
+            before, and the search ends at the first fall of the cost below this.
 
     Returns:
         The optimum, and the grids.
@@ -55,7 +59,7 @@ def grid_search(problem: FitProblem, mesh: float) -> tuple[Optimum, tuple[Round,
     search, size = Search(problem), len(problem.unknowns)
     known: dict[tuple[float, ...], float] = {}
     steps = _offsets(size)
-    centre, spacing = np.full(size, 0.5), 1.0 / (POINTS_PER_AXIS - 1)
+    centre, spacing, before = np.full(size, 0.5), 1.0 / (POINTS_PER_AXIS - 1), np.inf
     rounds = list[Round]()
     while True:
         # the coordinates are dyadic fractions, which floats hold exactly
@@ -70,10 +74,13 @@ def grid_search(problem: FitProblem, mesh: float) -> tuple[Optimum, tuple[Round,
         best_value = known[tuple(map(float, centre))]
         points, best_point = problem.points_at(new), problem.points_at(centre)
         rounds.append(Round(points, values, best_point, spacing))
-        if not is_better:
-            if spacing <= mesh:
-                break
-            spacing *= 0.5
+        if least_fall is None:
+            is_last, is_halved = not is_better and spacing <= mesh, not is_better
+        else:
+            is_last, is_halved = not before - best_value >= least_fall, True
+        if is_last:
+            break
+        spacing, before = spacing * (0.5 if is_halved else 1.0), best_value
     return Optimum(centre, best_value, len(known)), tuple(rounds)
 
 

@@ -24,11 +24,15 @@ class GasketDampingOptions(Options):
         None,
         "Also search by the grids of [B] section 3.1.2, with the surface of its distance, until "
         "this spacing in percent of the region (0 to 0.05 N s/mm, 0 to 200 N mm s/deg). A grid "
-        "moves on to a better point, and is halved where there is none; [B] halves it in each "
-        "round and stops when the distance falls by less than 0.02.",
+        "moves on to a better point, and is halved where there is none.",
         "PERCENT",
         ge=1e-3,
         le=25.0,
+    )
+    paper_mesh: bool = option(
+        False,
+        "Search by these grids with the rule of [B]: each is half as wide as the one before, until "
+        "the distance falls by less than 0.02 mm.",
     )
 
 

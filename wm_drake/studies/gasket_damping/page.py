@@ -108,7 +108,7 @@ def about_grids(grids: xr.Dataset) -> str:
     text = damping_text(np.array([best[name].item() for name in UNKNOWNS]))
     return (
         f"The grid search of [B] found {text}, with a distance of {text_of(best.objective)}, "
-        f"after {grids.sizes['point']} evaluations."
+        f"after {int(grids['round'].max())} rounds and {grids.sizes['point']} evaluations."
     )
 
 
@@ -180,8 +180,8 @@ def surface_plot(grids: xr.Dataset, fit: Fit, truth: np.ndarray | None) -> Plot:
         "Distance: sum over the loads of the 2-norm of the differences of the upper and lower "
         "envelopes, [B] Eq. (2), (3). Left: distance over both dampings, points of the grid "
         "search, darker in each later round, and the path of the best point from the first grid "
-        "on. The grid moves to its best point and is halved when it has no better point than its "
-        "centre; [B] halves it in each round and stops when the distance falls by less than 0.02. "
+        "on. With --mesh the grid moves to its best point, and is halved when it has no better "
+        "point than its centre; with --paper-mesh it is halved in each round, as in [B]. "
         "Right: distance at these points over the linear damping; colours: torsional "
         "damping ([B] Fig. 7).",
     )

@@ -39,6 +39,9 @@ UNKNOWNS = ("C_L", "C_T")
 UPPER = np.array([50.0, 0.2 * 180.0 / np.pi])
 """Upper bounds of [B]: 0.05 N s/mm for C_L and 200 N mm s/deg for C_T. [N s/m, N m s/rad]"""
 
+LEAST_FALL = 0.02e-3
+"""Fall of the distance that ends the search of [B], which prints 0.02, of lengths in mm. [m]"""
+
 STARTS = 3
 """Searches by least squares at most."""
 
@@ -212,18 +215,21 @@ class DistanceProblem(FitProblem):
         return np.sum(np.sqrt(list(squares.values())), axis=0)
 
 
-def grid_of_paper(problem: FitProblem, mesh: float) -> xr.Dataset:
+def grid_of_paper(problem: FitProblem, mesh: float | None) -> xr.Dataset:
     """Search by the grids of [B] section 3.1.2.
 
     Args:
-        mesh: Spacing at which the search ends, as a part of the region.
+        mesh: Spacing at which the search ends, as a part of the region; None for the rule of [B].
 
     Returns:
         Over the points of all grids: `round`, `spacing` as a part of the region, `C_L`, `C_T` and
         `objective`, the distance [m].
     """
     of_paper = DistanceProblem(problem.unknowns, problem.measurements, problem.evaluate)
-    rounds = grid_search(of_paper, mesh)[1]
+    if mesh is None:
+        rounds = grid_search(of_paper, 0.0, least_fall=LEAST_FALL)[1]
+    else:
+        rounds = grid_search(of_paper, mesh)[1]
     counts = [len(grid.points) for grid in rounds]
     points = np.concatenate([grid.points for grid in rounds])
     spacing = np.repeat([grid.spacing for grid in rounds], counts)

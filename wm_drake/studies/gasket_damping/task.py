@@ -1,5 +1,6 @@
 """Check the options of the gasket-damping study, and run it."""
 
+from wm_drake.errors import input_error
 from wm_drake.model.machine import Machine
 from wm_drake.report.terminal import say
 from wm_drake.studies.answer import Answer
@@ -26,6 +27,8 @@ class GasketDampingTask(Task):
         """Check the machine, and read the records or the true values of the virtual experiment."""
         self.options, self.machine = options, machine
         run_up_of(machine.parameters)
+        if options.mesh is not None and options.paper_mesh:
+            raise input_error("has its own end; leave --mesh out", where="--paper-mesh")
         self.records, self.truth = read_records(machine.parameters, options.record), None
         if not options.record:
             self.truth = planted_damping(
@@ -52,5 +55,7 @@ class GasketDampingTask(Task):
                 starts=STARTS,
                 problem=problem,
             )
-        grids = None if mesh is None else grid_of_paper(problem, mesh / 100.0)
+        grids = None
+        if mesh is not None or self.options.paper_mesh:
+            grids = grid_of_paper(problem, None if mesh is None else mesh / 100.0)
         return gasket_damping_answer(model, fit, data, self.truth, grids)
