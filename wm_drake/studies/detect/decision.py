@@ -6,6 +6,7 @@ washes are those that spin. The risk is therefore the share of touching loads am
 """
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import xarray as xr
@@ -14,13 +15,18 @@ from numpy.typing import NDArray
 from wm_drake.parameters.types import FloatArray
 from wm_drake.report.formatting import significant
 from wm_drake.report.quantity import SHARE, SPEED, Quantity
-from wm_drake.studies.tolerance.shares import SampleShare, share_of
+from wm_drake.studies.tolerance import shares
+from wm_drake.studies.tolerance.shares import SampleShare
 
 IN_TABLE = (0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 1.0)
 """Shares of loads that spin, of the thresholds in the table beside the chosen one."""
 
 LINES = (0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 1.0)
 """Shares of loads up to each line of the table of speed limits."""
+
+share_of = partial(shares.share_of, method="wilson")
+"""Return a share with the interval of Wilson. A threshold keeps the risk by its own rule, so its
+interval has to hold in 95 of 100 studies, not in 95 at least."""
 
 OF_LOADS = SHARE.named("share", form=lambda value: significant(value, 3 if value >= 10.0 else 2))
 DISTRIBUTIONS = Quantity("distributions per wash", decimals=2)

@@ -133,7 +133,9 @@ def chosen_signals(
     """Return the signals of `--signal`; by default torque and speed, or the first sensor.
 
     Args:
-        texts: Such as "Xr" or "torque, noise=0.1 N*m, resolution=0.01 N*m, sample=5 ms".
+        texts: Such as "Xr" or "torque, noise=0.1 N*m, resolution=0.01 N*m, sample=5 ms". A text
+            without a name, such as "sample=5 ms", goes on with the signal before: forms split texts
+            at commas.
 
     Raises:
         InputError: a signal is unknown or its numbers are wrong, or the machine has no signal.
@@ -149,7 +151,13 @@ def chosen_signals(
         return tuple(known[name] for name in known if name in ("torque", "speed")) or (
             next(iter(known.values())),
         )
-    return tuple(_signal(text, known) for text in texts)
+    entries = list[str]()
+    for text in texts:
+        if entries and "=" in text.partition(",")[0]:
+            entries[-1] += f", {text}"
+        else:
+            entries.append(text)
+    return tuple(_signal(entry, known) for entry in entries)
 
 
 def _signal(text: str, known: Mapping[str, ControllerSignal]) -> ControllerSignal:
