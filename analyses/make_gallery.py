@@ -94,7 +94,7 @@ ENTRIES = (
         "replay_middle.html",
     ),
     Entry("motor", "Driven by a motor", "wm-drake spin --drive motor --load middle"),
-    Entry("drive", "How weak may the motor be?", "wm-drake study drive --load middle --loads 12"),
+    Entry("drive", "How weak may the motor be?", "wm-drake study drive --load middle"),
     Entry("cabinet", "A cabinet that walks", "wm-drake spin --machine light_cabinet --load middle"),
     Entry(
         "studio", "Curves while a slider moves", "wm-drake studio --no-browser --port 8765", page=""

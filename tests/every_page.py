@@ -137,7 +137,7 @@ KINDS = {
     "balancer": _one("sections.html", "study", "balancer", "--quick"),
     "detect": _one("sections.html", "study", "detect", "--quick"),
     "cycle": _one("sections.html", "study", "cycle", "--profile", "short_cycle.yaml"),
-    "drive": _one("sections.html", "study", "drive", "--load", "middle", "--torques", "3", "--unbalances", "2", "--loads", "4"),
+    "drive": _one("sections.html", "study", "drive", "--load", "middle", "--torques", "3", "--unbalances", "2"),
 }  # fmt: skip
 
 

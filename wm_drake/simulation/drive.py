@@ -14,9 +14,6 @@ from wm_drake.parameters.types import FloatArray
 SLOWEST = 2.0 * np.pi
 """Speed from which the ripple is measured: 60 rpm. [rad/s] Below it a turn is mostly start-up."""
 
-REVOLUTIONS = 8
-"""Revolutions at the end of a run over which parts of order one are taken."""
-
 CAPTURE_TIME = 5.0
 """Time for which the speed must stay almost the same below the wanted one to be caught. [s]"""
 
@@ -123,42 +120,6 @@ def over_revolutions(time: FloatArray, angle: FloatArray, values: FloatArray) ->
         return np.asarray((sums[1] - sums[0]) / (ends[1] - ends[0]))
 
 
-def order_one(time: FloatArray, angle: FloatArray, values: FloatArray) -> FloatArray:
-    """Return the part of a signal that goes round with the drum, by least squares. (2,)
-
-        values = mean + trend (t - t_mean) + A cos(phi) + B sin(phi)
-
-    Args:
-        time, angle, values: (n,) [s, rad, any]
-
-    Returns:
-        A and B; NaN with fewer than five samples.
-    """
-    if len(time) < 5:
-        return np.full(2, np.nan)
-    columns = (np.ones(len(time)), time - time.mean(), np.cos(angle), np.sin(angle))
-    return np.asarray(np.linalg.lstsq(np.column_stack(columns), values, rcond=None)[0][2:])
-
-
-def orders_at_end(
-    time: FloatArray, angle: FloatArray, speed: FloatArray, torque: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return the parts of order one of torque and acceleration in the last revolutions of a run.
-
-    Args:
-        time, angle, speed, torque: As for `drive_measures`.
-
-    Returns:
-        (2,) of the torque [N m] and (2,) of the acceleration [rad/s^2], as `order_one`. The
-        acceleration follows from the speed: d/dt (A cos phi + B sin phi) = w (B cos phi - A sin
-        phi) at the mean speed w.
-    """
-    last = angle >= angle[-1] - 2.0 * np.pi * REVOLUTIONS if len(angle) else np.zeros(0, bool)
-    at = time[last], angle[last]
-    in_speed, mean = order_one(*at, speed[last]), float(np.mean(speed[last])) if last.any() else 0.0
-    return order_one(*at, torque[last]), mean * np.array([in_speed[1], -in_speed[0]])
-
-
 def speed_ripple(time: FloatArray, angle: FloatArray, speed: FloatArray) -> float:
     """Return the largest coefficient of fluctuation of the speed, see `DriveMeasures`."""
     mean = over_revolutions(time, angle, speed)
@@ -230,4 +191,4 @@ def measured_drive(
         caught.speed if caught else np.nan,
         caught.torque if caught else np.nan,
     )
-    return [*map(np.array, numbers), *orders_at_end(time, angle, speed, torque)]
+    return list(map(np.array, numbers))

@@ -1,4 +1,4 @@
-"""The drive study: closed form of the smallest torque, planted thresholds, planted unbalance."""
+"""The drive study: closed form of the smallest torque, planted thresholds."""
 
 import numpy as np
 import pytest
@@ -9,15 +9,12 @@ from simple_machines import DAMPING, MASS, STIFFNESS, unbalance
 
 from wm_drake.errors import InputError
 from wm_drake.model.build import build_machine
-from wm_drake.parameters import Load, SpinProfile, Unbalance, load_machine
+from wm_drake.parameters import Load, SpinProfile, load_machine
 from wm_drake.simulation.cases import Case
-from wm_drake.simulation.drive import orders_at_end
 from wm_drake.studies.drive.study import (
     MEASURES,
-    estimate_unbalance,
     find_thresholds,
     motor_with_limit,
-    random_loads,
     torque_map,
 )
 from wm_drake.studies.experiment import Experiment
@@ -90,48 +87,6 @@ def test_a_map_scales_the_masses():
     )
     np.testing.assert_allclose(found.sum_of_mass_times_radius, [0.2, 0.4])
     np.testing.assert_array_equal(found.end, [[11.0, 18.0, 18.0], [11.0, 11.0, 18.0]])
-
-
-def test_unbalance_is_the_part_of_torque_and_acceleration_that_goes_round():
-    """Plant J w' = T - m r g sin(phi + phase); the controller answers with any T of order one."""
-    inertia, g, rng = 0.4, 9.81, np.random.default_rng(1)
-    machine = load_machine("motor").model_copy(update={"gravity": g})
-    loads = random_loads(20, 3, unbalance(1.0))
-    moments = [
-        sum(u.mass * u.radius * np.exp(1j * u.phase) for u in load.unbalances) for load in loads
-    ]
-
-    def run(cases):
-        torque = rng.normal(size=(len(cases), 2))
-        pulls = [(-g * u.imag, -g * u.real) for u in moments]  # -g U sin(phi + phase)
-        acceleration = (torque + pulls) / inertia
-        return xr.Dataset(
-            {
-                "drive_torque_order_one": (("run", "order"), torque),
-                "drive_acceleration_order_one": (("run", "order"), acceleration),
-            }
-        )
-
-    found = estimate_unbalance(made_up(run, machine), 9.0, loads, inertia)
-    np.testing.assert_allclose(found.planted, np.abs(moments))
-    np.testing.assert_allclose(found.estimated, found.planted, rtol=1e-9)
-
-
-def test_parts_of_order_one_of_a_record():
-    time = 5e-3 * np.arange(3001)
-    angle = 9.0 * time + 0.02 * np.sin(9.0 * time)
-    speed = 9.0 + 0.18 * np.cos(9.0 * time)
-    torque = 2.0 + 0.7 * np.cos(angle) - 0.4 * np.sin(angle)
-    of_torque, of_acceleration = orders_at_end(time, angle, speed, torque)
-    np.testing.assert_allclose(of_torque, [0.7, -0.4], atol=1e-6)
-    np.testing.assert_allclose(of_acceleration, [0.0, -9.0 * 0.18], atol=0.03)
-
-
-def test_random_loads_follow_the_seed_only():
-    some, more = random_loads(3, 5, unbalance(1.0)), random_loads(6, 5, unbalance(1.0))
-    assert some == more[:3]
-    assert random_loads(3, 6, unbalance(1.0)) != some
-    assert all(isinstance(u, Unbalance) for load in some for u in load.unbalances)
 
 
 def test_a_machine_without_motor_or_with_a_table_is_refused():

@@ -3,7 +3,7 @@
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.simulation.drive import measured_drive
-from wm_drake.simulation.measures.kind import Better, Measure, Variable, detail, each_run
+from wm_drake.simulation.measures.kind import Better, Measure, Variable, each_run
 from wm_drake.simulation.measures.run import Run
 
 _TORQUE, _SPEED = Unit("N*m", "N*m"), Unit("rad/s", "rpm")
@@ -26,12 +26,6 @@ def _number(name: str, unit: Unit, about: str, better: Better = "smaller") -> Va
         is_response=not name.startswith("caught"),
         studio=None,
     )
-
-
-def _of_order_one(name: str, unit: str, about: str) -> Variable:
-    """Return a variable with the parts of a signal that go round with the drum."""
-    words = f"{name} of order one"
-    return detail(f"drive_{name}_order_one", ("order",), Unit(unit, unit), words, about)
 
 
 DRIVE = Measure(
@@ -63,8 +57,6 @@ DRIVE = Measure(
             "mean torque of the motor where the drum is caught",
             better="",
         ),
-        _of_order_one("torque", "N*m", "torque with cosine and sine of the drum angle"),
-        _of_order_one("acceleration", "rad/s^2", "acceleration of the drum with them"),
     ),
     each_run(_drive),
     has_table=False,

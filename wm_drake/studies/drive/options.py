@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wm_drake.studies.study import LOADS, PROFILE, SEED, Options, Study, imported, option
+from wm_drake.studies.study import LOADS, PROFILE, Options, Study, imported, option
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     from wm_drake.parameters import MachineParameters
@@ -22,9 +22,6 @@ class DriveOptions(Options):
     profile: Path | None = PROFILE
     torques: int = option(9, "Torque limits of the map.", "N", ge=2, le=50)
     unbalances: int = option(6, "Unbalances of the map.", "N", ge=2, le=50)
-    loads: int = option(48, "Random loads of the estimation of unbalance; 0 for none.", "N", ge=0)
-    speed: float = option(90.0, "Speed of the estimation. [rpm]", ge=30.0, le=300.0)
-    seed: int = SEED
 
 
 def _with_motor(parameters: "MachineParameters", _: DriveOptions) -> "MachineParameters":
@@ -35,9 +32,9 @@ def _with_motor(parameters: "MachineParameters", _: DriveOptions) -> "MachinePar
 
 DRIVE = Study(
     "drive",
-    "Find the weakest motor that passes every critical speed, and estimate the unbalance.",
+    "Find the weakest motor that passes every critical speed.",
     DriveOptions,
     imported("wm_drake.studies.drive.task:DriveTask"),
-    quick={"load": ("middle",), "torques": 2, "unbalances": 2, "loads": 3},
+    quick={"load": ("middle",), "torques": 2, "unbalances": 2},
     adapt=_with_motor,
 )

@@ -1,40 +1,32 @@
-"""Show the drive study: smallest torque limits, map, estimated unbalance."""
+"""Show the drive study: smallest torque limits, map."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 import xarray as xr
 
 from wm_drake.parameters import MachineParameters, SpinProfile
-from wm_drake.report import chart
 from wm_drake.report import figure as fig
 from wm_drake.report.labelled import LabelledTable
-from wm_drake.report.quantity import SHARE, SPEED, quantity_of, shown, text_of
+from wm_drake.report.quantity import SHARE, quantity_of, shown, text_of
 from wm_drake.studies.answer import Answer, Part, Plot
 from wm_drake.studies.drive.study import (
     PASSES,
     TORQUE_LIMIT,
     UNBALANCE,
-    estimation_errors,
     motor_with_limit,
 )
 
 
 def drive_answer(
-    parameters: MachineParameters,
-    profile: SpinProfile,
-    data: Mapping[str, xr.Dataset],
-    speed: float,
+    parameters: MachineParameters, profile: SpinProfile, thresholds: xr.Dataset, grid: xr.Dataset
 ) -> Answer:
     """Return the answer of the study.
 
     Args:
-        data: `thresholds`, `map` and, if there is one, `estimation`, as of `find_thresholds`,
-            `torque_map` and `estimate_unbalance` in `wm_drake.studies.drive.study`.
-        speed: Speed of the estimation. [rad/s]
+        thresholds, grid: As of `find_thresholds` and `torque_map` in
+            `wm_drake.studies.drive.study`.
     """
-    thresholds, grid, estimation = data["thresholds"], data["map"], data.get("estimation")
     ratio = motor_with_limit(parameters)[0].belt_ratio
     passed = grid.end.values >= PASSES * profile.speed[-1]
     torque_map = Part(
@@ -54,27 +46,16 @@ def drive_answer(
         "laundry lies at the wall shows the resonances alone.",
         is_in_terminal=True,
     )
-    errors = None if estimation is None else estimation_errors(estimation)
-    parts = [torque_map, Part("Smallest torque limit", (limits,))]
-    if estimation is not None and errors is not None:
-        table = LabelledTable("errors", errors, "Errors of the estimation", _about(speed))
-        parts[1:1] = [
-            Part(
-                "Unbalance seen by the drive",
-                (estimation_plot(estimation), LabelledTable("estimation", estimation)),
-            )
-        ]
-        parts.append(Part("Errors of the estimation", (table,)))
     return Answer(
         f"Drive of machine {parameters.name}",
-        summary(thresholds, errors),
+        summary(thresholds),
         parameters,
-        tuple(parts),
+        (torque_map, Part("Smallest torque limit", (limits,))),
         (("Duration of a run", f"{profile.duration:g} s"),),
     )
 
 
-def summary(thresholds: xr.Dataset, errors: xr.Dataset | None) -> str:
+def summary(thresholds: xr.Dataset) -> str:
     """Return the answer in a few sentences."""
     needs = thresholds.passes_from
     sentences = []
@@ -87,22 +68,7 @@ def summary(thresholds: xr.Dataset, errors: xr.Dataset | None) -> str:
             f"Load {worst['load'].item()} needs the strongest motor: {text_of(worst.passes_from)}, "
             f"{text_of(worst.passes_from_at_drum)} at the drum."
         )
-    if errors is not None:
-        sentences.append(
-            f"The unbalance estimated from torque and speed is wrong by {text_of(errors.rms)} "
-            f"(RMS) at a mean of {text_of(errors.mean_planted)}; 95 % of the errors are below "
-            f"{text_of(errors.p95)}."
-        )
     return " ".join(sentences)
-
-
-def _about(speed: float) -> str:
-    return (
-        f"Error of the unbalance estimated at a constant {SPEED.text(speed)}, "
-        "over loads of two masses at random places. Estimate: parts of motor torque and speed "
-        "that go round with the drum, m r = |T - J dw/dt| / g, with the inertia of the empty drum. "
-        "What remains: inertia of the load, and a tub that moves."
-    )
 
 
 def map_plot(grid: xr.Dataset, passed: np.ndarray, ratio: float) -> Plot:
@@ -140,25 +106,4 @@ def map_plot(grid: xr.Dataset, passed: np.ndarray, ratio: float) -> Plot:
         f"{int(passed.sum())} of {passed.size} runs pass.",
         f"Load {grid['load'].item()} with its masses multiplied by {factors[0]:g} to "
         f"{factors[-1]:g}, over the torque limit: where the drum passes and where not.",
-    )
-
-
-def estimation_plot(estimation: xr.Dataset) -> Plot:
-    """Return estimated over planted unbalance."""
-    drawn = {
-        "from_speed_alone": {"key": "speed ripple alone, J dw/dt", "symbol": "triangle-up"},
-        "from_torque_alone": {"key": "torque alone", "symbol": "triangle-down"},
-        "estimated": {"key": "both", "color": fig.OURS},
-    }
-    drawn["from_speed_alone"]["color"] = fig.QUIET
-    drawn["from_torque_alone"]["color"] = fig.MEASURED
-    ends = [0.0, 1.02 * shown(estimation.planted).max()]
-    line = fig.Line(ends, ends, color=fig.MARK, key="planted")
-    y = {"label": quantity_of(estimation.estimated).label}
-    panel = chart.panel(estimation, "planted", drawn, kind=fig.Points, y=y)
-    return Plot(
-        fig.Figure(panels=(chart.between((), panel, line),), height=340.0),
-        f"{estimation.sizes['random_load']} random loads.",
-        "Estimated over planted unbalance. Torque or speed alone see only their share of it, which "
-        "depends on the controller.",
     )

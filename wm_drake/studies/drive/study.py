@@ -1,16 +1,8 @@
-"""How strong a drive must be, and what its torque and speed tell about the unbalance.
+"""How strong a drive must be.
 
 Smallest torque limit: bisection on a logarithmic scale of the constant torque at the motor's shaft.
 A drive passes if the drum has the wanted speed at the end of the profile. It is assumed that a
 stronger drive passes where a weaker one does.
-
-Estimation of the unbalance: at a low constant speed, gravity turns the drum with the torque
--m r g sin(phi + phase) about its axis, once in a revolution. With the inertia J of drum and rotor,
-
-    J w' = T - m r g sin(phi + phase) - friction
-
-so that the parts of order one of torque T and acceleration w' give m r, whatever the controller
-does: m r = |T_1 - J w'_1| / g. An appliance knows T from its current and w' from its tacho.
 """
 
 from collections.abc import Sequence
@@ -25,7 +17,6 @@ from wm_drake.parameters import (
     MachineParameters,
     MotorDrive,
     SpinProfile,
-    Unbalance,
     with_values,
 )
 from wm_drake.parameters.drive import TorqueLimit, motor_of
@@ -47,9 +38,6 @@ RANGE = 100.0
 PRECISION = 1.02
 """Quotient of the two ends of the interval at which the bisection stops."""
 
-RAMP, HOLD = 10.0, 12.0
-"""Durations of run-up and hold of the runs for the estimation. [s]"""
-
 TORQUE, MOMENT = Unit("N*m", "N*m"), Unit("kg*m", "g*m")
 
 CAUGHT_BELOW = Quantity("does not pass with, at the motor", TORQUE, 3)
@@ -59,11 +47,6 @@ CAUGHT_TORQUE = Quantity("mean torque there, at the drum", TORQUE, 2)
 TORQUE_LIMIT = Quantity("torque limit at the motor", TORQUE, 3)
 END_SPEED = Quantity("speed at the end", SPEED.unit, 0)
 UNBALANCE = Quantity("unbalance, sum of mass times radius", MOMENT, 1)
-PLANTED = Quantity("planted unbalance", MOMENT, 1)
-ESTIMATED = Quantity("estimated unbalance", MOMENT, 1)
-FROM_TORQUE = Quantity("estimated from torque alone", MOMENT, 1)
-FROM_SPEED = Quantity("estimated from speed alone", MOMENT, 1)
-ERROR = Quantity("error", MOMENT, 1)
 
 
 def motor_with_limit(parameters: MachineParameters) -> tuple[MotorDrive, TorqueLimit]:
@@ -191,83 +174,3 @@ def scaled(load: Load, factor: float) -> Load:
     return Load(
         unbalances=tuple(u.model_copy(update={"mass": factor * u.mass}) for u in load.unbalances)
     )
-
-
-def estimate_unbalance(
-    experiment: Experiment, speed: float, loads: Sequence[Load], inertia: float
-) -> xr.Dataset:
-    """Return the unbalance of loads as the drive sees it at a constant speed.
-
-    Args:
-        speed: Speed of the hold, reached by a ramp. [rad/s]
-        inertia: Inertia of drum and rotor about the axis, without load. [kg m^2]
-
-    Returns:
-        Over the random loads: `planted`, size of the vector sum of mass times radius, `estimated`
-        from torque and speed, their difference `error`, and the parts T_1 / g and J w'_1 / g
-        alone, in size [kg m].
-    """
-    profile = SpinProfile(time=(0.0, RAMP, RAMP + HOLD), speed=(0.0, speed, speed))
-    parameters = experiment.machine.parameters
-    cases = (
-        Case(f"random {number}", load, profile, parameters=parameters)
-        for number, load in enumerate(loads)
-    )
-    runs = experiment.over({"random_load": range(len(loads))}, cases, "estimation")
-    g = parameters.gravity
-    torque, acceleration = (
-        runs[f"drive_{name}_order_one"].values @ np.array([1.0, 1.0j])
-        for name in ("torque", "acceleration")
-    )
-    planted = [
-        abs(sum(u.mass * u.radius * np.exp(1j * u.phase) for u in load.unbalances))
-        for load in loads
-    ]
-    estimated = np.abs(torque - inertia * acceleration) / g
-    numbers = {
-        "planted": (PLANTED, planted),
-        "estimated": (ESTIMATED, estimated),
-        "error": (ERROR, estimated - planted),
-        "from_torque_alone": (FROM_TORQUE, np.abs(torque) / g),
-        "from_speed_alone": (FROM_SPEED, inertia * np.abs(acceleration) / g),
-    }
-    return xr.Dataset({name: q.variable("random_load", v) for name, (q, v) in numbers.items()})
-
-
-def estimation_errors(estimation: xr.Dataset) -> xr.Dataset:
-    """Return number of loads, bias, RMS and 95 % quantile of the errors. [kg m]"""
-    errors = estimation.error.values
-    numbers = {
-        "mean_planted": ("mean planted", np.mean(estimation.planted.values)),
-        "bias": ("bias", np.mean(errors)),
-        "rms": ("RMS", np.sqrt(np.mean(errors**2))),
-        "p95": ("95 % below", np.quantile(np.abs(errors), 0.95)),
-    }
-    return xr.Dataset(
-        {"loads": Quantity("random loads", decimals=0).variable((), len(errors))}
-        | {name: ERROR.named(words).variable((), value) for name, (words, value) in numbers.items()}
-    )
-
-
-def random_loads(count: int, seed: int, places: Load) -> list[Load]:
-    """Return loads of two masses at random: 0 to 0.5 kg each, any phase, within the drum's depth.
-
-    Args:
-        places: Load whose first radius is used.
-    """
-    rng = np.random.default_rng(seed)
-    radius = places.unbalances[0].radius
-    return [
-        Load(
-            unbalances=tuple(
-                Unbalance(
-                    mass=float(rng.uniform(0.0, 0.5)),
-                    radius=radius,
-                    y=float(rng.uniform(-0.1, 0.1)),
-                    phase=float(rng.uniform(0.0, 2.0 * np.pi)),
-                )
-                for _ in range(2)
-            )
-        )
-        for _ in range(count)
-    ]

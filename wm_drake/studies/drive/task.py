@@ -4,19 +4,15 @@ from typing import Any
 
 import numpy as np
 
-from wm_drake.engines.compiled.step_check import drum_inertia
 from wm_drake.errors import input_error
 from wm_drake.model.machine import Machine
-from wm_drake.report.quantity import SPEED
 from wm_drake.studies.answer import Answer
 from wm_drake.studies.drive.options import DriveOptions
 from wm_drake.studies.drive.page import drive_answer
 from wm_drake.studies.drive.study import (
     MEASURES,
-    estimate_unbalance,
     find_thresholds,
     motor_with_limit,
-    random_loads,
     torque_map,
 )
 from wm_drake.studies.executor import Executor
@@ -43,23 +39,18 @@ class DriveTask(Task):
     @property
     def identity(self) -> dict[str, Any]:
         """Return what determines the runs beside the machine."""
-        return {"profile": self.cases[0].profile, "seed": str(self.options.seed)}
+        return {"profile": self.cases[0].profile}
 
     def run(self, executor: Executor) -> Answer:
-        """Find thresholds, draw the map for the load that needs most, and estimate unbalance."""
+        """Find thresholds, and draw the map for the load that needs most."""
         options, parameters = self.options, self.machine.parameters
         loads = tuple(self.cases)
         experiment = Experiment(self.machine, MEASURES, executor.simulate, loads)
-        thresholds, speed = find_thresholds(experiment), SPEED.unit.to_si(options.speed)
+        thresholds = find_thresholds(experiment)
         needs = thresholds.passes_from.fillna(motor_with_limit(parameters)[1].torque).values
         worst = int(np.argmax(np.where(thresholds.passes_from.isnull(), np.inf, needs)))
         top = needs[worst]
         torques = (top * np.linspace(0.25, 2.0, options.torques)).tolist()
         factors = np.linspace(0.25, 1.5, options.unbalances).tolist()
         grid = torque_map(experiment, self.cases[worst], torques, factors)
-        data = {"thresholds": thresholds, "map": grid}
-        if options.loads:
-            inertia = drum_inertia(self.machine.set_up())
-            drawn = random_loads(options.loads, options.seed, self.cases[0].load)
-            data["estimation"] = estimate_unbalance(experiment, speed, drawn, inertia)
-        return drive_answer(parameters, self.cases[0].profile, data, speed)
+        return drive_answer(parameters, self.cases[0].profile, thresholds, grid)
