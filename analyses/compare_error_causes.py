@@ -4,8 +4,10 @@
 degrees: whirl of the drum in its bearing, residual imbalance of the drum, and an error of the phase
 of the masses (at 0 degrees their phase "is straightforward"). Each is put into the machine
 `free_stroke` in three sizes, and all three together. The machine with the cause stands for the
-experiment, the one without for the model, and the error is that of Table 9. Spin cycles are kept in
-a ledger; a second call goes on. The script renews docs/error-causes.md between its marks:
+experiment, the one without for the model, and the error is that of Table 9. At last, a common error
+of all groups, as large as that of [A] for one mass and at 0 degrees, is put in quadrature with an
+error of the phase. Spin cycles are kept in a ledger; a second call goes on. The script renews
+docs/error-causes.md between its marks:
 
     python analyses/compare_error_causes.py --page docs/error-causes.md
 """
@@ -20,7 +22,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from analysis_tools import validation_page as page
-from analysis_tools.error_causes import CAUSES, with_cause, without_phase_error
+from analysis_tools.error_causes import ASKED_FOR, CAUSES, with_cause, without_phase_error
 from analysis_tools.spin_profiles import begin_of
 from write_paper_a import CASES, GROUPS
 
@@ -42,6 +44,7 @@ def main() -> None:
     )
     parser.add_argument("--quick", action="store_true", help="five cases, before 10 s")
     parser.add_argument("--few", action="store_true", help="five cases, one of each group at least")
+    parser.add_argument("--only", default="", metavar="WORDS", help="causes with these words")
     parser.add_argument("--ledger", type=Path, default=Path("compare_error_causes.sqlite"))
     parser.add_argument("--page", type=Path, help="page to renew between its marks")
     parser.add_argument("--out", type=Path, help="also write the text to this file")
@@ -58,12 +61,21 @@ def main() -> None:
         def error_of(imperfections: dict[str, Any]) -> xr.DataArray:
             return 100.0 * average_errors(perfect, found(with_cause(machine, imperfections)))
 
-        lines = [_line(name, error_of, cases) for name in CAUSES]
+        causes = [name for name in CAUSES if arguments.only in name]
+        errors = {name: _errors(CAUSES[name], error_of, cases) for name in causes}
+    published = _published(cases)
+    common = float(np.mean([published[name] for name in GROUPS if name not in AT_AN_ANGLE]))
+    for size in [size for size in ASKED_FOR if f"phase error, {size}" in causes]:
+        errors[f"a common error of {common:.1f} % in quadrature with a phase error of {size}"] = {
+            group: float(np.hypot(common, np.nan_to_num(error)))
+            for group, error in errors[f"phase error, {size}"].items()
+        }
+    lines = [[name, *map(_percent, of_group.values())] for name, of_group in errors.items()]
     text = page.origin("python analyses/compare_error_causes.py --page docs/error-causes.md", [])
     text += page.table_text(
         "Error of a model without the cause",
         ["cause, size", *GROUPS],
-        [_published(cases), *lines],
+        [["**[A] Table 9: error of its model**", *map(_percent, published.values())], *lines],
     )
     print(text)
     page.write(text, arguments.out, arguments.page)
@@ -84,26 +96,33 @@ def _displacement(
     return xr.DataArray(ledger.get(key).values["rms"], labels_of(machine, cases, profile), DIMS)
 
 
-def _published(cases: list[UnbalanceCase]) -> list[str]:
-    means = [
-        np.mean([case.published_error_percent for case in cases if belongs(case)])
-        for belongs in GROUPS.values()
-    ]
-    return ["**[A] Table 9: error of its model**", *(f"{mean:.1f} %" for mean in means)]
+def _published(cases: list[UnbalanceCase]) -> dict[str, float]:
+    """Return the mean error of each group in [A] Table 9. [%]"""
+    return {
+        group: float(np.mean([case.published_error_percent for case in cases if belongs(case)]))
+        for group, belongs in GROUPS.items()
+    }
 
 
-def _line(
-    name: str, error_of: Callable[[dict[str, Any]], xr.DataArray], cases: list[UnbalanceCase]
-) -> list[str]:
-    """Return the line of a cause; an error of the phase acts in the groups at an angle only."""
-    cells = [name]
+def _errors(
+    cause: dict[str, Any],
+    error_of: Callable[[dict[str, Any]], xr.DataArray],
+    cases: list[UnbalanceCase],
+) -> dict[str, float]:
+    """Return the mean error of each group; NaN without a cause. [%]
+
+    An error of the phase acts in the groups at an angle only.
+    """
+    found = {}
     for group, belongs in GROUPS.items():
-        causes = CAUSES[name] if group in AT_AN_ANGLE else without_phase_error(CAUSES[name])
+        causes = cause if group in AT_AN_ANGLE else without_phase_error(cause)
         names = [case.name for case in cases if belongs(case)]
-        cells.append(
-            f"{float(error_of(causes).sel(case=names).mean()):.1f} %" if causes else "none"
-        )
-    return cells
+        found[group] = float(error_of(causes).sel(case=names).mean()) if causes else np.nan
+    return found
+
+
+def _percent(error: float) -> str:
+    return "none" if np.isnan(error) else f"{error:.1f} %"
 
 
 if __name__ == "__main__":

@@ -22,6 +22,10 @@ LOOSE = {
 SIZES = ("0.05 mm", "10 g", "2 deg"), ("0.15 mm", "20 g", "5 deg"), ("0.5 mm", "50 g", "10 deg")
 """Small, middle and large size of the three causes. All are assumptions."""
 
+ASKED_FOR = ("19 deg", "24 deg")
+"""Errors of the phase that the excess of [A] at 180 and at 90 degrees asks for, if all groups have
+a common error in quadrature."""
+
 
 def whirl(size: str) -> dict[str, Any]:
     """Return a radial clearance in the bearing."""
@@ -42,7 +46,7 @@ CAUSES: dict[str, dict[str, Any]] = {
     "whirl: a compliant bearing without clearance": {"bearing": BEARING | STIFF},
     **{f"whirl: radial clearance {size}": whirl(size) for size, _, _ in SIZES},
     **{f"residual imbalance, {size}": residual(size) for _, size, _ in SIZES},
-    **{f"phase error, {size}": phase(size) for _, _, size in SIZES},
+    **{f"phase error, {size}": phase(size) for size in (*(of[2] for of in SIZES), *ASKED_FOR)},
     **{
         f"all three: {', '.join(sizes)}": whirl(sizes[0]) | residual(sizes[1]) | phase(sizes[2])
         for sizes in SIZES
