@@ -37,6 +37,9 @@ from wm_drake.parameters import load_machine
 from wm_drake.parameters.types import FloatArray
 from wm_drake.studies.calibrate.parameter_map import parameter_map_of
 
+SPONGE = "reference_sponge"
+"""Shipped machine that this script has found, with a friction sponge."""
+
 STEADY_ITERATIONS = 40
 """Limit of iterations by the steady motion."""
 
@@ -60,6 +63,7 @@ def main() -> None:
     arguments = _arguments()
     reference = load_machine(REFERENCE)
     columns = {"goal": GOALS, REFERENCE: goals_of(reference, reference)}
+    columns[SPONGE] = goals_of(load_machine(SPONGE), reference)
     if not arguments.quick:
         for begin in [*_shipped(arguments), *_best_ends(arguments)]:
             columns[f"{begin.words}, `{begin.law}`"] = _fitted(arguments, begin)
@@ -73,7 +77,7 @@ def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--quick", action="store_true", help="show the shipped machine alone")
+    parser.add_argument("--quick", action="store_true", help="show the shipped machines alone")
     parser.add_argument("--net", type=Path, default=Path("search_basins.sqlite"))
     parser.add_argument("--seed", type=int, default=0, help="seed of the net")
     parser.add_argument("--steady", type=int, default=40, help="fits by the steady motion")

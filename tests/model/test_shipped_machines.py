@@ -21,9 +21,9 @@ from wm_drake.studies.machine_show.description import oscillating_mass
 from wm_drake.studies.modes.natural import natural_modes
 
 README = SDF_FOLDER / "README.md"
-CARRIED = {"oscillating_group.sdf": 2e-3}
+CARRIED = {"oscillating_group.sdf": 2e-3, "oscillating_group_sponge.sdf": 2e-3}
 """Part of the weight that bushings may carry: short springs lean, stiff end bushings hold them."""
-SHIFT = {"oscillating_group.sdf": 6e-3}
+SHIFT = {"oscillating_group.sdf": 6e-3, "oscillating_group_sponge.sdf": 6e-3}
 """Largest distance of the rest pose from the drawn one: its rear spring leans, it tilts by 2.5 deg.
 [m]"""
 FRAME_GROUPS = ("spring_", "damper_", "gasket_", "sensor_", "detergent_")
