@@ -228,6 +228,25 @@ def test_damping_is_found_from_record_files(wm_drake, reference, machine):
     assert "virtual experiment" not in Path("out/report.html").read_text()
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("planted", "rounds", "off"),
+    [((28.7, 0.087), 4, (-0.020, 0.006)), ((12.0, 0.14), 2, (0.042, 0.071))],
+)
+def test_the_rule_of_the_paper_ends_beside_the_planted_damping(
+    reference, machine, planted, rounds, off
+):
+    """Repeat the figures of docs/theory/fits.md, which `--paper-mesh` prints."""
+    truth = np.array([planted[0], np.rad2deg(planted[1])])  # N s/m, N m s/rad
+    numbers = damping_numbers(reference).parameters_at(truth)
+    records = {load: run_of(machine, numbers, load).displacement for load in ("middle", "counter")}
+    grids = grid_of_paper(envelope_model(machine, records).problem(), None)
+    assert grids["round"].max() == rounds
+    best = grids.isel(point=int(grids.objective.argmin("point")))
+    found = np.array([best.C_L.item(), best.C_T.item()])
+    assert np.abs(found / truth - 1.0) == pytest.approx(np.abs(off), abs=1e-3)
+
+
 def run_of(machine, parameters, load):
     """Return the record of a run of the built machine with other numbers."""
     cases = [Case(load, parameters.loads[load], parameters.profile, parameters=parameters)]
