@@ -242,6 +242,14 @@ def twice_the_speed(of):
     of["Drum"] = (2.0 * of["Drum"][0], "rpm")
 
 
+def on_the_motor(of):
+    of["Drum"] = (12.3 * of["Drum"][0], "rpm")
+
+
+def in_hertz(of):
+    of["Drum"] = (of["Drum"][0] / 60.0, "rpm")
+
+
 def without_a_unit(of):
     of["Acc 1"] = (of["Acc 1"][0], "")
 
@@ -272,6 +280,8 @@ def ac_coupled(of):
         (reversed_z, "S1_z: it has the other sign (polarity: negative)", None),
         (in_wrong_unit, "the units of S1_x, S1_z, S2_y are larger than declared", None),
         (twice_the_speed, "with ratio: 2 both agree", None),
+        (on_the_motor, "with ratio: 12.", None),
+        (in_hertz, "or its unit is Hz, not rpm", None),
     ],
 )
 def test_planted_faults_are_named_or_left_out(wm_drake, laboratory, plant, message, least):
@@ -314,8 +324,11 @@ def test_a_drum_that_turned_the_other_way_is_named(compare, tmp_path_factory):
     assert error.count("what explains it: the drum turned the other way") == 1
     assert error.count(";") < 3  # one cause is named, no other
     Path("back.yaml").write_text(backwards)
-    result = compare("run.csv", "--test", "test.yaml", "--profile", "back.yaml")
-    assert max(row["error_percent"] for row in result["errors_acceleration"]) < 0.3
+    for speed in ("speed: {channel: Drum}\n", ""):  # else the signals align the clock
+        write_test(speed=speed)
+        result = compare("run.csv", "--test", "test.yaml", "--profile", "back.yaml")
+        assert max(row["error_percent"] for row in result["errors_acceleration"]) < 0.3
+    assert "the drum turned the other way" in compare("run.csv", "--test", "test.yaml", code=2)
 
 
 def rounded(time, channels):

@@ -106,6 +106,21 @@ def speed_held(of):
     of["speed"][800:950] = of["speed"][800]
 
 
+def held_to_a_plateau(of):
+    of["speed"][1440:1590] = of["speed"][1440]
+
+
+def nearly_clipped(of):
+    """Clip before a noisy amplifier."""
+    limit = 9.81 + 0.5 * (of["S"].max() - 9.81)
+    above = np.flatnonzero(of["S"] > limit)
+    of["S"][above] = limit + 0.005 * np.sin(np.arange(len(above)))
+
+
+def small_spikes(of):
+    of["S"][[350, 500]] = 9.81 + 1.3 * np.percentile(np.abs(of["S"] - 9.81), 95.0)
+
+
 def speed_mark(of):
     of["speed"][[700, 900]] = 65535.0
 
@@ -123,6 +138,9 @@ def speed_mark(of):
         (clipped, "clipping", None),
         (speed_off, "jumps of the speed", 150),
         (speed_held, "constant spans", 150),
+        (held_to_a_plateau, "jumps of the speed", 150),
+        (nearly_clipped, "clipping", None),
+        (small_spikes, "spikes", 2),
         (speed_mark, "marks of lost samples", 2),
     ],
 )

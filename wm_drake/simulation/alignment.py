@@ -168,7 +168,7 @@ def _of_phases(
     counts = sizes > LEAST_PART * largest
     if not counts.any():
         return Alignment(before.offset, before.rate, OFFSET_SD, RATE_SD, "signals", np.pi)
-    stamps, speed = measured.time.values, np.abs(measured.speed.values)
+    stamps, speed = measured.time.values, measured.speed.values
     middle = float(before.of_run(np.array(np.mean(time))))
     rows, columns, phases, weights = [], [], [], []
     for k in np.flatnonzero(counts.any(axis=0)):

@@ -99,6 +99,36 @@ def test_a_planted_cause_is_named_first(runs, of, changes, causes):
         assert any(cause in each for each in best.causes)
 
 
+@pytest.mark.parametrize(
+    ("order", "count"), [((3, 1, 2, 0, 4), 1), ((0, 1, 4, 3, 2), 1), ((2, 1, 3, 0, 4), 2)]
+)
+def test_exchanged_channels_of_like_sensors_are_named(runs, order, count):
+    """Exchange S1_x and S2_x, S1_z and S3_z, and three in a ring."""
+    best = diagnosis(runs, recorded(runs)[:, order]).explanations[0]
+    assert best.misfit < 0.05
+    assert len(best.causes) == count
+    assert all("are exchanged" in cause for cause in best.causes)
+
+
+SIGNS = np.array([-1.0, 1.0, 1.0, -1.0, 1.0])
+
+
+@pytest.mark.parametrize(
+    ("factor", "causes"),
+    [
+        (-1.0, ["all sensors have the other sign"]),
+        (SIGNS, ["S1_x: it has the other sign", "S2_x: it has the other sign"]),
+        (1e3, ["the units of S1_x, S1_y, S1_z, S2_x, S3_z are larger"]),
+    ],
+)
+def test_faults_of_several_sensors_are_named(runs, factor, causes):
+    best = diagnosis(runs, factor * recorded(runs)).explanations[0]
+    assert best.misfit < 0.05
+    assert len(best.causes) == len(causes)
+    for cause in causes:
+        assert any(cause in each for each in best.causes)
+
+
 def test_as_declared_nothing_is_tried(runs):
     found = diagnosis(runs, recorded(runs))
     assert not found.unlike

@@ -32,6 +32,10 @@ SPIKE, SPIKE_OF_ALL, SPIKE_SAMPLES = 6.0, 2.0, 3
 first ratio, and than 95 % of all samples, by the second one. With Gaussian noise the first ratio
 alone needs 7 standard deviations."""
 
+AROUND, FEW = 100, 0.005
+"""Samples on each side beyond all of which, by the ratio of a spike, a sample is a spike too; and
+largest part of such ones: more are knocks."""
+
 NEAR = 12
 """Samples on each side that are the neighbours of a spike."""
 
@@ -52,6 +56,9 @@ CLIPPED, CLIPPED_PAIRS = 5.0, 3
 """A channel is clipped if its largest value occurs so many times as often as any other in the
 nearest third of its range, and in so many pairs of neighbouring samples. A sine that is rounded has
 the ratio 2.4."""
+
+NEARLY = 0.005
+"""Part of the range within which samples count as the largest value: noise may follow a limit."""
 
 LEAST_CLIPPED = 10
 """Smallest number of samples at a range."""
@@ -81,6 +88,9 @@ LONGEST_BRIDGE = 5.0
 SLOWEST, STARTED = np.pi / 30.0, 2.0 * np.pi
 """Speed below which a drum rests, and the one up to which a tacho may not see it turn: 1 and 60
 rpm, that of a turn from rest at 30 rpm in a second. [rad/s]"""
+
+HELD = 4
+"""Samples of one value before a jump from which they may be held, and the drum moved meanwhile."""
 
 MOST_SEGMENTS = 300
 """Most pieces between jumps of a speed; one with more is noise."""
@@ -203,14 +213,28 @@ def _spikes(channel: Channel) -> np.ndarray:
     values = channel.values
     mask = np.zeros(len(values), dtype=bool)
     off = np.abs(values - np.nanmedian(values))
-    for at in np.flatnonzero(off > SPIKE_OF_ALL * np.nanpercentile(off, 95.0)):
+    usual = np.nanpercentile(off, 95.0)
+    for at in np.flatnonzero((off > SPIKE_OF_ALL * usual) | ((off > usual) & _lone(off))):
         near = values[max(0, at - NEAR) : at + NEAR + 1]
         near = near[np.isfinite(near)]
         apart = np.abs(near - np.median(near))
         if len(apart) > 2 * SPIKE_SAMPLES + 2:
-            usual = np.partition(apart, -SPIKE_SAMPLES - 1)[-SPIKE_SAMPLES - 1]
-            mask[at] = abs(values[at] - np.median(near)) > SPIKE * usual
+            usual_near = np.partition(apart, -SPIKE_SAMPLES - 1)[-SPIKE_SAMPLES - 1]
+            mask[at] = abs(values[at] - np.median(near)) > SPIKE * usual_near
     return mask
+
+
+def _lone(off: FloatArray) -> np.ndarray:
+    """Return the few samples (n,) that are far beyond all others around them."""
+    from scipy.ndimage import maximum_filter1d  # slow to import
+
+    size = np.nan_to_num(off)
+    others = np.maximum(
+        np.roll(maximum_filter1d(size, AROUND), AROUND // 2 + SPIKE_SAMPLES),
+        np.roll(maximum_filter1d(size, AROUND), -AROUND // 2 - SPIKE_SAMPLES),
+    )
+    lone = size > SPIKE * others
+    return lone if lone.sum() <= FEW * len(off) else np.zeros(len(off), dtype=bool)
 
 
 def _stuck(channel: Channel) -> np.ndarray:
@@ -267,13 +291,16 @@ def _clipped(channel: Channel) -> np.ndarray:
     for side in (1.0, -1.0):
         signed = side * values
         top, low = np.nanmax(signed), np.nanmin(signed)
-        is_top = signed == top
-        near = signed[(signed > top - 0.35 * (top - low)) & ~is_top]
-        most = np.unique(near, return_counts=True)[1].max() if len(near) else 0
-        pairs = int(np.sum(is_top[1:] & is_top[:-1]))
-        runs = int(np.sum(is_top[1:] & ~is_top[:-1]))
-        if is_top.sum() >= max(LEAST_CLIPPED, CLIPPED * most) and min(pairs, runs) >= CLIPPED_PAIRS:
-            at_range |= is_top
+        for width, part in ((0.0, 0.35), (NEARLY * (top - low), 0.1)):
+            is_top = signed >= top - width
+            near = signed[(signed > top - part * (top - low)) & ~is_top]
+            near = np.floor((top - near) / width) if width else near
+            most = np.unique(near, return_counts=True)[1].max() if len(near) else 0
+            pairs = int(np.sum(is_top[1:] & is_top[:-1]))
+            runs = int(np.sum(is_top[1:] & ~is_top[:-1]))
+            enough = is_top.sum() >= max(LEAST_CLIPPED, CLIPPED * most)
+            if enough and min(pairs, runs) >= CLIPPED_PAIRS:
+                at_range |= is_top
     places = np.flatnonzero(at_range)
     if not len(places):
         return at_range
@@ -334,7 +361,9 @@ def _jumping(channel: Channel) -> np.ndarray:
     is_start = np.minimum(value[:-1], value[1:]) < SLOWEST
     reach = np.where(is_start, STARTED, _reach(waits, value[:-1]))
     jumps = np.flatnonzero(np.abs(np.diff(value)) > reach + margin)
-    edges = np.append(0, changes[jumps + 1]), np.append(changes[jumps + 1], len(speed))
+    held = changes[jumps][changes[jumps + 1] - changes[jumps] > HELD]  # a value held before a jump
+    inner = np.unique(np.append(changes[jumps + 1], held[held > 0]))
+    edges = np.append(0, inner), np.append(inner, len(speed))
     if not len(jumps) or len(edges[0]) > MOST_SEGMENTS:
         return np.zeros(len(channel.values), dtype=bool)
     mask = np.ones(len(channel.values), dtype=bool)

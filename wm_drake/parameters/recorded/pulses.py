@@ -105,6 +105,7 @@ def counted(
     allowed = LOST + USUAL_ACCELERATION * np.diff(times[kept]) / np.exp(usual)
     is_long = np.diff(times[kept]) > 2.0 * np.exp(-usual)
     is_lost = is_long & (np.abs(speeds - usual) > allowed)
+    is_lost |= np.diff(times[kept]) * np.exp(usual) > MOST_MISSING + 1.0
     pulses = Pulses(
         times[kept],
         np.concatenate([[0], np.cumsum(np.where(is_lost, 1, steps))]),

@@ -28,6 +28,12 @@ CONTRADICTION = 0.05
 RATIOS = (1.0, 1 / 4, 1 / 3, 1 / 2, 2 / 3, 3 / 2, 2.0, 3.0, 4.0)
 """Ratios of the true drum speed to the recorded one that are tried."""
 
+SCANNED, WINDOWS = 0.04, 20
+"""Relative step of the ratios that are searched where none of these fits, and number of windows."""
+
+UNITS = {"Hz": 60.0, "rad/s": 30.0 / np.pi}
+"""Units of a speed, by rpm."""
+
 UPSIDE_DOWN = 1.5
 """Difference of a mean, by gravity, above which gravity has the other sign: 2, not 1 or 0."""
 
@@ -77,22 +83,57 @@ def check_orders(recording: TestRecording) -> None:
         return
     known = np.isfinite(speed)
     angle = cumulative_trapezoid(np.interp(time, time[known], np.abs(speed[known])), time)
+    angle = np.append(0.0, angle)
     values = np.stack([*recording.channels.values.values()], axis=1)
     values = np.where(known[:, None], values, np.nan)
-    vectors = order_vectors(values, np.append(0.0, angle), time, np.array(RATIOS))
-    powers = np.nan_to_num(np.abs(vectors.values) ** 2).sum(axis=0)  # order, sensor
-    best = np.argmax(powers, axis=0)
-    order = int(np.bincount(best).argmax())
-    is_larger = powers[order] > LARGER**2 * powers[0]
-    if RATIOS[order] != 1.0 and np.mean((best == order) & is_larger) > 0.5:
+    powers = _powers(values, angle, time, np.array([*RATIOS, *NEIGHBOURS]))
+    if powers.any() and np.mean(np.argmax(powers, axis=0) == 0) >= 0.5:
+        return
+    ratio = _true_ratio(values, angle, time)
+    if ratio and abs(np.log(ratio)) > 2.0 * SCANNED:
         about = recording.about
+        units = [unit for unit, size in UNITS.items() if abs(np.log(ratio / size)) < SCANNED]
+        more = f"; or its unit is {units[0]}, not rpm" if units and about.kind == "speed" else ""
         raise input_error(
-            f"the sensors vibrate with {RATIOS[order]:.3g} times the recorded drum speed, in which "
+            f"the sensors vibrate with {ratio:.3g} times the recorded drum speed, in which "
             f"order 1 is smaller by a factor of {LARGER:g} or more: the tacho has another ratio; "
-            f"with ratio: {about.ratio / RATIOS[order]:.4g} both agree",
+            f"with ratio: {about.ratio / ratio:.3g} both agree{more}",
             where=str(recording.path),
             key=about.channel,
         )
+
+
+def _powers(
+    values: FloatArray, angle: FloatArray, time: FloatArray, orders: FloatArray
+) -> FloatArray:
+    """Return the mean squares of orders of signals (n, k) over time (orders, k); 0 if unknown."""
+    windows = REVOLUTIONS, float(np.ptp(time)) / WINDOWS
+    vectors = order_vectors(values, angle, time, orders, windows)
+    squares = np.abs(vectors.values) ** 2
+    known = np.isfinite(squares)
+    return np.asarray(np.where(known, squares, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1))
+
+
+def _true_ratio(values: FloatArray, angle: FloatArray, time: FloatArray) -> float:
+    """Return the ratio of the drum speed to the recorded one that sensors vibrate with; 0 if none.
+
+    It is that whose order 1 is the largest, in windows of its own revolutions; a ratio of small
+    numbers nearby is taken for it.
+    """
+    one = np.array([1.0])
+    scale = np.maximum(np.nanvar(values, axis=0), 1e-300)
+
+    def best_of(ratios: FloatArray) -> tuple[float, float]:
+        sizes = [float((_powers(values, r * angle, time, one)[0] / scale).sum()) for r in ratios]
+        best = int(np.argmax(sizes))
+        return float(ratios[best]), sizes[best]
+
+    coarse, size = best_of(np.exp(np.arange(np.log(1.0 / 20.0), np.log(70.0), SCANNED)))
+    if size <= LARGER**2 * best_of(one)[1]:
+        return 0.0
+    fine, _ = best_of(coarse * np.exp(SCANNED * np.linspace(-1.0, 1.0, 17)))
+    near = min(RATIOS, key=lambda ratio: abs(np.log(fine / ratio)))
+    return near if abs(np.log(fine / near)) < 0.5 * SCANNED else fine
 
 
 def check_speed(pair: Pair) -> None:
@@ -173,12 +214,12 @@ def judged(diagnosis: Diagnosis, pair: Pair) -> str:
         InputError: its vibrations are not, and a cause explains it; or no sensor is like its
             prediction at all.
     """
-    if not (diagnosis.unlike or diagnosis.shifted):
-        return ""
     path = pair.recording.path
     is_upside_down = max(diagnosis.means.values(), default=0.0) > UPSIDE_DOWN
-    if (diagnosis.unlike or is_upside_down) and diagnosis.explanations:
+    if (diagnosis.doubtful or is_upside_down) and diagnosis.explanations:
         raise input_error(diagnosis.text, where=str(path))
+    if not (diagnosis.unlike or diagnosis.shifted):
+        return ""
     if float(np.abs(order_one(pair).correlation.values).max(initial=0.0)) < LEAST_CORRELATION:
         raise input_error(f"no signal is like its prediction; it {diagnosis.text}", where=str(path))
     return f"{path.name} {diagnosis.text}."

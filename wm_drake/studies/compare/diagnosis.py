@@ -23,8 +23,12 @@ GRAVITY = 9.81
 """Size by which a difference of means is divided. [m/s^2]"""
 
 UNLIKE = 0.3
-"""Misfit of order 1 of a sensor from which causes are tried: an assumption, more than tilts, gains
-and most models are off by."""
+"""Misfit of order 1 of a sensor that is said also if no cause explains it: an assumption, more than
+tilts, gains and most models are off by."""
+
+DOUBTFUL = 0.1
+"""Misfit of order 1 of a sensor from which causes are tried, which are named only if they explain
+it: sensors along one axis are much alike, and so are their channels if they are exchanged."""
 
 UNLIKE_MEAN = 0.1
 """Difference of the means of an accelerometer, by gravity, from which causes are tried."""
@@ -45,13 +49,21 @@ MOST_CAUSES = 3
 ALIKE = 1.5
 """Largest ratio of the misfit of a cause that is named to that of the best one."""
 
-LEAST_GAIN = 0.7
-"""Largest ratio of the misfit with a further cause to that without it."""
+LEAST_GAIN = 0.85
+"""Largest ratio of the misfit with a further cause to that without it: one of three like causes
+leaves sqrt(2 / 3)."""
+
+NEARLY = 1.05
+"""Largest ratio of the misfit of the first cause that is taken to that of the best one: the plain
+ones come first."""
+
+REMAINS = 0.5
+"""Largest misfit of any sensor with the causes that are named."""
 
 CORNERS = (0.16, 0.5, 1.6, 5.0)
 """Corners of AC couplings that are tried. [Hz]"""
 
-FACTORS = {"g": 9.80665, "mg": 9.80665e-3, "in": 0.0254, "mm": 1e-3, "a tenth": 0.1}
+FACTORS = {"g": 9.80665, "mg": 9.80665e-3, "in": 0.0254, "mm": 1e-3, "a half": 0.5, "a tenth": 0.1}
 """Factors of units that are tried, and their reciprocals."""
 
 SHIFTS = 0.002 * np.arange(-10, 11)
@@ -113,6 +125,11 @@ class Diagnosis:
         return [name for name, value in self.vibrations.items() if value > UNLIKE]
 
     @property
+    def doubtful(self) -> list[str]:
+        """Return the sensors for whose vibration causes are tried."""
+        return [name for name, value in self.vibrations.items() if value > DOUBTFUL]
+
+    @property
     def shifted(self) -> list[str]:
         """Return the sensors whose mean is not that of gravity."""
         return [name for name, value in self.means.items() if value > UNLIKE_MEAN]
@@ -126,7 +143,7 @@ class Diagnosis:
     @property
     def text(self) -> str:
         """Return what explains the recording, or that nothing does."""
-        names = ", ".join(dict.fromkeys([*self.unlike, *self.shifted]))
+        names = ", ".join(dict.fromkeys([*(self.unlike or self.doubtful), *self.shifted]))
         head = f"is not like its prediction in {names} (misfit {MISFIT.text(self.misfit)})"
         if self.explanations:
             return f"{head}; what explains it: {'; or '.join(map(str, self.explanations))}"
@@ -227,7 +244,8 @@ class Suspect:
         best = int(np.argmin(squares.sum(axis=1)))
         means = np.array([factor * seen.means[v] for seen, v, factor in chosen])
         is_shown = [sensor.quantity == "acceleration" for sensor in self.sensors.values()]
-        apart = np.abs(self.measured.means[columns] - means) / GRAVITY * np.array(is_shown)
+        unit = GRAVITY * np.maximum(np.abs(trial.factors), 1.0)
+        apart = np.abs(self.measured.means[columns] - means) / unit * np.array(is_shown)
         return np.sqrt(np.maximum(squares[best], 0.0)), apart, float(SHIFTS[best])
 
     def total(self, trial: _Trial) -> float:
@@ -236,14 +254,10 @@ class Suspect:
         return float(np.sqrt(np.mean(vibrations**2 + np.minimum(means, 2.0) ** 2)))
 
     def further(self, trial: _Trial) -> Iterator[_Trial]:
-        """Yield a trial with one more cause, about sensors that are unlike their predictions."""
+        """Yield a trial with one more cause, about sensors that are unlike; plain causes first."""
         vibrations, means, _ = self.misfits(trial)
         names = list(self.sensors)
-        wrong = [int(k) for k in np.flatnonzero((vibrations > UNLIKE) | (means > UNLIKE_MEAN))]
-        for i, j in combinations(range(len(names)), 2):
-            one, other = (self.sensors[names[k]] for k in (i, j))
-            if (i in wrong or j in wrong) and one.quantity == other.quantity:
-                yield from _exchanged(trial, names, i, j)
+        wrong = [int(k) for k in np.flatnonzero((vibrations > DOUBTFUL) | (means > UNLIKE_MEAN))]
         for k in wrong:
             for number, sign in product(range(len(self.variants[k])), (1.0, -1.0)):
                 if number == trial.variants[k] and sign > 0.0:
@@ -252,6 +266,14 @@ class Suspect:
                 texts.append("it has the other sign (polarity: negative)" if sign < 0.0 else "")
                 words = f"{names[k]}: {' and '.join(filter(None, texts))}"
                 yield _changed(trial, {k: (number, sign)}, words)
+        for i, j in combinations(range(len(names)), 2):
+            one, other = (self.sensors[names[k]] for k in (i, j))
+            if (i in wrong or j in wrong) and one.quantity == other.quantity:
+                yield from _exchanged(trial, names, i, j)
+        every = range(len(names))
+        yield _changed(
+            trial, {k: (trial.variants[k], -1.0) for k in every}, "all sensors have the other sign"
+        )
         for unit, factor in FACTORS.items():
             for size in (factor, 1.0 / factor):
                 words = f"are larger than declared by the factor {size:.4g} ({unit})"
@@ -295,7 +317,7 @@ def diagnosed(declared: Suspect, others: Sequence[Suspect] = ()) -> Diagnosis:
         dict(zip(names, means.tolist(), strict=True)),
         shift=shift,
     )
-    if not (result.unlike or result.shifted):
+    if not (result.doubtful or result.shifted):
         return result
     tested = list[Explanation]()
     for suspect in (declared, *others):
@@ -304,24 +326,34 @@ def diagnosed(declared: Suspect, others: Sequence[Suspect] = ()) -> Diagnosis:
             tried.clear()
         trial, least = suspect.declared, suspect.total(suspect.declared)
         while len(trial.causes) < MOST_CAUSES and not _is_like(suspect, trial):
-            more = sorted(
-                ((suspect.total(t), t) for t in suspect.further(trial)), key=lambda each: each[0]
-            )
-            if not more or more[0][0] > LEAST_GAIN * least:
+            more = [(suspect.total(t), t) for t in suspect.further(trial)]
+            lowest = min((value for value, _ in more), default=np.inf)
+            if lowest > LEAST_GAIN * least:
                 break
-            tried += more[:3]
-            least, trial = more[0]
-        tested += [Explanation(t.causes, value) for value, t in tried]
-    fitting = [e for e in tested if e.misfit <= min(EXPLAINED, EXPLAINS * misfit)]
-    fitting.sort(key=lambda e: e.misfit * (1.0 + 0.2 * len(e.causes)) + 0.01 * len(e.causes))
+            least, trial = next(each for each in more if each[0] <= NEARLY * lowest + 0.005)
+            tried += [(least, trial), *sorted(more, key=lambda each: each[0])[:3]]
+        tested += [Explanation(t.causes, v) for v, t in tried if _remains(suspect, t) <= REMAINS]
+    limit = min(EXPLAINED, EXPLAINS * misfit)
+    fitting = [each for each in dict.fromkeys(tested) if each.misfit <= limit]
+    fitting.sort(key=lambda e: round(_cost(e), 2))
     best = fitting[0].misfit if fitting else 0.0
     kept = [e for e in fitting[:3] if e.misfit <= ALIKE * best + 0.005]
     return replace(result, explanations=tuple(kept))
 
 
+def _cost(explanation: Explanation) -> float:
+    """Return the misfit of an explanation, more for each cause."""
+    count = len(explanation.causes)
+    return explanation.misfit * (1.0 + 0.2 * count) + 0.01 * count
+
+
 def _is_like(suspect: Suspect, trial: _Trial) -> bool:
     vibrations, means, _ = suspect.misfits(trial)
-    return bool((vibrations <= UNLIKE).all() and (means <= UNLIKE_MEAN).all())
+    return bool((vibrations <= DOUBTFUL).all() and (means <= UNLIKE_MEAN).all())
+
+
+def _remains(suspect: Suspect, trial: _Trial) -> float:
+    return float(np.max(suspect.misfits(trial)[0]))
 
 
 def _exchanged(trial: _Trial, names: Sequence[str], i: int, j: int) -> Iterator[_Trial]:

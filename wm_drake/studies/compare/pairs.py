@@ -179,6 +179,7 @@ def speed_of_order_one(pair: Pair) -> FloatArray:
     scale = np.max(np.abs(products), axis=0)
     products = products / np.where(scale > 0.0, scale, 1.0)
     turned = np.sum(products[1:] * np.conj(products[:-1]), axis=1)
+    turned = np.where(measured.speed.values[1:] < 0.0, np.conj(turned), turned)
     time = measured.time.values
     known = np.abs(turned) > 0.0
     middles = 0.5 * (time[1:] + time[:-1])[known]
