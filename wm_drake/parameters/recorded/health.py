@@ -291,9 +291,9 @@ def _clipped(channel: Channel) -> np.ndarray:
     for side in (1.0, -1.0):
         signed = side * values
         top, low = np.nanmax(signed), np.nanmin(signed)
-        for width, part in ((0.0, 0.35), (NEARLY * (top - low), 0.1)):
+        for width, reach in ((0.0, 0.35), (NEARLY * (top - low), 0.1)):
             is_top = signed >= top - width
-            near = signed[(signed > top - part * (top - low)) & ~is_top]
+            near = signed[(signed > top - reach * (top - low)) & ~is_top]
             near = np.floor((top - near) / width) if width else near
             most = np.unique(near, return_counts=True)[1].max() if len(near) else 0
             pairs = int(np.sum(is_top[1:] & is_top[:-1]))

@@ -132,6 +132,9 @@ def _true_ratio(values: FloatArray, angle: FloatArray, time: FloatArray) -> floa
     if size <= LARGER**2 * best_of(one)[1]:
         return 0.0
     fine, _ = best_of(coarse * np.exp(SCANNED * np.linspace(-1.0, 1.0, 17)))
+    powers = _powers(values, fine * angle, time, np.array([1.0, *NEIGHBOURS])) / scale
+    if powers[0].sum() <= LARGER**2 * powers[1:].sum(axis=1).max():
+        return 0.0  # noise has as much of any order
     near = min(RATIOS, key=lambda ratio: abs(np.log(fine / ratio)))
     return near if abs(np.log(fine / near)) < 0.5 * SCANNED else fine
 

@@ -249,9 +249,13 @@ class Suspect:
         return np.sqrt(np.maximum(squares[best], 0.0)), apart, float(SHIFTS[best])
 
     def total(self, trial: _Trial) -> float:
-        """Return the root mean square of the misfits of all sensors."""
+        """Return the root mean square of the misfits of all sensors.
+
+        An opposite vibration is no worse than none: else a wrong factor of 0 would be a gain.
+        """
         vibrations, means, _ = self.misfits(trial)
-        return float(np.sqrt(np.mean(vibrations**2 + np.minimum(means, 2.0) ** 2)))
+        squares = np.minimum(vibrations, 1.0) ** 2 + np.minimum(means, 2.0) ** 2
+        return float(np.sqrt(np.mean(squares)))
 
     def further(self, trial: _Trial) -> Iterator[_Trial]:
         """Yield a trial with one more cause, about sensors that are unlike; plain causes first."""
@@ -270,18 +274,16 @@ class Suspect:
             one, other = (self.sensors[names[k]] for k in (i, j))
             if (i in wrong or j in wrong) and one.quantity == other.quantity:
                 yield from _exchanged(trial, names, i, j)
-        every = range(len(names))
-        yield _changed(
-            trial, {k: (trial.variants[k], -1.0) for k in every}, "all sensors have the other sign"
-        )
+        if len(names) > 1:
+            every = {k: (trial.variants[k], -1.0) for k in range(len(names))}
+            yield _changed(trial, every, "all sensors have the other sign")
         for unit, factor in FACTORS.items():
             for size in (factor, 1.0 / factor):
                 words = f"are larger than declared by the factor {size:.4g} ({unit})"
-                for group in {tuple(wrong), *((k,) for k in wrong)}:
+                for group in {tuple(wrong), *((k,) for k in wrong)} - {()}:
                     changes = {k: (trial.variants[k], size) for k in group}
                     said = ", ".join(names[k] for k in group)
-                    if group:
-                        yield _changed(trial, changes, f"the units of {said} {words}")
+                    yield _changed(trial, changes, f"the units of {said} {words}")
 
 
 def variants_of(sensor: RecordedSensor) -> Iterator[Variant]:
