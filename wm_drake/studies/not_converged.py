@@ -1,5 +1,6 @@
 """Mark the answer of a study that rests on runs that are not converged."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import xarray as xr
@@ -13,6 +14,9 @@ from wm_drake.studies.answer import Answer, Part
 SPREAD = Quantity("spread", Share(), 1)
 """Difference of the measures of a run from those with twice its step."""
 
+MARK = "not converged"
+"""Words beside the label of such a run in the rows of tables."""
+
 MEANING = (
     "The measures of these runs still change with the step: their motion jumps or is chaotic, and "
     "has no one peak. The spread is the largest difference from the run with the step before; "
@@ -21,7 +25,10 @@ MEANING = (
 
 
 def marked(answer: Answer, steps: StepSummary) -> Answer:
-    """Return an answer that names the runs that are not converged; unchanged if all are."""
+    """Return an answer that names and marks the runs that are not converged.
+
+    It is unchanged if all are. Tables mark the rows whose label is the name of such a run.
+    """
     runs = steps.unconverged
     if not runs:
         return answer
@@ -38,4 +45,17 @@ def marked(answer: Answer, steps: StepSummary) -> Answer:
         }
     )
     part = Part("Runs that are not converged", (LabelledTable("not_converged", data),), MEANING)
-    return replace(answer, answer=f"{answer.answer} {words}", parts=(*answer.parts, part))
+    names = dict.fromkeys(name for name, _ in runs)
+    parts = (*(_with_marks(part, names) for part in answer.parts), part)
+    return replace(answer, answer=f"{answer.answer} {words}", parts=parts)
+
+
+def _with_marks(part: Part, names: Iterable[str]) -> Part:
+    """Return a part whose tables mark the rows of the runs with these names."""
+    shown = []
+    for item in part.shown:
+        if isinstance(item, LabelledTable):
+            marks = {name: f"{item.words.get(name, name)} ({MARK})" for name in names}
+            item = replace(item, words={**item.words, **marks})
+        shown.append(item)
+    return replace(part, shown=shown)

@@ -13,6 +13,7 @@ from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
 from wm_drake.engines.compiled.drum import sample_controller
 from wm_drake.engines.compiled.local_error import (
     DIFFERENCED,
+    EVERY,
     OF_MULTISTEP,
     OF_RUNGE_KUTTA,
     add_fourth_difference,
@@ -86,7 +87,7 @@ def integrate_lanes(steps, begin, end, p, elements, x, work, sums, history):
         add_peaks(errors, state, rate, row[i] >= 0)
         add_inner_peaks(errors, state, length[i], inner)
         alike = steps_alike(alike, i, length, acceleration)
-        if alike >= DIFFERENCED:
+        if alike >= DIFFERENCED and i % EVERY == 0:
             factor = OF_MULTISTEP if one_derivative[i] else OF_RUNGE_KUTTA
             add_fourth_difference(
                 errors, past.rates, i, length[i], factor, begins.size, PAST_RATES, inner

@@ -48,6 +48,10 @@ OF_INNER = 2.0
 DIFFERENCED = 4
 """Number of steps of the same length that must lie before one whose differences are taken."""
 
+EVERY = 4
+"""Fourth differences are taken at every fourth step and stand for four: a contact or a transition
+of friction that a step does not resolve makes the steps after it rough too."""
+
 Sums = namedtuple(
     "Sums", ("recent", "worst", "speed", "in_steps", "in_samples", "tub_near", "inner_near")
 )
@@ -167,7 +171,7 @@ def add_fourth_difference(sums, rates, i, h, factor, size, count, inner):
             difference = inner.levers[j] * fourth_difference(rates, begins, inner.at[j])
             of_inner = of_inner + difference * difference
         total = total + as_of_tub(sums, of_inner)
-    add_square(sums, (factor * h) * (factor * h) * total, h)
+    add_square(sums, EVERY * (factor * h) * (factor * h) * total, EVERY * h)
 
 
 @law
