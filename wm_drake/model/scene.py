@@ -357,9 +357,10 @@ class Scene:
         block, number = divmod(int(np.argmin(path.lowest)), len(path.pairs))
         lowest = path.poses_of(np.array([block]))  # gives a small gap, which excludes most blocks
         best = self._smallest_of_pair(path, number, path.farthest, time, lowest)
-        for number in range(len(path.pairs)):
-            near = path.near(number, best.distance)
-            best = self._smallest_of_pair(path, number, best, time, near)
+        for number, bound in enumerate(path.lowest.min(axis=0)):
+            if bound < best.distance:
+                near = path.near(number, best.distance)
+                best = self._smallest_of_pair(path, number, best, time, near)
         return best
 
     def _path(self, time: FloatArray, poses: FloatArray, rest_pose: FloatArray) -> Path | None:

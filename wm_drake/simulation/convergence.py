@@ -68,10 +68,12 @@ class Accuracy(NamedTuple):
     @property
     def text(self) -> str:
         """Return the error in words."""
+        if self.error == math.inf:
+            return "not converged: with a longer step it diverges"
         percent = f"{PERCENT.from_si(self.error):.2g} %"
         if self.is_converged:
             return f"error of up to {percent}"
-        return f"not converged: its measures differ by {percent} with half the step"
+        return f"not converged: its measures differ by {percent} from those with a longer step"
 
 
 def attributes_of(accuracy: Accuracy) -> dict[str, Any]:
@@ -233,9 +235,8 @@ class StepSummary:
         if not self.unconverged:
             return ""
         name, worst = max(self.unconverged, key=lambda pair: pair[1].error)
-        differ = f"{PERCENT.from_si(worst.error):.2g} %"
         return (
             f"{len(self.unconverged)} of {self.runs} runs are not converged, with steps down to "
-            f"{STEP.from_si(worst.step):.3g} ms: measures of '{name}' still differ by {differ} "
-            "with half the step. Their motion jumps or is chaotic, and has no one peak"
+            f"{STEP.from_si(worst.step):.3g} ms; '{name}' is {worst.text}. Their motion jumps or "
+            "is chaotic, and has no one peak"
         )

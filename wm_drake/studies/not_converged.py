@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import replace
 
+import numpy as np
 import xarray as xr
 
 from wm_drake.parameters.units import Share
@@ -32,10 +33,10 @@ def marked(answer: Answer, steps: StepSummary) -> Answer:
     runs = steps.unconverged
     if not runs:
         return answer
-    spread = SPREAD.text(max(accuracy.error for _, accuracy in runs))
+    largest = max(accuracy.error for _, accuracy in runs)
+    spread = f", with a spread of up to {SPREAD.text(largest)}" if np.isfinite(largest) else ""
     words = (
-        f"Not converged: {len(runs)} of {steps.runs} runs, with a spread of up to {spread}; what "
-        "rests on them is uncertain."
+        f"Not converged: {len(runs)} of {steps.runs} runs{spread}; what rests on them is uncertain."
     )
     data = xr.Dataset(
         {

@@ -214,6 +214,8 @@ def growth_lanes(jacobian, internal, h, steps, numbers, cabinet_jacobian, block,
             share = a[row * n + row] * x[row]
             past_inputs[i % PAST_INPUTS * n + row] = rate[row] - share
         block_after_step(x, rate, past_inputs, i, n, h, b, first, m, stage)
+        quarter = 4 * i // steps
+        most = top[quarter]
         for row in range(n):
             if internal[row] == INTERNAL:
                 middle, ahead = extrapolated(past_inputs, i, row, n)
@@ -225,9 +227,9 @@ def growth_lanes(jacobian, internal, h, steps, numbers, cabinet_jacobian, block,
                 x[row] = path_after_step(x[row], a[row * n + row], path, h)
             elif internal[row] == SMOOTH:
                 x[row] = explicit_multistep(x[row], past_rates, i, row, n, h)
-            quarter = 4 * i // steps
             size = abs(x[row])
-            top[quarter] = where(size > top[quarter], size, top[quarter])
+            most = where(size > most, size, most)
+        top[quarter] = most
 
 
 @law
