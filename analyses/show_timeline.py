@@ -1,10 +1,12 @@
-"""Where does the time of a command go? A row for each command: imports, machine, runs, page.
+"""Where does the time of a command go? A row for each command: imports, compilation, runs, page.
 
     python analyses/show_timeline.py --page docs/performance.md
 
-Each command runs in a process of its own, once to compile and then five times. The times of a part
-are those on a clock in the main thread, without the imports in it and without other parts in it.
-The row of a command is its run of median length. `--page` renews the table on the page.
+Each command runs in a process of its own, once to compile and then three times; "first time" is
+once, with an empty cache of compiled code. The times of a part are those on a clock in the main
+thread, without the imports in it and without other parts in it. Compilation counts loading of
+compiled code; what another thread or process compiles meanwhile counts as the part that waits. The
+row of a command is its run of median length. `--page` renews the table on the page.
 """
 
 import argparse
@@ -12,6 +14,7 @@ import builtins
 import contextlib
 import importlib
 import json
+import os
 import re
 import shlex
 import subprocess
@@ -20,6 +23,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from pkgutil import resolve_name
 from typing import Any
@@ -32,10 +36,16 @@ COMMANDS = (
     "study spin-cycle",
     "study modes",
     "study response",
+    "study next",
+    "verdict",
 )
 """Commands that are timed; they are run with --quiet and a folder for results."""
+FIRST = ("spin", "study gasket --load middle --load counter", "verdict")
+"""Those that are also timed with an empty cache of compiled code."""
+REPEATS = 3
 IMPORTS, OTHER = "imports", "other"
 PARTS = {
+    "compilation": ("numba.core.dispatcher:Dispatcher.compile",),
     "machine": ("wm_drake.studies.run:_machine_of",),
     "runs": ("wm_drake.studies.executor:Executor.simulate", "wm_drake.batch.runs:Runner.run"),
     "page": ("wm_drake.studies.answer:Answer.pages",),
@@ -102,23 +112,38 @@ def time_parts(arguments: list[str]) -> None:
     print(json.dumps(clock.times))
 
 
+def parts_of(command: str, cache: str | None = None) -> dict[str, float]:
+    """Return the time of each part of a command, with compiled code in a folder of its own. [s]"""
+    environment = os.environ if cache is None else os.environ | {"NUMBA_CACHE_DIR": cache}
+    with tempfile.TemporaryDirectory() as folder:
+        out = "" if command.startswith("machine") else " --out out --quiet"
+        done = subprocess.run(
+            [sys.executable, str(Path(__file__).resolve()), "--time", command + out],
+            cwd=folder,
+            env=environment,
+            check=True,
+            capture_output=True,
+            text=True,
+        )
+    return dict(json.loads(done.stdout.splitlines()[-1]))
+
+
 def row_of(command: str, repeats: int) -> str:
     """Return the row of a command: its run of median length."""
-    runs = []
-    for _ in range(repeats + 1):  # the first one compiles
-        with tempfile.TemporaryDirectory() as folder:
-            out = "" if command.startswith("machine") else " --out out --quiet"
-            done = subprocess.run(
-                [sys.executable, str(Path(__file__).resolve()), "--time", command + out],
-                cwd=folder,
-                check=True,
-                capture_output=True,
-                text=True,
-            )
-        runs.append(json.loads(done.stdout.splitlines()[-1]))
+    runs = [parts_of(command) for _ in range(repeats + 1)]  # the first one compiles
     times = sorted(runs[1:], key=lambda parts: sum(parts.values()))[repeats // 2]
+    return _row(f"`{command}`", times)
+
+
+def first_row(command: str) -> str:
+    """Return the row of a command that compiles."""
+    with tempfile.TemporaryDirectory() as cache:
+        return _row(f"`{command}`, first time", parts_of(command, cache))
+
+
+def _row(words: str, times: dict[str, float]) -> str:
     cells = [f"{seconds:.2f}" for seconds in (*times.values(), sum(times.values()))]
-    return " | ".join([f"| `{command}`", *cells]) + " |"
+    return " | ".join([f"| {words}", *cells]) + " |"
 
 
 def main() -> None:
@@ -135,8 +160,10 @@ def main() -> None:
     columns = ["command, times in s", IMPORTS, *PARTS, OTHER, "whole"]
     lines = ["| " + " | ".join(columns) + " |", "|---" * len(columns) + "|"]
     print("\n".join(lines))
-    for command in COMMANDS[:1] if arguments.quick else COMMANDS:
-        lines.append(row_of(command, 1 if arguments.quick else 5))
+    rows = [partial(row_of, command, REPEATS) for command in COMMANDS]
+    rows += [partial(first_row, command) for command in FIRST]
+    for row in [partial(row_of, COMMANDS[0], 1)] if arguments.quick else rows:
+        lines.append(row())
         print(lines[-1], flush=True)
     if arguments.out:
         arguments.out.write_text("\n".join(lines) + "\n", encoding="utf-8")
