@@ -124,7 +124,7 @@ def run_all(wm_drake, folder, page, chosen, more=()):
             words += paths or [word]  # a word such as N*m names no files
         if words[:2] == ["machine", "new"]:  # never over a file
             (folder / f"{words[2]}.yaml").unlink(missing_ok=True)
-        has_folder = words[0] != "machine" and words[:2] != ["record", "channels"]
+        has_folder = words[0] not in ("machine", "cite") and words[:2] != ["record", "channels"]
         if has_folder and "--resume" not in words:
             first = next((n for n, word in enumerate(words) if word.startswith("-")), len(words))
             words.insert(first, "--overwrite")  # before an option that takes several values

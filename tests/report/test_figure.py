@@ -3,6 +3,7 @@
 import base64
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pandas as pd
@@ -114,8 +115,8 @@ def test_files_and_picture_show_the_same_data(tmp_path):
     ]
     svg = (tmp_path / f"{stem}.svg").read_text()
     width = ElementTree.fromstring(svg).get("width")
-    assert float(width.removesuffix("pt")) == pytest.approx(180.0 / 25.4 * 72.0)
-    assert b"/MediaBox [ 0 0 510.236" in (tmp_path / f"{stem}.pdf").read_bytes()
+    assert float(width.removesuffix("pt")) == pytest.approx(175.0 / 25.4 * 72.0)
+    assert b"/MediaBox [ 0 0 496.0629" in (tmp_path / f"{stem}.pdf").read_bytes()
     table = pd.read_csv(tmp_path / f"{stem}.csv")
     pd.testing.assert_frame_equal(
         table, figure_data(figure), check_dtype=False, check_exact=False, rtol=1e-8
@@ -128,6 +129,27 @@ def test_files_and_picture_show_the_same_data(tmp_path):
     bars = table[table.panel == "2 bars"]
     assert bars[["x", "y", "value"]].to_numpy().tolist() == [[1.5, 0, 1], [2, 1, 2]]
     assert file_name("") == "picture"
+
+
+def test_one_column_has_the_panels_below_each_other_with_their_numbers(tmp_path):
+    line = Line([0.0, 1.0, 2.0], [1.0, 3.0, 2.0])
+    panels = [
+        Panel(marks=(line,), x=Axis(label="time, s"), y=Axis(label="force, N"), title=title)
+        for title in ("first", "second", "third", "fourth")
+    ]
+    figure = Figure(panels=in_grid(panels, 2, share="both"))
+    hidden = [not panel.y.has_numbers for panel in figure.panels]
+    assert any(hidden)
+    drawing = matplotlib_of(figure, columns=1)
+    assert drawing.get_figwidth() == pytest.approx(85.0 / 25.4)
+    boxes = [axes.get_position() for axes in drawing.axes]
+    assert all(above.y0 > below.y1 for above, below in pairwise(boxes))
+    assert [axes.get_ylabel() for axes in drawing.axes] == ["force, N"] * 4
+    assert [axes.get_xlabel() for axes in drawing.axes] == ["time, s"] * 4
+    write_figures([(figure, "four")], tmp_path, columns=1, has_text=True)
+    svg = ElementTree.parse(tmp_path / "01_four.svg").getroot()
+    texts = {element.text for element in svg.iter("{http://www.w3.org/2000/svg}text")}
+    assert {"first", "fourth", "time, s"} <= texts
 
 
 def test_the_name_of_a_file_ends_with_a_whole_word():

@@ -80,10 +80,11 @@ class Place:
 
 @dataclass(frozen=True)
 class Arrangement:
-    """Places of all panels, and the height of the figure. [px]"""
+    """Places of all panels, and the size of the figure. [px]"""
 
     places: tuple[Place, ...]
     height: float
+    width: float
     columns: tuple[tuple[float, float], ...]
 
 
@@ -122,13 +123,35 @@ def key_texts(figure: fig.Figure) -> tuple[str, ...]:
     return figure.keys or tuple(dict.fromkeys(mark.key for mark in marks if mark.key))
 
 
-def arrange(figure: fig.Figure) -> Arrangement:
-    """Return the places of the panels of a figure."""
+def in_one_column(figure: fig.Figure) -> fig.Figure:
+    """Return a figure with its panels below each other, each with the numbers of its axes.
+
+    One with panels of several rows stays as it is: its panels belong side by side.
+    """
+    if any(panel.rows > 1 for panel in figure.panels):
+        return figure
+    ordered = sorted(figure.panels, key=lambda panel: (panel.row, panel.column))
+    shown = []
+    for place, panel in enumerate(ordered):
+        x = next(p.x for p in reversed(ordered) if p.column == panel.column)
+        y = next(p.y for p in ordered if p.row == panel.row)
+        axes = {
+            name: replace(axis, has_numbers=shared.has_numbers, label=axis.label or shared.label)
+            if axis.scale and axis.scale == shared.scale
+            else axis
+            for name, axis, shared in (("x", panel.x, x), ("y", panel.y, y))
+        }
+        shown.append(replace(panel, row=place, column=0, x=axes["x"], y=axes["y"]))
+    return replace(figure, panels=tuple(shown), widths=())
+
+
+def arrange(figure: fig.Figure, width: float = fig.WIDTH) -> Arrangement:
+    """Return the places of the panels of a figure of a width. [px]"""
     panels = _with_ranges(figure.panels)
     columns, rows = (1 + max(p.column for p in panels), max(p.row + p.rows for p in panels))
     ratios = np.array(figure.widths or (1.0,) * columns)
     outer = fig.LABEL * LINE + 8.0
-    begin, end = 0.0, float(fig.WIDTH)
+    begin, end = 0.0, float(width)
     spans = np.full(columns, (end - begin) * 0.85) * ratios / ratios.sum()
     for _ in range(3):  # texts are broken by the width that other texts leave
         rooms = [_room(p, spans[p.column], figure.height * p.rows) for p in panels]
@@ -164,7 +187,7 @@ def arrange(figure: fig.Figure) -> Arrangement:
         for panel, room in zip(panels, rooms, strict=True)
     )
     height = at - 0.5 * GAP + (outer if figure.x_label else 0.0)
-    return Arrangement(places, float(height), tuple(x_edges))
+    return Arrangement(places, float(height), float(width), tuple(x_edges))
 
 
 @dataclass(frozen=True)

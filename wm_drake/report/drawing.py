@@ -24,16 +24,17 @@ from wm_drake.report.arrangement import (
     LINE,
     Place,
     arrange,
+    in_one_column,
     key_texts,
     text_width,
     x_count,
     y_count,
 )
 
-JOURNAL_WIDTH = 180.0 / 25.4
-"""Width of a drawing: two columns of a journal. [in]"""
+COLUMN_WIDTHS = {1: 85.0 / 25.4, 2: 175.0 / 25.4}
+"""Width of a drawing by the columns of a journal that it takes. [in]"""
 
-INCH = fig.WIDTH / JOURNAL_WIDTH
+INCH = fig.WIDTH / COLUMN_WIDTHS[2]
 """Pixels of the picture on a page in an inch of the drawing."""
 
 POINT = 72.0 / INCH
@@ -78,15 +79,21 @@ MARKERS = {
 """Symbols of points by their names in Plotly."""
 
 
-def matplotlib_of(figure: fig.Figure) -> Drawing:
-    """Return a figure as a drawing at journal width, with its legend below the panels."""
-    arrangement = arrange(figure)
-    rows = _key_rows(figure)
+def matplotlib_of(figure: fig.Figure, columns: int = 2) -> Drawing:
+    """Return a figure as a drawing at journal width, with its legend below the panels.
+
+    Args:
+        columns: Columns of a journal that it takes; in one, panels are below each other.
+    """
+    figure = in_one_column(figure) if columns == 1 else figure
+    arrangement = arrange(figure, COLUMN_WIDTHS[columns] * INCH)
+    rows = _key_rows(figure, arrangement.width)
     height = arrangement.height + 22.0 * len(rows)
-    drawing = Drawing(figsize=(fig.WIDTH / INCH, height / INCH))
+    size = arrangement.width, height
+    drawing = Drawing(figsize=(arrangement.width / INCH, height / INCH))
     with rc_context(SIZES):
         for place in arrangement.places:
-            _draw_panel(drawing, place, height)
+            _draw_panel(drawing, place, size)
         common: dict[str, Any] = {
             "fontsize": POINT * fig.LABEL,
             "color": fig.MARK,
@@ -100,13 +107,13 @@ def matplotlib_of(figure: fig.Figure) -> Drawing:
     return drawing
 
 
-def _key_rows(figure: fig.Figure) -> list[list[str]]:
+def _key_rows(figure: fig.Figure, width: float) -> list[list[str]]:
     """Return the entries of the legend in rows that are not too long."""
     rows: list[list[str]] = []
     used = 0.0
     for key in key_texts(figure):
         used += text_width(key, fig.TEXT) + 60.0
-        if not rows or used > fig.WIDTH:
+        if not rows or used > width:
             rows.append([])
             used = text_width(key, fig.TEXT) + 60.0
         rows[-1].append(key)
@@ -150,10 +157,10 @@ def _sample(marks: list[fig.Mark]) -> Any:
     return tuple(samples.values())
 
 
-def _draw_panel(drawing: Drawing, place: Place, height: float) -> None:
-    panel = place.panel
-    box = (place.left / fig.WIDTH, 1.0 - place.bottom / height)
-    size = ((place.right - place.left) / fig.WIDTH, (place.bottom - place.top) / height)
+def _draw_panel(drawing: Drawing, place: Place, of_drawing: tuple[float, float]) -> None:
+    panel, (width, height) = place.panel, of_drawing
+    box = (place.left / width, 1.0 - place.bottom / height)
+    size = ((place.right - place.left) / width, (place.bottom - place.top) / height)
     axes = drawing.add_axes((*box, *size))
     axes.set_axisbelow(True)
     for side in ("top", "right", "bottom", "left"):
@@ -176,7 +183,7 @@ def _draw_panel(drawing: Drawing, place: Place, height: float) -> None:
         _draw_top(axes, panel.top)
     _draw_titles(axes, place)
     if place.texts.scale is not None:
-        _draw_color_bar(drawing, place, place.texts.scale, height)
+        _draw_color_bar(drawing, place, place.texts.scale, of_drawing)
 
 
 def _second_axes(axes: Axes, place: Place) -> Axes:
@@ -265,9 +272,12 @@ def _norm(scale: fig.Scale) -> Normalize:
     return Normalize(*scale.ends())
 
 
-def _draw_color_bar(drawing: Drawing, place: Place, scale: fig.Scale, height: float) -> None:
-    box = ((place.right + 8.0) / fig.WIDTH, 1.0 - place.bottom / height)
-    axes = drawing.add_axes((*box, 12.0 / fig.WIDTH, (place.bottom - place.top) / height))
+def _draw_color_bar(
+    drawing: Drawing, place: Place, scale: fig.Scale, of_drawing: tuple[float, float]
+) -> None:
+    width, height = of_drawing
+    box = ((place.right + 8.0) / width, 1.0 - place.bottom / height)
+    axes = drawing.add_axes((*box, 12.0 / width, (place.bottom - place.top) / height))
     bar = drawing.colorbar(ScalarMappable(_norm(scale), _colormap(scale)), cax=axes)
     ticks = scale.bar_ticks()
     bar.set_ticks(list(scale.place([at for at, _ in ticks])), labels=[text for _, text in ticks])

@@ -47,21 +47,27 @@ def collect(figure: Figure, title: str) -> None:
         gathered.append((figure, title))
 
 
-def write_figures(figures: list[tuple[Figure, str]], folder: Path) -> None:
+def write_figures(
+    figures: list[tuple[Figure, str]], folder: Path, *, columns: int = 2, has_text: bool = False
+) -> None:
     """Write figures as PDF, SVG and PNG at journal width, each with a CSV file of its data.
 
     Args:
         figures: Figures and their alternative texts, which name the files.
+        columns: Columns of a journal that a figure takes, 1 or 2.
+        has_text: Whether the texts of an SVG are text, which another program can edit and sets in
+            its own font; else they are drawn.
     """
     from matplotlib import rc_context  # slow to import: only for --figures
 
     from wm_drake.report.drawing import matplotlib_of
 
+    kind = "none" if has_text else "path"
     for index, (figure, title) in enumerate(figures, start=1):
         stem = f"{index:02d}_{file_name(title)}"
-        drawing = matplotlib_of(figure)
+        drawing = matplotlib_of(figure, columns)
         buffer = io.StringIO()
-        with rc_context({"svg.hashsalt": "wm-drake", "svg.fonttype": "path"}):
+        with rc_context({"svg.hashsalt": "wm-drake", "svg.fonttype": kind}):
             drawing.savefig(buffer, format="svg", dpi=DPI, metadata={"Date": None})
         # matplotlib repeats each text as a comment, names from files among them
         svg = re.sub(r"<!--.*?-->\n?", "", buffer.getvalue(), flags=re.DOTALL)

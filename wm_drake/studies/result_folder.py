@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from wm_drake.errors import input_error, reason_of
 from wm_drake.report.provenance import command_line, now, source_revision, version
@@ -34,8 +34,17 @@ LEDGER = "ledger.sqlite"
 SUFFIX = ".partial"
 """End of the name of a temporary folder."""
 
-FIGURES: ContextVar[Path | None] = ContextVar("figures", default=None)
-"""Folder of `--figures` for the running command."""
+
+class FigureFiles(NamedTuple):
+    """Folder of `--figures`, and how its files look, as for `publication.write_figures`."""
+
+    folder: Path
+    columns: int = 2
+    has_text: bool = False
+
+
+FIGURES: ContextVar[FigureFiles | None] = ContextVar("figures", default=None)
+"""Files of `--figures` for the running command."""
 
 TRIES = 5
 """Number of temporary folders that are tried."""
@@ -124,7 +133,8 @@ def check_folders(out: Path, run: CommandRun) -> None:
     """Raise an InputError if a run must not write to its folder or to that of `--figures`."""
     check_folder(out, run)
     if (of_figures := FIGURES.get()) is not None:
-        check_folder(of_figures, _run_of_figures(of_figures, out, run))
+        folder = of_figures.folder
+        check_folder(folder, _run_of_figures(folder, out, run))
 
 
 def prepare_folder(out: Path, run: CommandRun) -> None:
@@ -153,13 +163,14 @@ def result_folder(out: Path, run: CommandRun, kept: str = "") -> Iterator[Path]:
         return
     from wm_drake.report.publication import collected, write_figures
 
+    place = of_figures.folder
     with (
-        one_folder(of_figures, _run_of_figures(of_figures, out, run), kept) as drawn,
+        one_folder(place, _run_of_figures(place, out, run), kept) as drawn,
         one_folder(out, run, kept) as folder,
     ):
         with collected() as figures:
             yield folder
-        write_figures(figures, drawn)
+        write_figures(figures, drawn, columns=of_figures.columns, has_text=of_figures.has_text)
 
 
 def _run_of_figures(folder: Path, out: Path, run: CommandRun) -> CommandRun:

@@ -31,6 +31,7 @@ from wm_drake.studies.result_folder import (
     LEDGER,
     RUN_FILE,
     CommandRun,
+    FigureFiles,
     check_folders,
     check_is_folder,
     prepare_folder,
@@ -49,6 +50,7 @@ if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     from wm_drake.model.machine import Machine
     from wm_drake.parameters import MachineParameters
     from wm_drake.studies.answer import Answer
+    from wm_drake.studies.archive import Archived
 
 RUNS_KEPT = (
     "all runs are kept, so repeat the command to write the results without running them again"
@@ -69,9 +71,20 @@ class RunOptions(OptionModel):
     )
     figures: Path | None = option(
         None,
-        "Write each picture of the page to this folder as PDF, SVG and PNG, 180 mm wide, with its "
-        "data as CSV.",
+        "Write each picture of the page to this folder as PDF, SVG and PNG, with its data as CSV.",
         "DIR",
+    )
+    figure_columns: int = option(
+        2, "Columns of a journal that a picture takes: 1 (85 mm) or 2 (175 mm).", "N", ge=1, le=2
+    )
+    figure_text: bool = option(
+        False, "Keep the texts of SVG files as text, which other programs can edit."
+    )
+    archive: Path | None = option(
+        None,
+        "Write one file that reproduces the study: machine, SDF, options, input files, tables, "
+        "ledger; 'wm-drake rerun FILE' runs it again and compares.",
+        "FILE.zip",
     )
     quick: bool = option(False, "Small sizes for a first look, where no other option sets them.")
     units: Literal["si", "us"] = option(
@@ -209,6 +222,10 @@ def execute(order: Order) -> tuple["Answer", Facts, tuple[str, ...]]:
 
 def _executed(order: Order) -> tuple["Answer", Facts, tuple[str, ...]]:
     begin, study, options = time.perf_counter(), order.study, order.options
+    archive = order.run.archive
+    if archive is not None and archive.exists() and not order.run.overwrite:
+        message = "exists; add --overwrite to replace it, or choose another file with --archive"
+        raise input_error(message, where=str(archive))
     machines = tuple(_machine_of(order, name) for name in order.machines)
     machine = machines[0] if len(machines) == 1 else None
     given = getattr(options, "profile", None)
@@ -222,11 +239,11 @@ def _executed(order: Order) -> tuple["Answer", Facts, tuple[str, ...]]:
     run = CommandRun(
         study.folder_owner,
         order.run.overwrite,
-        _identity(order, machine, task.identity) if study.has_runs and machine else {},
+        _identity(order, machines, task.identity) if study.has_runs and machines else {},
         order.command,
         options.model_dump(mode="json"),
     )
-    with _figures_in(order.run.figures), _notices_once(), _executor(order, run) as executor:
+    with _figures_of(order.run), _notices_once(), _executor(order, run) as executor:
         result = task.run(executor)
         for extend in filter(None, begun):
             result = extend(executor, result)
@@ -242,7 +259,26 @@ def _executed(order: Order) -> tuple["Answer", Facts, tuple[str, ...]]:
         steps = executor.steps.text
         facts = Facts(order.command, wall_s, warned, step, integrator, steps, executor.runs, engine)
         files = _written(result, facts, order.run.out, run)
+    if archive is not None:
+        from wm_drake.studies.archive import write_archive  # most studies have none
+
+        ledger = None if order.run.out is None else order.run.out / LEDGER
+        write_archive(archive, _archived(order), result, ledger)
     return result, facts, files
+
+
+def _archived(order: Order) -> "Archived":
+    """Return the study for its archive, with the machines before `--set`."""
+    from wm_drake.parameters import load_machine
+    from wm_drake.studies.archive import NOT_AGAIN, Archived
+
+    return Archived(
+        order.study.name,
+        order.command,
+        {n: order.parameters.get(n) or load_machine(n) for n in order.machines},
+        order.options.model_dump(mode="json", exclude={"machine"}),
+        order.run.model_dump(mode="json", exclude=set(NOT_AGAIN)),
+    )
 
 
 def _marked(result: "Answer", executor: Executor) -> "Answer":
@@ -322,7 +358,9 @@ def machine_text(parameters: "MachineParameters") -> str:
     return f"{parameters.name} {key_of(numbers=numbers)[:8]}"
 
 
-def _identity(order: Order, machine: "Machine", parts: Mapping[str, Any]) -> dict[str, str]:
+def _identity(
+    order: Order, machines: "Sequence[Machine]", parts: Mapping[str, Any]
+) -> dict[str, str]:
     """Return the properties that distinguish a study from others, for its ledger."""
     from wm_drake.batch import sources_version
     from wm_drake.batch.ledger import key_of
@@ -330,7 +368,7 @@ def _identity(order: Order, machine: "Machine", parts: Mapping[str, Any]) -> dic
     return {
         "study": order.study.name,
         "engine": _engine(order.run),
-        "machine": machine_text(machine.parameters),
+        "machine": ", ".join(machine_text(machine.parameters) for machine in machines),
         **{
             name: part if isinstance(part, str) else key_of(part=part)[:8]
             for name, part in parts.items()
@@ -348,9 +386,10 @@ def _notices_once() -> Iterator[None]:
 
 
 @contextmanager
-def _figures_in(folder: Path | None) -> Iterator[None]:
-    """Make `result_folder` write the pictures of pages to a folder."""
-    token = FIGURES.set(folder)
+def _figures_of(options: RunOptions) -> Iterator[None]:
+    """Make `result_folder` write the pictures of pages to the folder of `--figures`."""
+    folder, columns, has_text = options.figures, options.figure_columns, options.figure_text
+    token = FIGURES.set(FigureFiles(folder, columns, has_text) if folder else None)
     try:
         yield
     finally:

@@ -1,0 +1,75 @@
+"""Tests of `wm-drake rerun` and `wm-drake cite`: a study again from one file; the citation."""
+
+import io
+import re
+import shutil
+import zipfile
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from wm_drake.model.bodies import SDF_FOLDER
+from wm_drake.report.provenance import version
+
+PROFILE = "time: (0, 2) s\nspeed: (0, 300) rpm\n"
+
+
+@pytest.fixture
+def archive(wm_drake):
+    """Return the archive of a study whose machine, SDF and profile are gone."""
+    folder = Path("inputs")
+    folder.mkdir()
+    shutil.copy(SDF_FOLDER / "oscillating_group.sdf", folder / "mine.sdf")
+    (folder / "p.yaml").write_text(PROFILE)
+    (folder / "mine.yaml").write_text("extends: reference\nname: mine\nmodel: mine.sdf\n")
+    study = ("--machine", "inputs/mine.yaml", "--profile", "inputs/p.yaml", "--load", "middle")
+    sizes = ("--factor", "K_Lx", "--factor", "C_L", "--design", "full", "--workers", "1")
+    words = ("--set", "gasket.stiffness_y=3 N/mm", *study, *sizes, "--archive", "a.zip")
+    ended = wm_drake("study gasket", *words, "--out", "out")
+    assert ended.code == 0, ended.err
+    again = wm_drake("study gasket", *words, "--out", "other")
+    assert again.code == 2
+    assert "a.zip: exists" in again.err
+    shutil.rmtree(folder)
+    return Path("a.zip")
+
+
+def test_study_is_the_same_again_from_one_file(wm_drake, archive):
+    with zipfile.ZipFile(archive) as content:
+        names = content.namelist()
+    assert {"archive.json", "machine_0.json", "ledger.sqlite", "tables/runs.csv"} <= set(names)
+    inputs = sorted(Path(name).name for name in names if name.startswith("inputs/"))
+    assert inputs == ["mine.sdf", "p.yaml"]
+    ended = wm_drake("rerun", archive, "--out", "again")
+    assert ended.code == 0, ended.err + ended.out
+    pd.testing.assert_frame_equal(pd.read_csv("again/runs.csv"), pd.read_csv("out/runs.csv"))
+
+
+def test_what_differs_is_named(wm_drake, archive):
+    with zipfile.ZipFile(archive) as old, zipfile.ZipFile("b.zip", "w") as new:
+        for name in old.namelist():
+            data = old.read(name)
+            if name == "tables/runs.csv":
+                table = pd.read_csv(io.BytesIO(data))
+                table.loc[0, "Dx_mm"] *= 1.001
+                data = table.to_csv(index=False).encode()
+            new.writestr(name, data)
+    ended = wm_drake("rerun", "b.zip")
+    assert ended.code == 1
+    assert re.search(r"^runs: column Dx_mm differs by \S+ of", ended.out, re.MULTILINE)
+    Path("c.zip").write_text("nothing")
+    ended = wm_drake("rerun", "c.zip")
+    assert ended.code == 2
+    assert "is no archive" in ended.err
+
+
+def test_citation_has_program_and_papers(wm_drake):
+    ended = wm_drake("cite")
+    entries = re.findall(r"@(\w+)\{(\w+),", ended.out)
+    assert [kind for kind, _ in entries] == ["software", "article", "article", "article"]
+    assert f"version = {{{version()}}}" in ended.out
+    assert "doi = {10.3390/s20226636}" in ended.out
+    assert wm_drake("cite", "--format", "cff").out == (
+        Path(__file__).parents[2] / "CITATION.cff"
+    ).read_text(encoding="utf-8")
