@@ -14,7 +14,9 @@ import pandas as pd
 import pytest
 from simple_machines import SPONGES
 
+import wm_drake as wm
 from wm_drake.parameters import load_machine
+from wm_drake.studies.inputs import changed_parameters
 
 WITH_TABLE = """extends: reference
 gasket:
@@ -209,3 +211,29 @@ def test_level_zero_of_a_machine_with_tables_is_beside_the_machine(study_without
     printed = json.loads(ended.out)
     (row,) = printed["level_zero"]
     assert row["unit"] == "mm"
+
+
+def test_own_design_of_values_is_that_of_single_runs(wm_drake):
+    Path("p.yaml").write_text(PROFILE)
+    places = np.array([(x, y) for x in (-1.0, 0.3, 1.2) for y in (-0.8, 0.1, 1.0)])
+    rows = [f"{100 + 50 * x:.6g} %,{100 + 50 * y:.6g} %" for x, y in places]
+    Path("own.csv").write_text("\n".join(["K_Lx,C_L", *rows]))
+    own = ("--design", "own.csv", "--factor", "K_Lx", "--factor", "C_L", "--profile", "p.yaml")
+    chosen = ("--load", "middle", "--response", "amplitude_Xr")
+    ended = wm_drake("study", "gasket", *own, *chosen, "--out", "out")
+    assert ended.code == 0, ended.err
+    runs = pd.read_csv("out/runs.csv")
+    np.testing.assert_allclose(runs[["K_Lx", "C_L"]], places, atol=1e-9)
+    stiffness, damping = rows[6].split(",")  # beyond the range
+    changed = changed_parameters(load_machine("reference"), [f"K_Lx={stiffness}", f"C_L={damping}"])
+    case = wm.Case("middle", changed.loads["middle"], wm.load_profile("p.yaml"))
+    measured = wm.measure(wm.simulate(wm.build_machine(changed), case))
+    amplitude = 1e3 * float(measured.amplitude.sel(sensor="Xr"))
+    (column,) = [name for name in runs.columns if name.startswith("value")]
+    assert runs[column][6] == pytest.approx(amplitude, rel=1e-6)
+    # three places each determine squares: the quadratic model has 6 of the 9
+    fits = pd.read_csv("out/fits.csv")
+    assert fits["r2"].between(0.0, 1.0).all()
+    levels = wm_drake("study", "gasket", *own, "--model", "main", "--out", "main")
+    assert levels.code == 2
+    assert "quadratic" in levels.err

@@ -96,21 +96,30 @@ class Varied:
         return [self.at[name] for name in names]
 
     def at_level(self, level: float) -> float:
-        """Return the value at a level, or at a place between two levels, from -1 to 1."""
-        return float(np.interp(level, (-1.0, 0.0, 1.0), [self.at[name] for name in LEVELS]))
+        """Return the value at a level, between two levels, or beyond -1 and 1 along their line."""
+        low, middle, high = (self.at[name] for name in LEVELS)
+        if level < -1.0:
+            return low + (level + 1.0) * (middle - low)
+        if level > 1.0:
+            return high + (level - 1.0) * (high - middle)
+        return float(np.interp(level, (-1.0, 0.0, 1.0), (low, middle, high)))
 
-    def level_of(self, text: str) -> float:
-        """Return the place from -1 to 1 of a value.
+    def level_of(self, text: str, *, beyond: bool = False) -> float:
+        """Return the place of a value, from -1 to 1.
 
         Args:
             text: Value with a unit, or in percent or as distance of the machine's number.
+            beyond: Whether it may be outside the range of the levels.
 
         Raises:
-            InputError: the text is not a value, or is outside the range of the levels.
+            InputError: the text is not a value, or is outside the range.
         """
         number = self.numbers[0] if self.numbers else Number(self.name, None, self.unit)
         value, levels = number.resolved(text), self.first_levels
-        low, _, high = levels
+        low, middle, high = levels
+        if beyond and not low <= value <= high:
+            end, side = (low, -1.0) if value < low else (high, 1.0)
+            return float(side + (value - end) / (side * (end - middle)))
         slack = ROUNDING * (high - low)
         if not low - slack <= value <= high + slack:
             ends = f"{number.unit.reading(low)} to {number.unit.reading(high)}"

@@ -2,14 +2,23 @@
 
 import re
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from wm_drake.errors import InputNotice, Problem, check_known, input_error, shortened
+from wm_drake.errors import (
+    InputNotice,
+    Problem,
+    check_known,
+    input_error,
+    problems_at,
+    shortened,
+)
+from wm_drake.parameters.recorded.signal import split_title
 from wm_drake.parameters.recorded.text import TextRow, table_rows
+from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import plain_number
 from wm_drake.studies.doe.coding import LEVELS, MODELS, Levels, columns, efficiency, level_matrix
 from wm_drake.studies.doe.exchange import d_optimal_levels
@@ -154,11 +163,7 @@ WORDS = {
 
 
 def read_design(path: Path, factors: tuple[str, ...], model: str = "main+2fi") -> Design:
-    """Read a design from a table as spreadsheets and programs for designs write it.
-
-    The file has one column per factor, in any order, with the levels -1, 0 and 1, or low, mid and
-    high. Columns of `OF_PROGRAMS`, empty ones, and those with the name of a factor and more, such
-    as `C_L_Ns_per_mm` for its values, are ignored. A trial that is repeated runs once.
+    """Read a design with the levels -1, 0 and 1, or low, mid and high, as `read_levels` does.
 
     Args:
         model: Model to estimate, key of `MODELS`.
@@ -167,31 +172,87 @@ def read_design(path: Path, factors: tuple[str, ...], model: str = "main+2fi") -
         InputError: the file has other columns or other levels, or the trials do not determine the
             model.
     """
-    head, *rows = table_rows(path) or [TextRow(1, [])]
-    places = _factor_columns(path, head.cells, rows, factors)
-    levels = np.zeros((len(rows), len(factors)), dtype=np.int8)
-    for number, row in enumerate(rows):
-        for column, place in enumerate(places):
-            cell = row.cells[place] if place < len(row.cells) else ""
-            level = _level(cell)
-            if level not in LEVELS:
-                raise input_error(
-                    f"'{shortened(cell, 40)}' is not a level; allowed are -1, 0 and 1, or low, mid "
-                    "and high",
-                    where=f"{path}:{row.line}",
-                    key=factors[column],
-                )
-            levels[number, column] = level
-    levels = _without_repeats(path, levels)
-    design = Design(path.name, factors, levels, model)
+    return design_of(path.name, factors, read_levels(path, factors), model)
+
+
+def has_three_levels(levels: FloatArray) -> bool:
+    """Return whether all levels are -1, 0 or 1."""
+    return bool(np.isin(levels, LEVELS).all())
+
+
+def design_of(kind: str, factors: tuple[str, ...], levels: FloatArray, model: str) -> Design:
+    """Return a design with levels -1, 0 and 1 of a file.
+
+    Raises:
+        InputError: the trials do not determine the model.
+    """
+    whole: Levels = np.array(levels, dtype=np.int8).reshape(levels.shape[0], levels.shape[1])
+    design = Design(kind, factors, whole, model)
     if design.efficiency() == 0.0:
         needed = columns(len(factors), model)
+        is_enough = model != "main" and efficiency(design.levels, "main") > 0.0
+        hint = "add other trials" + (", or use --model main" if is_enough else "")
         raise input_error(
             f"these {design.trials} trials do not determine the {needed} coefficients of {model}; "
-            "add other trials, or use the model main",
-            where=str(path),
+            f"{hint}",
+            where=kind,
         )
     return design
+
+
+LARGEST_LEVEL = 4.0
+"""Largest level without a unit: the star points of a rotatable central composite design of eight
+factors. A larger number is a value whose unit is missing."""
+
+
+def read_levels(
+    path: Path,
+    factors: tuple[str, ...],
+    level_of: Callable[[str, str], float] | None = None,
+) -> FloatArray:
+    """Read the levels of a table as spreadsheets and programs for designs write it.
+
+    The file has one column per factor, in any order, with levels: numbers, or low, mid and high; or
+    with values: with a unit in each cell, or in the head, such as `K_Lx [N/mm]`. Columns of
+    `OF_PROGRAMS`, empty ones, and those with the name of a factor and more beside its own column,
+    such as `C_L_Ns_per_mm`, are ignored. A trial that is repeated runs once.
+
+    Args:
+        level_of: Function of a factor and a value as text that returns its level; without it only
+            the levels -1, 0 and 1 are allowed.
+
+    Returns:
+        (trials, factors)
+
+    Raises:
+        InputError: the file has other columns, or a cell is neither a level nor a value.
+    """
+    head, *rows = table_rows(path) or [TextRow(1, [])]
+    places = _factor_columns(path, head.cells, rows, factors)
+    levels = np.zeros((len(rows), len(factors)))
+    for number, row in enumerate(rows):
+        for column, (place, unit) in enumerate(places):
+            cell = row.cells[place] if place < len(row.cells) else ""
+            where = f"{path}:{row.line}"
+            levels[number, column] = _level_or_value(cell, unit, where, factors[column], level_of)
+    return _without_repeats(path, levels)
+
+
+def _level_or_value(
+    cell: str, unit: str, where: str, factor: str, level_of: Callable[[str, str], float] | None
+) -> float:
+    """Return the level of a cell, which has a level, or a value with a unit here or in its head."""
+    level = _level(cell)
+    if not unit and (level in LEVELS or (level_of and abs(level) <= LARGEST_LEVEL)):
+        return level
+    if level_of is not None and cell.strip() and (unit or np.isnan(level)):
+        with problems_at(where, factor):
+            return level_of(factor, f"{cell.strip()} {unit}".strip())
+    allowed = "-1, 0 and 1, or low, mid and high"
+    if level_of:
+        allowed = f"low, mid, high, numbers up to {LARGEST_LEVEL:g}, and values with a unit"
+    message = f"'{shortened(cell, 40)}' is not a level; allowed are {allowed}"
+    raise input_error(message, where=where, key=factor)
 
 
 def _level(cell: str) -> float:
@@ -205,24 +266,29 @@ def _level(cell: str) -> float:
 
 def _factor_columns(
     path: Path, head: Sequence[str], rows: Sequence[TextRow], factors: Sequence[str]
-) -> list[int]:
-    """Return the column of each factor.
+) -> list[tuple[int, str]]:
+    """Return the column of each factor, and the unit in its head.
 
     Raises:
         InputError: a factor has none or several, or a column is neither of a factor nor known.
     """
-    by_name, others = dict[str, list[int]](), list[str]()
+    by_name, others = dict[str, list[tuple[int, str]]](), list[str]()
+    of_unit = dict[str, list[tuple[int, str]]]()
     plain = {factor.casefold(): factor for factor in factors}
     more = tuple(f"{factor}{end}" for factor in factors for end in ("_", " "))
     for place, title in enumerate(head):
         name, short = title.strip(), re.sub(r"[\W_]", "", title).lower()
         factor = name if name in factors else plain.get(name.casefold(), "")
+        before, unit = split_title(name)
         if factor:
-            by_name.setdefault(factor, []).append(place)
+            by_name.setdefault(factor, []).append((place, ""))
+        elif unit and plain.get(before.casefold()):
+            of_unit.setdefault(plain[before.casefold()], []).append((place, unit))
         elif short in OF_PROGRAMS or name.startswith(more):
             continue
         elif any(row.cells[place : place + 1] not in ([], [""]) for row in rows):
             others.append(name)
+    by_name = {**of_unit, **by_name}
     if others or sorted(by_name) != sorted(factors) or any(len(v) > 1 for v in by_name.values()):
         message = f"needs the columns {','.join(factors)} (and may have {TRIAL})"
         message += f", has {','.join(map(str.strip, head))}"
@@ -232,7 +298,7 @@ def _factor_columns(
     return [by_name[factor][0] for factor in factors]
 
 
-def _without_repeats(path: Path, levels: Levels) -> Levels:
+def _without_repeats(path: Path, levels: FloatArray) -> FloatArray:
     """Return trials without those that are repeated, such as centre points, with a notice."""
     _, first = np.unique(levels, axis=0, return_index=True)
     left_out = len(levels) - len(first)

@@ -130,11 +130,14 @@ def spread_figure(screening: xr.Dataset, names: Sequence[str], words: Words) -> 
     return fig.Figure(panels=fig.in_grid(panels, len(panels), share="y"), height=260.0)
 
 
-def pareto_figure(screening: xr.Dataset, load: str, words: Words) -> fig.Figure:
+def pareto_figure(
+    screening: xr.Dataset, load: str, words: Words, *, has_thresholds: bool = True
+) -> fig.Figure:
     """Return the largest contributions to each response as sorted bars, one panel per response.
 
-    Bars of terms that are not significant are grey. Dashed lines: the thresholds of [B] for main
-    effects and interactions. Dotted line: where the F test of a main effect is significant at 5 %.
+    Bars of terms that are not significant are grey. Dashed lines, if wanted: the thresholds of [B]
+    for main effects and interactions. Dotted line: where the F test of a main effect is
+    significant at 5 %.
     """
     keys = ("main effect", "interaction", "not significant (F test, 5 %)")
 
@@ -149,7 +152,7 @@ def pareto_figure(screening: xr.Dataset, load: str, words: Words) -> fig.Figure:
             at_y = np.flatnonzero(kinds == kind)
             bars = fig.Bars(at_y, percents[at_y], is_across=True, color=color, key=keys[kind])
             marks.append(bars)
-        for least in (LEADING_MAIN, LEADING_INTERACTION):
+        for least in (LEADING_MAIN, LEADING_INTERACTION) if has_thresholds else ():
             value = float(CONTRIBUTION.values(least))
             rule = fig.Rule(value, "y", color=fig.MEASURED, dash="dashed", key="thresholds of [B]")
             marks.append(rule)

@@ -4,6 +4,8 @@ from pathlib import Path
 
 from wm_drake.studies.study import PROFILE, Options, Study, imported, option
 
+DEFAULT_MODEL = "main+2fi"
+
 
 class GasketOptions(Options):
     """Options of the gasket study."""
@@ -16,7 +18,8 @@ class GasketOptions(Options):
     )
     design: str = option(
         "d-optimal",
-        "Design: d-optimal, orthogonal, full, or a CSV file with a column of -1, 0, 1 per factor.",
+        "Design: d-optimal, orthogonal, full, or a CSV file or workbook with a column per factor: "
+        "levels, -1 and 1 for the ends, or values with a unit in cell or head (K_Lx [N/mm]).",
     )
     trials: int | None = option(
         None,
@@ -25,9 +28,12 @@ class GasketOptions(Options):
         "N",
         ge=1,
     )
-    model: str = option(
-        "main+2fi",
-        "Effects to estimate: main (main effects) or main+2fi (with two-factor interactions).",
+    model: str | None = option(
+        None,
+        "Effects to estimate: main (main effects) or main+2fi (with two-factor interactions). Of a "
+        "file also a polynomial: linear, linear+2fi, quadratic, or terms such as "
+        "'C_L, K_Lx, C_L:K_Lx, C_L^2'. Default: main+2fi; quadratic with other levels than -1, 0, "
+        "1.",
     )
     seed: int = option(0, "Seed of the D-optimal design.", ge=0, le=2**32 - 1)
     factor: tuple[str, ...] = option(

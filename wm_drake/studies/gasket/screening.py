@@ -32,7 +32,7 @@ from wm_drake.report.formatting import number, three_digits
 from wm_drake.report.quantity import SHARE, Quantity, each_of
 from wm_drake.simulation.measures.kind import Better
 from wm_drake.studies.doe.anova import anova
-from wm_drake.studies.doe.coding import LEVELS, efficiency
+from wm_drake.studies.doe.coding import LEVELS, columns, efficiency
 from wm_drake.studies.doe.design import Design
 
 LEADING_MAIN = 0.1
@@ -156,10 +156,11 @@ def check_degrees_of_freedom(design: Design) -> None:
     The full factorial is allowed: it has no other trials.
     """
     if design.residual_df < 1 and not design.is_complete:
+        is_enough = design.trials > columns(len(design.factors), "main")
         raise input_error(
             f"{design.trials} trials for {design.coefficients} coefficients of {design.model} "
-            "leave no degree of freedom, so nothing shows how well the model fits; add trials, or "
-            "use the model main",
+            "leave no degree of freedom, so nothing shows how well the model fits; add trials"
+            + (", or use --model main" if is_enough else ""),
             key="trials",
         )
 

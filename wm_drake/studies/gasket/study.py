@@ -20,6 +20,7 @@ from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.cases import Case, load_of
 from wm_drake.simulation.measures.responses import Response, chosen_responses, measures_of
 from wm_drake.studies.doe.design import Design
+from wm_drake.studies.doe.polynomial import PolynomialDesign
 from wm_drake.studies.experiment import Experiment, Simulate, responses
 from wm_drake.studies.gasket.screening import VALUE, runs_of
 
@@ -79,7 +80,7 @@ class GasketTrials:
         machine = build_machine(self.parameters)
         return Experiment(machine, self.measures, simulate, tuple(self.loads))
 
-    def responses(self, design: Design, experiment: Experiment) -> xr.Dataset:
+    def responses(self, design: Design | PolynomialDesign, experiment: Experiment) -> xr.Dataset:
         """Run all trials and return their responses, as of `screening.runs_of`.
 
         Args:

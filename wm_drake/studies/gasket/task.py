@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from wm_drake.errors import check_known, input_error, nearest_names, problems_at
@@ -16,10 +17,24 @@ from wm_drake.parameters.varying import TABLES, Varied, Varying
 from wm_drake.simulation.cases import Case, is_as_measured
 from wm_drake.studies.answer import Answer
 from wm_drake.studies.doe.coding import MODELS
-from wm_drake.studies.doe.design import DESIGNS, Design, make_design, read_design
+from wm_drake.studies.doe.design import (
+    DESIGNS,
+    Design,
+    design_of,
+    has_three_levels,
+    make_design,
+    read_levels,
+)
+from wm_drake.studies.doe.polynomial import (
+    POLYNOMIALS,
+    PolynomialDesign,
+    check_determined,
+    polynomial,
+)
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.experiment import Experiment
-from wm_drake.studies.gasket.options import GasketOptions
+from wm_drake.studies.gasket.options import DEFAULT_MODEL, GasketOptions
+from wm_drake.studies.gasket.own_design import fitted_screening, polynomial_answer
 from wm_drake.studies.gasket.page import Comparisons, gasket_answer
 from wm_drake.studies.gasket.proposal import (
     Candidates,
@@ -58,8 +73,13 @@ class GasketTask(Task):
         factors = _factors(machine, options)
         self.parameters = factors.machine
         self.settings = [_setting(factors, text) for text in options.check]
-        self.design = _design(options, factors.names)
-        check_degrees_of_freedom(self.design)
+        self.design = _design(options, factors)
+        if isinstance(self.design, PolynomialDesign):
+            check_determined(self.design)
+            if options.check:
+                raise input_error("needs a design with the levels -1, 0 and 1", where="--check")
+        else:
+            check_degrees_of_freedom(self.design)
         self.cases = selected_cases(self.parameters, options.load, True, options.profile)
         with problems_at("--response", ""):
             self.trials = GasketTrials(factors, self.cases, options.response)
@@ -105,8 +125,12 @@ class GasketTask(Task):
     def run(self, executor: Executor) -> Answer:
         """Run the trials, level 0 with each treatment of tables, and the settings to check."""
         trials, experiment = self.trials, self.trials.experiment(executor.simulate)
-        with executor.progress(self.design.trials * len(self.cases)):
-            screening = run_screening(self.design, lambda d: trials.responses(d, experiment))
+        design = self.design
+        with executor.progress(design.trials * len(self.cases)):
+            if isinstance(design, PolynomialDesign):
+                runs = trials.responses(design, experiment)
+                return polynomial_answer(fitted_screening(design, runs), trials)
+            screening = run_screening(design, lambda d: trials.responses(d, experiment))
         models = models_of(screening)
         check, published = xr.Dataset(), xr.Dataset()
         if self.settings:
@@ -212,11 +236,12 @@ def _setting(factors: Varying, text: str) -> Setting:
     return Setting(text, tuple(places.values()))
 
 
-def _design(options: GasketOptions, names: tuple[str, ...]) -> Design:
-    """Return the design that the options select, for factors with these names."""
-    kind, model, trials = options.design, options.model, options.trials
-    check_known(model, MODELS, f"unknown model '{model}'", where="--model")
+def _design(options: GasketOptions, factors: Varying) -> Design | PolynomialDesign:
+    """Return the design that the options select, for some factors."""
+    kind, trials, names = options.design, options.trials, factors.names
+    model = options.model or DEFAULT_MODEL
     if kind in DESIGNS:
+        check_known(model, MODELS, f"no model '{model}' of this design", where="--model")
         return make_design(kind, names, trials=trials, model=model, seed=options.seed)
     if not Path(kind).is_file():
         hint = nearest_names(kind, DESIGNS)
@@ -228,4 +253,18 @@ def _design(options: GasketOptions, names: tuple[str, ...]) -> Design:
             "not allowed with a design from a file, which has its own number of trials",
             where="--trials",
         )
-    return read_design(Path(kind), names, model)
+    by_name = factors.by_name
+    levels = read_levels(
+        Path(kind), names, lambda name, text: by_name[name].level_of(text, beyond=True)
+    )
+    if model in MODELS and has_three_levels(levels):
+        return design_of(Path(kind).name, names, levels, model)
+    if options.model in MODELS:
+        message = f"{model} is of the levels -1, 0 and 1; allowed here are {', '.join(POLYNOMIALS)}"
+        raise input_error(f"{message}, and terms such as {names[0]}^2", where="--model")
+    for number in np.flatnonzero(np.abs(levels).max(axis=1, initial=0.0) > 1.0).tolist():
+        with problems_at(f"{kind}, different trial {number + 1}"):
+            factors.at_levels(levels[number].tolist())
+    return PolynomialDesign(
+        Path(kind).name, names, levels, polynomial(options.model or "quadratic", names)
+    )
