@@ -1,10 +1,12 @@
 """Design of measurements on problems of known answer: variances in closed form, no machine runs."""
 
+import warnings
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from wm_drake.errors import InputError
 from wm_drake.model.build import build_machine
@@ -13,7 +15,7 @@ from wm_drake.parameters.candidates import load_candidates
 from wm_drake.simulation.measures import MEASURES
 from wm_drake.simulation.measures.responses import Response
 from wm_drake.studies.next.knowledge import of_calibration_folder
-from wm_drake.studies.next.measurements import CandidateMeasurement, measurements_of
+from wm_drake.studies.next.measurements import CandidateMeasurement, _Reading, measurements_of
 from wm_drake.studies.next.question import Observed, Question
 from wm_drake.studies.next.study import (
     Model,
@@ -112,6 +114,15 @@ def test_singles_are_ranked_and_have_gain_per_cost():
     assert np.isnan(singles.gain_per_cost.sel(candidate="m2"))
 
 
+def test_weak_measurement_of_the_worst_of_loads_gains_next_to_nothing():
+    rng = np.random.default_rng(1)
+    model = linear_model(np.eye(4), list(1e-3 * rng.standard_normal((20, 1, 4))))
+    assert model.is_linear
+    gains = singles_of(model).gain.values
+    assert (gains >= 0.0).all()
+    assert (gains < 1e-4).all()
+
+
 def test_curved_answer_is_judged_by_samples_that_keep_what_a_line_misses():
     model = linear_model([1.0], [[100.0]], bend=0.6)
     assert not model.is_linear
@@ -208,6 +219,18 @@ def test_candidates_add_loads_and_sensors_to_the_machine(tmp_path):
     taken = file.model_copy(update={"loads": {"middle": file.loads["test_mass"]}})
     with pytest.raises(InputError, match=r"loads\.middle: is in the machine already"):
         with_candidates(reference, taken)
+
+
+def test_a_sensor_that_nothing_moves_says_nothing():
+    sizes = xr.DataArray(
+        [[[0.0, 2e-3]]], {"load": ["middle"], "sensor": ["Y", "X"]}, ("point", "load", "sensor")
+    )
+    machines = SimpleNamespace(runs={True: xr.Dataset({"amplitude": sizes})})
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        (numbers,) = _Reading(("middle", True), ("Y", "X")).numbers(machines)
+    assert np.isnan(numbers[0])
+    assert numbers[1] == pytest.approx(np.log(2e-3))
 
 
 def test_a_calibration_to_records_is_known_without_its_recorder(tmp_path):

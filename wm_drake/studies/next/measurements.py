@@ -257,10 +257,14 @@ class _Reading:
     sensors: tuple[str, ...]
 
     def numbers(self, machines: TriedMachines) -> FloatArray:
-        """Return the logarithms of machines. (machines, sensors)"""
+        """Return the logarithms of machines, NaN of a sensor that nothing moves.
+
+        Returns:
+            (machines, sensors)
+        """
         load, gasket = self.run
         read = machines.runs[gasket].amplitude.sel(load=load, sensor=list(self.sensors))
-        return np.log(read.transpose("point", "sensor").values)
+        return np.log(read.where(read > 0.0).transpose("point", "sensor").values)
 
 
 def _sensor_groups(candidate: RunCandidate, every: Sequence[str]) -> list[tuple[str, ...]]:

@@ -117,7 +117,8 @@ class Model:
             gain, both = self._gain(chosen)
             covariance = covariance - gain @ both.T
         sizes, directions = np.linalg.eigh(covariance)
-        root = directions * np.sqrt(np.maximum(sizes, 0.0))
+        # the symmetric root: a small change of the covariance changes the draws little
+        root = (directions * np.sqrt(np.maximum(sizes, 0.0))) @ directions.T
         return self.question.worst(self.middle + self._normal @ root.T)
 
     def missed(self, chosen: Sequence[int]) -> FloatArray:
@@ -285,6 +286,9 @@ def least_gain(error: Any) -> Any:
 def singles_of(model: Model) -> xr.Dataset:
     """Return what each measurement alone does, the best first.
 
+    In the mean over its outcomes, no measurement makes an answer less sure. At the expected outcome
+    the worst of several loads may scatter more; that counts as no gain.
+
     Returns:
         Over `candidate`, in words: its `name` in the file; `gain`, the part by which the interval
         of the first answer becomes narrower, and its standard `error` by the drawn machines, 0 if
@@ -294,8 +298,8 @@ def singles_of(model: Model) -> xr.Dataset:
     measurements = model.question.measurements
     every = [[k] for k in range(len(measurements))]
     widths = np.array([half_widths(model.after(chosen)) for chosen in every])
-    widths = widths.reshape(len(every), len(model.question.answers))
     before = half_widths(model.after(()))
+    widths = np.minimum(widths.reshape(len(every), len(before)), before)
     remaining = np.array([model.remaining(chosen) for chosen in every])
     order = np.argsort(remaining, kind="stable")
     costs = np.array([m.cost for m in measurements])
