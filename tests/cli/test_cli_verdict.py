@@ -1,6 +1,7 @@
 """Tests of `wm-drake verdict`: answer, advice that holds when it is run, exit codes."""
 
 import json
+import re
 import shlex
 from pathlib import Path
 
@@ -65,7 +66,13 @@ def test_the_answer_and_the_advice_are_those_of_single_runs(verdict):
         text.partition("=")[0] for text in sets
     }
     page = Path("out/report.html").read_text(encoding="utf-8")
-    assert page.index("The tub does not touch the housing") < page.index("Proposal")
+    lead = page[page.index('<p class="summary">') : page.index("<nav")]
+    asked = ("does not touch", "How likely", "What decides", "What to change", "What it costs")
+    places = [lead.index(words) for words in asked]
+    assert places == sorted(places)
+    linked = re.findall(r'<dt><a href="#([^"]+)">', lead)
+    assert len(linked) == 4
+    assert all(f'<section id="{anchor}">' in page for anchor in linked)
 
 
 def test_limits_and_parts_that_may_change_are_the_users(verdict):
@@ -108,3 +115,53 @@ def test_exit_codes(verdict, words, code, message):
     assert ended.code == code
     assert message in ended.err
     assert Path("out/report.html").exists() == (code != 2)
+
+
+def test_machines_and_variants_are_judged_side_by_side_as_each_alone(verdict):
+    Path("stiff.yaml").write_text(
+        "extends: reference\nname: stiff\ngasket: {stiffness_x: 9 N/mm}\n"
+    )
+    pair = verdict("reference", "stiff.yaml", "--json", "--out", "pair")
+    assert pair.code == 0, pair.err
+    change = "gasket.stiffness_x=9 N/mm; gasket.stiffness_z=2 N/mm"
+    variant = verdict("stiff.yaml", "--variant", change, "--json", "--out", "variant")
+    assert variant.code == 0, variant.err
+    sets = [word for text in change.split("; ") for word in ("--set", text)]
+    alone = {
+        "reference": verdict("reference", "--json", "--out", "a"),
+        "stiff": verdict("stiff.yaml", "--json", "--out", "b"),
+        change: verdict("stiff.yaml", *sets, "--json", "--out", "c"),
+    }
+    shown = {name: json.loads(ended.out) for name, ended in alone.items()}
+    both = json.loads(pair.out)["verdicts"], json.loads(variant.out)["verdicts"]
+    assert [[row["state"] for row in rows] for rows in both] == [
+        ["reference", "stiff"],
+        ["stiff", change],
+    ]
+    for rows in both:
+        first = rows[0]["smallest_gap_mm"]
+        for row in rows:
+            one = shown[row["state"]]
+            assert row["smallest_gap_mm"] == one["numbers"][0]["smallest_gap_mm"]
+            assert row["upper_percent"] == one["laundry_probability"][0]["upper_percent"]
+            assert row["difference_mm"] == pytest.approx(row["smallest_gap_mm"] - first)
+    pages = sorted(path.name for path in Path("pair").glob("report_*.html"))
+    assert pages == ["report_reference.html", "report_stiff.html"]
+    again = verdict("reference", "reference", "--out", "same")
+    assert again.code == 2
+    assert "two have the name" in again.err
+
+
+def test_the_same_changes_are_run_in_all_units(verdict):
+    shown = {}
+    for units in ("si", "us"):
+        ended = verdict(
+            "reference", "--only", "spring_types", "--units", units, "--json", "--out", units
+        )
+        shown[units] = json.loads(ended.out)
+    si, us = shown["si"]["influences"], shown["us"]["influences"]
+    assert [row["key"] for row in si] == [row["key"] for row in us]
+    for one, other in zip(si, us, strict=True):
+        for side in ("less", "more"):
+            gap, inches = one[f"gap_with_{side}_mm"], other[f"gap_with_{side}_in"]
+            assert inches * 25.4 == pytest.approx(gap, rel=1e-12)

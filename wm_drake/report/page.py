@@ -3,7 +3,7 @@
 import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -120,6 +120,7 @@ class Section:
         anchor: Name of the section in an address.
         text: Sentences.
         facts: Pairs of word and text.
+        anchors: Names of the sections that say more, by the words of facts.
         links: Names of files beside the page, and the words that link to them.
         remarks: Sentences of a list.
         body: Other parts as HTML, from `report.page.fragment`.
@@ -133,6 +134,7 @@ class Section:
     tables: Sequence[Table] = ()
     text: str = ""
     facts: Sequence[tuple[str, str]] = ()
+    anchors: Mapping[str, str] = field(default_factory=dict)
     links: Sequence[tuple[str, str]] = ()
     remarks: Sequence[str] = ()
     body: str = ""

@@ -56,6 +56,7 @@ class Part:
         links: Names of files beside the page, and the words that link to them.
         remarks: Sentences of a list.
         facts: Pairs of word and text.
+        more: Headings of the parts of the page that say more, by the words of facts.
         body: Function that returns other parts as HTML, from `report.page.fragment`; called by each
             page, whose figures it makes.
         has_long_words: Whether the words of the tables are broken into lines.
@@ -68,6 +69,7 @@ class Part:
     links: Sequence[tuple[str, str]] = ()
     remarks: Sequence[str] = ()
     facts: Sequence[tuple[str, str]] = ()
+    more: Mapping[str, str] = field(default_factory=dict)
     body: Callable[[], str] | None = None
     has_long_words: bool = False
     is_folded: bool = False
@@ -275,12 +277,17 @@ def pictures_first(parts: Sequence[Part]) -> tuple[Part, ...]:
     return (*pictures, *others)
 
 
+def _anchor(heading: str) -> str:
+    """Return the name of a part in an address."""
+    return heading.partition(":")[0].lower().replace(" ", "-")
+
+
 def _section(part: Part) -> Any:
     """Return a part as section of a page."""
     from wm_drake.report.page import Section, picture
 
     return Section(
-        part.heading.partition(":")[0].lower().replace(" ", "-"),
+        _anchor(part.heading),
         part.heading,
         [picture(p.figure, p.alternative, p.caption) for p in part.shown if isinstance(p, Plot)],
         [table.table() for table in part.tables if table.heading],
@@ -288,6 +295,7 @@ def _section(part: Part) -> Any:
         links=part.links,
         remarks=part.remarks,
         facts=part.facts,
+        anchors={word: _anchor(heading) for word, heading in part.more.items()},
         body=part.body() if part.body else "",
         has_long_words=part.has_long_words,
         is_folded=part.is_folded,

@@ -12,7 +12,6 @@ if TYPE_CHECKING:  # --help does not wait for them
     from wm_drake.parameters import MachineParameters
     from wm_drake.simulation.cases import Case
     from wm_drake.studies.spin.task import SpinTask
-    from wm_drake.studies.verdict.task import VerdictTask
 
 LIVE: Any = option(
     False, "Let the page run the machine too: folded, with sliders, without a server."
@@ -34,12 +33,18 @@ def _of_spin(task: "SpinTask") -> Extend | None:
     return _with_page(planned.machine.parameters, planned.cases, options.machine[0], options.sets)
 
 
-def _of_verdict(task: "VerdictTask") -> Extend | None:
-    """Return the function that adds the page of the loads of the machine."""
+def _of_verdict(task: Any) -> Extend | None:
+    """Return the function that adds the page of the loads of the machine.
+
+    Raises:
+        InputError: several machines or variants are compared.
+    """
     options: Any = task.options
     if not options.live:
         return None
-    return _with_page(task.given.parameters, task.cases, options.machine, options.sets)
+    if options.variant or len(options.machine) > 1:
+        raise input_error("needs a single machine and variant", where="--live")
+    return _with_page(task.given.parameters, task.cases, options.machine[0], options.sets)
 
 
 def _with_page(

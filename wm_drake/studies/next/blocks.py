@@ -11,14 +11,17 @@ if TYPE_CHECKING:
     from wm_drake.studies.answer import Answer
     from wm_drake.studies.executor import Executor
     from wm_drake.studies.next.knowledge import Knowledge
-    from wm_drake.studies.verdict.task import VerdictTask
 
 
-def _of_verdict(task: "VerdictTask") -> Extend:
+def _of_verdict(task: Any) -> Extend | None:
     """Return the block of a machine that is known from drawings and catalogues."""
     from wm_drake.studies.proposal import command_text
+    from wm_drake.studies.verdict.task import VerdictTask
 
-    command = command_text(f"wm-drake study next {task.options.machine}", task.options)
+    if not isinstance(task, VerdictTask):  # several machines are compared
+        return None
+    (machine,) = task.options.machine
+    command = command_text(f"wm-drake study next {machine}", task.options)
 
     def known() -> "Knowledge":
         from wm_drake.studies.next.knowledge import of_file

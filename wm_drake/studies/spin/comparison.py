@@ -83,7 +83,8 @@ def comparison_answer(
     """
     pages = {name: f"report_{files[name].part}.html" for name in variants}
     others = {pages[name]: spin_answer(runs, files=files[name]) for name, runs in variants.items()}
-    machines = [runs.parameters for runs in variants.values()]
+    by_name = {name: runs.parameters for name, runs in variants.items()}
+    machines = list(by_name.values())
     data = differences_of(variants, references)
     plot = _plot(variants)
     return Answer(
@@ -92,7 +93,11 @@ def comparison_answer(
         machines[0] if all(machine == machines[0] for machine in machines) else None,
         (
             Part("Differences", (*([plot] if plot else []), _table(data), _amplitudes(variants))),
-            Part("Parameters that differ", remarks=different_parameters(variants), is_folded=True),
+            Part(
+                "Parameters that differ",
+                remarks=different_parameters(by_name),
+                is_folded=True,
+            ),
             Part("Full reports", links=[(p, f"Full report of {n}") for n, p in pages.items()]),
         ),
         tuple(
@@ -423,11 +428,11 @@ def common_sensors(machines: Sequence[MachineParameters]) -> list[str]:
     return [name for name in machines[0].sensors if all(name in m.sensors for m in machines)]
 
 
-def different_parameters(variants: Variants) -> list[str]:
+def different_parameters(machines: Mapping[str, MachineParameters]) -> list[str]:
     """Return a sentence for each parameter that differs between the machines."""
     texts = {
-        name: {k: readable(value, unit) for k, value, unit in quantities(runs.parameters)}
-        for name, runs in variants.items()
+        name: {k: readable(value, unit) for k, value, unit in quantities(machine)}
+        for name, machine in machines.items()
     }
     keys = dict.fromkeys(key for of_machine in texts.values() for key in of_machine)
     return [

@@ -1,6 +1,9 @@
 """Options of the verdict, and its declaration."""
 
 from pathlib import Path
+from typing import Any
+
+from pydantic import field_validator
 
 from wm_drake.studies.study import PROFILE, SEED, Options, Study, imported, option
 
@@ -8,8 +11,19 @@ from wm_drake.studies.study import PROFILE, SEED, Options, Study, imported, opti
 class VerdictOptions(Options):
     """Options of the verdict."""
 
-    machine: str = option(
-        "reference", "Name of a shipped machine, or machine file.", "MACHINE", "argument"
+    machine: tuple[str, ...] = option(  # type: ignore[assignment]  # that of `Options` is one
+        ("reference",),
+        "Name of a shipped machine, or machine file. Several are compared on one page, with a page "
+        "for each.",
+        "MACHINE",
+        "argument",
+        min_length=1,
+    )
+    variant: tuple[str, ...] = option(
+        (),
+        "Compare the machine with one that has other numbers, as of --set, with blanks after ';': "
+        "'gasket.stiffness_x=5 N/mm; C_L=80 %'. Repeatable.",
+        "'KEY=VALUE; ...'",
     )
     clearance: str = option(
         "0 mm", "Gap between tub and housing that must remain in every run.", "LENGTH"
@@ -40,12 +54,18 @@ class VerdictOptions(Options):
     profile: Path | None = PROFILE
     seed: int = SEED
 
+    @field_validator("machine", mode="before")
+    @classmethod
+    def _one_or_several(cls, value: Any) -> Any:
+        """Return a tuple for the name of a single machine."""
+        return (value,) if isinstance(value, str) else value
+
 
 VERDICT = Study(
     "verdict",
     "Say whether the tub touches the housing, how likely that is, and what to change.",
     VerdictOptions,
-    imported("wm_drake.studies.verdict.task:VerdictTask"),
+    imported("wm_drake.studies.verdict.task:begin"),
     quick={"samples": 16},
     group="",
 )

@@ -1,6 +1,6 @@
 """Show the verdict: a page whose first screen is the answer."""
 
-from dataclasses import replace
+from collections.abc import Mapping
 
 import numpy as np
 import xarray as xr
@@ -10,13 +10,14 @@ from wm_drake.report.formatting import shape_name
 from wm_drake.report.labelled import LabelledTable
 from wm_drake.report.quantity import HIDDEN, SPEED, Quantity, of_measure, shown, text_of
 from wm_drake.studies.answer import Answer, Part, Plot
-from wm_drake.studies.proposal_page import proposal_part
+from wm_drake.studies.proposal_page import LINE, costs_text, proposal_part, proposal_text
 from wm_drake.studies.stops import stops_sentence
 from wm_drake.studies.tolerance.page import masses_text
 from wm_drake.studies.verdict.study import (
     FACTOR,
     SMALLEST_GAP,
     STATES,
+    Judged,
     VerdictQuestion,
     proposal,
     smallest,
@@ -39,36 +40,28 @@ HOW_OTHERS_DIFFER = (
 
 LAUNDRY = "random laundry"
 
+GAPS, DECIDES, CHANGES = "Smallest gaps", "What decides the gap", "What to change"
+"""Headings of parts."""
 
-def verdict_answer(
-    question: VerdictQuestion,
-    states: xr.Dataset,
-    tried: xr.Dataset,
-    laundry: xr.Dataset,
-    masses: tuple[float, float] | None,
-) -> Answer:
-    """Return the answer.
 
-    Args:
-        states, tried, laundry: As of `states_of`, `influences` and `laundry_of` in
-            `wm_drake.studies.verdict.study`.
-        masses: Smallest and largest mass of the laundry [kg]; None if loads scatter in its place.
-    """
+def verdict_answer(judged: Judged) -> Answer:
+    """Return the answer."""
+    question, states, tried, laundry, _ = judged
     word = word_of(question, states, laundry)
-    samples = f"{laundry.sizes['sample']} samples"
     return Answer(
         f"Verdict on machine {question.machine.name}",
         answer(question, states, laundry),
         question.machine,
         (
-            Part("Smallest gaps", (gaps_plot(question, states, laundry), *_laundry(laundry))),
+            Part(GAPS, (_gaps_plot(question, states, laundry), *_laundry(laundry))),
             Part("Stops", (stops_table(states),) if "stop_hits" in states else ()),
-            Part("What decides the gap", influences_shown(question, states, tried)),
+            Part(DECIDES, influences_shown(question, states, tried)),
+            _change_part(judged),
             Part("Each load", (loads_table(question, states),)),
             Part("Other commands with a smallest gap", text=HOW_OTHERS_DIFFER),
         ),
-        (("Laundry", f"{question.laundry}; {samples}"),),
-        short=_short(question, states, tried, laundry, masses),
+        tuple(_about_laundry(judged)),
+        short=_short(judged),
         diverged=() if word == "clear" else (f"verdict: {word}",),
     )
 
@@ -119,35 +112,53 @@ def mm(value: float) -> str:
     return SMALLEST_GAP.text(value).replace(" ", "\u00a0")
 
 
-def _short(
-    question: VerdictQuestion,
-    states: xr.Dataset,
-    tried: xr.Dataset,
-    laundry: xr.Dataset,
-    masses: tuple[float, float] | None,
-) -> Part:
-    """Return the part in short: the proposal, the laundry, the margin; as `verdict_answer`."""
-    loads, machine, clearance = states["load"].values.tolist(), question.machine, question.clearance
-    margin = smallest(states)[0].item() - clearance
-    rows = [("Random laundry", laundry_text(question, laundry.isel(state=0), question.laundry))]
-    if states.sizes["state"] > 1:
-        rows.append(("Random laundry then", laundry_text(question, laundry.isel(state=1))))
+def _short(judged: Judged) -> Part:
+    """Return the part in short: how likely, what decides, what to change, what it costs."""
+    question, states, tried, laundry, _ = judged
+    made = proposal(question, states)
+    rows = [("How likely", laundry_text(question, laundry.isel(state=0)))]
+    if question.clearance:
+        margin = smallest(states)[0].item() - question.clearance
+        kept = "more" if margin > 0.0 else "less"
+        text = f"{mm(abs(margin))} {kept} than the clearance, {mm(question.clearance)}"
+        rows.insert(0, ("Margin", text))
+    if tried.sizes["key"]:
+        rows.append(("What decides", _influences_text(tried.isel(key=slice(MOST_NAMED)))))
+    rows.append(("What to change", proposal_text(made)))
+    if made.is_confirmed:
+        words = {response.name: response.title for response in question.responses}
+        rows.append(("What it costs", costs_text(made, words)))
+        rows.append(("How likely then", laundry_text(question, laundry.isel(state=1))))
+        rows.append((LINE, made.line_to_copy.item()))
+    more = {
+        "How likely": GAPS,
+        "What decides": DECIDES,
+        "What to change": CHANGES,
+        "What it costs": CHANGES,
+    }
+    return Part("In short", facts=rows, more={word: more[word] for word, _ in rows if word in more})
+
+
+def _change_part(judged: Judged) -> Part:
+    """Return the part of the proposal: why, and the responses before and after."""
+    question, states, tried, laundry, _ = judged
+    words = {response.name: response.title for response in question.responses}
+    why = why_text(question, tried)
+    part = proposal_part(proposal(question, states), why, words)
+    numbers = numbers_of(question, states, word_of(question, states, laundry))
+    tables = (*part.shown, LabelledTable("numbers", numbers))
+    return Part(CHANGES, tables, why)
+
+
+def _about_laundry(judged: Judged) -> list[tuple[str, str]]:
+    """Return what the laundry is, and how its mass compares with that of the loads."""
+    question, states, _, laundry, masses = judged
+    loads, machine = states["load"].values.tolist(), question.machine
+    rows = [("Laundry", f"{question.laundry}; {laundry.sizes['sample']} samples")]
     if masses and masses[1] < max(machine.loads[name].mass for name in loads):
         text = masses_text(machine, loads, masses)
         rows.append(("Its mass", f"{text} --laundry names a file with other laundry"))
-    if clearance:
-        kept = "more" if margin > 0.0 else "less"
-        rows.append(("Margin", f"{mm(abs(margin))} {kept} than the clearance, {mm(clearance)}"))
-    else:
-        rows.append(("Margin", f"{mm(margin)} to contact; --clearance '10 mm' sets another limit"))
-    if tried.sizes["key"]:
-        rows.append(("What decides it", _influences_text(tried.isel(key=slice(MOST_NAMED)))))
-    words = {response.name: response.title for response in question.responses}
-    made, why = proposal(question, states), why_text(question, tried)
-    part = proposal_part(made, why, words, rows)
-    word = word_of(question, states, laundry)
-    numbers = LabelledTable("numbers", numbers_of(question, states, word))
-    return replace(part, shown=(*part.shown, numbers))
+    return rows
 
 
 def why_text(question: VerdictQuestion, tried: xr.Dataset) -> str:
@@ -159,17 +170,16 @@ def why_text(question: VerdictQuestion, tried: xr.Dataset) -> str:
     return f"No change of parts by {change} makes the smallest gap clearly larger within the limit."
 
 
-def laundry_text(question: VerdictQuestion, laundry: xr.Dataset, about: str = "") -> str:
+def laundry_text(question: VerdictQuestion, laundry: xr.Dataset) -> str:
     """Return probability and smallest gap of the samples."""
     clearance = question.clearance
     what = f"keep less than {mm(clearance)}" if clearance else "touch"
-    of_what = f" ({about})" if about else ""
     gap = laundry.smallest_gap.item()
     least = f"smallest gap {mm(gap)}" if np.isfinite(gap) else "a run failed"
     return (
-        f"{int(laundry['count']) or 'none'} of {laundry.sizes['sample']} runs{of_what} {what}; "
-        f"probability {text_of(laundry.probability)} (95 % interval {text_of(laundry.lower)} to "
-        f"{text_of(laundry.upper)}); {least}"
+        f"{int(laundry['count']) or 'none'} of {laundry.sizes['sample']} runs with random laundry "
+        f"{what}; probability {text_of(laundry.probability)} (95 % interval "
+        f"{text_of(laundry.lower)} to {text_of(laundry.upper)}); {least}"
     )
 
 
@@ -252,20 +262,40 @@ def _laundry(laundry: xr.Dataset) -> tuple[LabelledTable, LabelledTable]:
     )
 
 
-def gaps_plot(question: VerdictQuestion, states: xr.Dataset, laundry: xr.Dataset) -> Plot:
+def _gaps_plot(question: VerdictQuestion, states: xr.Dataset, laundry: xr.Dataset) -> Plot:
     """Return the gaps of the loads and of the laundry, before and after the proposed change."""
-    styles = ((0, fig.OURS, STATES[0], 0.13), (-1, fig.QUIET, STATES[1], -0.13))
+    styles = dict(zip(STATES[: laundry.sizes["state"]], (fig.OURS, fig.QUIET), strict=False))
+    return Plot(
+        gaps_figure(question.clearance, states, laundry, styles),
+        f"Smallest gaps; the smallest one is {mm(smallest(states)[0].item())}.",
+        "Smallest gap of each load of the machine, and of all samples of random laundry. Dashed: "
+        "the clearance wanted.",
+    )
+
+
+def gaps_figure(
+    clearance_size: float, states: xr.Dataset, laundry: xr.Dataset, styles: Mapping[str, str]
+) -> fig.Figure:
+    """Return the gaps of the loads and of the laundry, a line for each state.
+
+    Args:
+        clearance_size: Gap that must remain. [m]
+        states, laundry: Smallest gaps over `state`. [m]
+        styles: Colour of each state by its name.
+    """
     names = [*states["load"].values.tolist(), LAUNDRY]
-    clearance = SMALLEST_GAP.values(question.clearance).item()
+    clearance = SMALLEST_GAP.values(clearance_size).item()
     marks: list[fig.Mark] = [fig.Rule(0.0, "y", color=fig.MARK)]
     if clearance:
         marks.append(fig.Rule(clearance, "y", color=fig.MEASURED, dash="dashed"))
     largest = clearance
-    for state, color, key, shift in styles[: laundry.sizes["state"]]:
+    apart = min(0.26, 0.8 / len(styles))
+    shifts = apart * (0.5 * (len(styles) - 1) - np.arange(len(styles)))
+    for state, (key, color) in enumerate(styles.items()):
         of_loads, of_laundry = states.smallest_gap[state].values, laundry.smallest_gap[state].item()
         sizes = np.array([*of_loads, of_laundry])
         gaps = SMALLEST_GAP.values(sizes)
-        at = np.arange(len(gaps), dtype=float)[::-1] + shift
+        at = np.arange(len(gaps), dtype=float)[::-1] + shifts[state]
         known = np.isfinite(gaps)
         ends = (np.zeros(known.sum()), at[known]), (gaps[known], at[known])
         marks.append(fig.segments(*ends, color=color, width=4.0))
@@ -278,13 +308,8 @@ def gaps_plot(question: VerdictQuestion, states: xr.Dataset, laundry: xr.Dataset
         ticks=fig.named(names, np.arange(len(names))[::-1]), has_grid=False, has_line=False
     )
     x = fig.Axis(label=f"{SMALLEST_GAP.label} (0: the parts touch)", range=(None, 1.12 * largest))
-    figure = fig.Figure(panels=(fig.Panel(marks=tuple(marks), x=x, y=y),), height=46.0 * len(names))
-    return Plot(
-        figure,
-        f"Smallest gaps; the smallest one is {mm(smallest(states)[0].item())}.",
-        "Smallest gap of each load of the machine, and of all samples of random laundry. Dashed: "
-        "the clearance wanted.",
-    )
+    height = 23.0 * max(2, len(styles)) * len(names)
+    return fig.Figure(panels=(fig.Panel(marks=tuple(marks), x=x, y=y),), height=height)
 
 
 def influences_shown(

@@ -16,7 +16,7 @@ from wm_drake.parameters import MachineParameters, with_value
 from wm_drake.parameters.elements import CurveTable
 from wm_drake.parameters.keys import quantities
 from wm_drake.parameters.types import FloatArray
-from wm_drake.parameters.units import Share
+from wm_drake.parameters.units import Share, Unit
 from wm_drake.parameters.variation import value_at
 from wm_drake.report.formatting import shape_name
 from wm_drake.report.quantity import CHANGE, Quantity, of_measure
@@ -84,6 +84,21 @@ class ChangedRuns(NamedTuple):
 
     runs: xr.Dataset
     changes: Mapping[str, str]
+
+
+class Judged(NamedTuple):
+    """What a verdict found.
+
+    Attributes:
+        states, tried, laundry: As of `states_of`, `influences` and `laundry_of`.
+        masses: Smallest and largest mass of the laundry [kg]; None if loads scatter in its place.
+    """
+
+    question: VerdictQuestion
+    states: xr.Dataset
+    tried: xr.Dataset
+    laundry: xr.Dataset
+    masses: tuple[float, float] | None
 
 
 def smallest(runs: xr.Dataset) -> xr.DataArray:
@@ -302,8 +317,11 @@ def proposal(question: VerdictQuestion, states: xr.Dataset) -> xr.Dataset:
     texts = []
     for key, text in changes.items():
         change = CHANGE.text(_ratio(question.machine, key, text) - 1.0)
-        value = "of its table" if text.endswith("%") else f"({change})"
-        texts.append((words_of(key), f"{text.replace('*', ' ')} {value}", key))
+        value = f"{text} of its table"
+        if not text.endswith("%"):
+            changed = value_at(with_value(question.machine, key, text), key)
+            value = f"{_unit_of(question.machine, key).reading(changed, digits=4)} ({change})"
+        texts.append((words_of(key), value, key))
     sets = [f'--set "{key}={text}"' for key, text in changes.items()]
     command = " ".join([question.command, *sets])
     return proposal_of(runs, texts, is_confirmed=bool(changes), command=command)
@@ -353,11 +371,18 @@ def laundry_of(samples: Sequence[xr.Dataset], clearance: float) -> xr.Dataset:
 
 
 def _text(parameters: MachineParameters, key: str, factor: float) -> str:
-    """Return a multiple of a number as the text that `--set` takes, so that it is what is run."""
+    """Return a multiple of a number as the text that `--set` takes, so that it is what is run.
+
+    It is rounded in the unit of machine files, whatever the units of the reader.
+    """
     if isinstance(value_at(parameters, key), CurveTable):
         return f"{FACTOR.values(factor):.4g} %"
-    unit = next(u for name, _, u in quantities(parameters) if name == key).for_reader
+    unit = _unit_of(parameters, key)
     return f"{unit.from_si(factor * value_at(parameters, key)):.4g} {unit.shown}"
+
+
+def _unit_of(parameters: MachineParameters, key: str) -> Unit:
+    return next(unit for name, _, unit in quantities(parameters) if name == key)
 
 
 def _ratio(parameters: MachineParameters, key: str, text: str) -> float:

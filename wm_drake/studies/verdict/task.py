@@ -1,7 +1,9 @@
 """Check the options of the verdict, and run it."""
 
 import math
+import re
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from wm_drake.errors import input_error, nearest_names, problems_at
@@ -24,12 +26,23 @@ from wm_drake.simulation.measures.stops import STOPS
 from wm_drake.studies.answer import Answer
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.experiment import Experiment
-from wm_drake.studies.inputs import pairs_of, profile_of, selected_cases
+from wm_drake.studies.inputs import (
+    build_checked,
+    changed_parameters,
+    friction_warnings,
+    machine_warnings,
+    pairs_of,
+    profile_of,
+    selected_cases,
+)
 from wm_drake.studies.proposal import MOST_LOSS, command_text
+from wm_drake.studies.spin.options import MOST_VARIANTS
+from wm_drake.studies.spin.task import file_parts
 from wm_drake.studies.study import Task
 from wm_drake.studies.tolerance.options import ToleranceOptions
 from wm_drake.studies.tolerance.study import CONTACTS, laundry_masses
 from wm_drake.studies.tolerance.task import ToleranceTask
+from wm_drake.studies.verdict.comparison import comparison_answer
 from wm_drake.studies.verdict.options import VerdictOptions
 from wm_drake.studies.verdict.page import verdict_answer
 from wm_drake.studies.verdict.study import (
@@ -37,6 +50,7 @@ from wm_drake.studies.verdict.study import (
     FACTOR,
     SMALLEST_GAP,
     STATES,
+    Judged,
     VerdictQuestion,
     aim_of,
     changeable,
@@ -84,10 +98,11 @@ class VerdictTask(Task):
     def _command(self) -> str:
         """Return the command of this verdict, without sizes."""
         options = self.options
+        (machine,) = options.machine
         more = [f"--clearance '{options.clearance}'"] if self.clearance else []
         more += [f"--limit {limit}" for limit in options.limit]
         more += [f"--only {key}" for key in options.only]
-        return command_text(f"wm-drake verdict {options.machine}", options, *more)
+        return command_text(f"wm-drake verdict {machine}", options, *more)
 
     def _laundry(self, machine: Machine) -> ToleranceTask:
         """Return the tolerance study of a machine, without what a verdict does not show."""
@@ -106,6 +121,10 @@ class VerdictTask(Task):
         return {**self.laundry.identity, **change}
 
     def run(self, executor: Executor) -> Answer:
+        """Run, and return the answer."""
+        return verdict_answer(self.judged(executor))
+
+    def judged(self, executor: Executor) -> Judged:
         """Run the loads, the changes, and the laundry before and after the proposed change."""
         parameters, change = self.machine.parameters, FACTOR.unit.to_si(self.options.change)
         experiment = Experiment(self.machine, self.measures, executor.simulate, tuple(self.cases))
@@ -126,13 +145,70 @@ class VerdictTask(Task):
             self._command,
             {} if changed is None else changed.changes,
         )
-        return verdict_answer(
+        return Judged(
             question,
             states_of(base, changed),
             tried.assign(why_not=("key", reasons(aim, tried, self.responses, changed))),
             laundry_of(samples, self.clearance),
             laundry_masses(samples[0]),
         )
+
+
+def begin(options: VerdictOptions, *machines: Machine) -> "VerdictTask | VerdictComparisonTask":
+    """Return the task of the verdict on a machine, or of the comparison of several ones."""
+    if len(machines) == 1 and not options.variant:
+        return VerdictTask(options, machines[0])
+    return VerdictComparisonTask(options, machines)
+
+
+class VerdictComparisonTask(Task):
+    """Verdicts on several machines, or variants of one, with checked options."""
+
+    def __init__(self, options: VerdictOptions, machines: Sequence[Machine]) -> None:
+        """Check the options, and build the variants."""
+        if options.variant and len(machines) > 1:
+            raise input_error("needs a single machine", where="--variant")
+        count = len(machines) + len(options.variant)
+        if count > MOST_VARIANTS:
+            message = f"{count} are too many for one page; at most {MOST_VARIANTS} can be compared"
+            raise input_error(message, where="--variant" if options.variant else "MACHINE")
+        self.options = options
+        self.tasks: dict[str, VerdictTask] = {}
+        self.warned: list[str] = []
+        for given, machine in zip(options.machine, machines, strict=True):
+            self._add(options, given, machine)
+        for variant in options.variant:
+            sets = tuple(re.split(r";\s+", variant.strip()))
+            with problems_at("--variant"):
+                changed = changed_parameters(machines[0].parameters, sets)
+                named = changed.model_copy(update={"name": variant.strip()})
+                built = build_checked(options.machine[0], named)
+            texts = (*machine_warnings(named, profile=options.profile), *friction_warnings(named))
+            self.warned += [f"{variant}: {text}" for text in texts]
+            more = options.model_copy(update={"sets": (*options.sets, *sets)})
+            self._add(more, options.machine[0], built)
+
+    def _add(self, options: VerdictOptions, given: str, machine: Machine) -> None:
+        name = machine.parameters.name
+        if name in self.tasks:
+            message = f"two have the name '{name}'; give each machine file its own 'name'"
+            raise input_error(message, where="--variant" if options.variant else "MACHINE")
+        one = options.model_copy(update={"machine": (given,), "variant": ()})
+        self.tasks[name] = VerdictTask(one, machine)
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """Return what determines the runs."""
+        each = [task.identity for task in self.tasks.values()]
+        numbers = [task.machine.parameters.model_dump(mode="json") for task in self.tasks.values()]
+        return {"compared": [list(self.tasks), numbers, each]}
+
+    def run(self, executor: Executor) -> Answer:
+        """Judge one after the other."""
+        judged = {name: task.judged(executor) for name, task in self.tasks.items()}
+        parts = file_parts(list(judged))
+        pages = {name: f"report_{part}.html" for name, part in zip(judged, parts, strict=True)}
+        return replace(comparison_answer(judged, pages), warned=tuple(self.warned))
 
 
 def _limits(entries: Sequence[str], chosen: Sequence[Response]) -> tuple[float, ...]:
