@@ -195,3 +195,42 @@ def test_a_phone_shows_all_without_scrolling_sideways(page):
     page.size(390)
     assert page.run("return document.documentElement.scrollWidth <= window.innerWidth")
     assert serious_faults(page) == []
+
+
+@pytest.mark.slow
+def test_paper_has_the_verdict_and_no_empty_side_bar(page):
+    left = "return document.querySelector('main').getBoundingClientRect().left"
+    on_screen = page.run(left)
+    page.media(media="print")
+    try:
+        assert page.run(left) < 0.2 * on_screen
+        assert page.find("#verdict").is_displayed()
+        assert not page.find("#search").is_displayed()
+        assert (
+            page.run("return getComputedStyle(document.querySelector('tr')).breakInside") == "avoid"
+        )
+    finally:
+        page.media()
+
+
+@pytest.mark.slow
+def test_texts_of_the_profile_are_as_large_as_the_others(page):
+    size = (
+        "const svg = document.querySelector(arguments[0]);"
+        "return svg.getBoundingClientRect().width / svg.viewBox.baseVal.width"
+    )
+    profile, envelope = page.run(size, "#profile svg"), page.run(size, "#envelopes svg")
+    assert profile == pytest.approx(envelope, rel=0.25)
+
+
+@pytest.mark.slow
+def test_search_lists_what_the_machine_has_first(page):
+    page.find("#search").send_keys("friction")
+    parts = (
+        "return [...document.querySelectorAll('#numbers > .part:not([hidden])')]"
+        ".sort((a, b) => a.getBoundingClientRect().top - b.getBoundingClientRect().top)"
+        ".map((part) => part.querySelector('summary').textContent)"
+    )
+    shown = page.run(parts)
+    assert "gasket" in shown
+    assert shown.index("dampers") < shown.index("gasket")

@@ -205,7 +205,7 @@ def test_refused_value_is_seen_whatever_is_searched_for(page):
     ]
     assert f"The last machine that ran: {gap}" in page.find("#verdict").text.replace("\n", " ")
     assert page.find(ROW.format(STIFFNESS, ".problem")).is_displayed()
-    assert page.run("return document.querySelectorAll('.old').length") == 6
+    assert page.run("return document.querySelectorAll('.old').length") == 8
     page.find("#search").send_keys(" outer")  # nothing has these words
     assert page.find(ROW.format(STIFFNESS, ".problem")).is_displayed()
     page.run(move, ROW.format(STIFFNESS, ".text"), "4 N/mm")
@@ -407,6 +407,98 @@ def test_numbers_follow_the_picture_and_are_pale_until_then(page):
     page.wait("return window.fetched.includes('api/numbers')")
     settled(page)
     assert page.run("return window.fetched").count("api/numbers") == 1
+
+
+def test_study_of_other_numbers_is_pale_and_says_when_it_began(page, folder):
+    (folder / "other.yaml").write_text("extends: reference\nname: other\ngravity: 9.8 m/s^2\n")
+    page.driver.refresh()
+    ready(page)
+    next_ = "const n = document.getElementById('next'); return [n.className, n.textContent]"
+    row = "return document.querySelector('.study').className"
+    settled(page)
+    page.wait("return document.querySelector('#study-options input')")
+    page.find("#ask-next").click()
+    page.wait("return document.querySelector('.study')", timeout=60.0)
+    try:
+        assert page.run(next_)[0] == ""
+        assert page.run(row) == "study"
+        typed(page, UNBALANCE, "700 g")
+        settled(page)
+        classes, text = page.run(next_)
+        started = page.run("return document.querySelector('.study').textContent")
+        assert classes == "old"
+        assert page.run(row) == "study old"
+        date = re.search(r"\d{4}-\d\d-\d\d \d\d:\d\d", text)[0]
+        assert date in started
+        page.find("#undo").click()
+        settled(page)
+        assert page.run(next_)[0] == ""
+        assert page.run(row) == "study"
+        switched(page, "other.yaml")
+        page.wait("return document.querySelector('#about').textContent.startsWith('other')")
+        settled(page)
+        assert page.run(next_)[0] == "old"
+        assert page.run(row) == "study old"
+        page.run(
+            "[...document.querySelectorAll('.study button')].at(-1).click()"
+        )  # show its machine
+        page.wait("return document.getElementById('machine').value === 'reference'")
+        settled(page)
+        assert page.run(next_)[0] == ""
+        assert page.run(row) == "study"
+    finally:
+        page.run("document.querySelector('.study button')?.click()")  # cancel
+
+
+def test_saved_as_is_said_of_the_numbers_that_were_saved(page):
+    page.find("#save-name").send_keys("kept")
+    page.find("#save").click()
+    said = "return document.querySelector('#save-result').textContent"
+    assert page.wait(said) == "saved as kept.yaml"
+    typed(page, UNBALANCE, "700 g")
+    assert page.run(said) == ""
+
+
+def switched(page, machine):
+    page.run(
+        "const m = document.querySelector('#machine'); m.value = arguments[0];"
+        "m.dispatchEvent(new Event('change'))",
+        machine,
+    )
+
+
+BLOCKED = """window.answered = window.fetch; window.runs = 0;
+window.fetch = (...of) => (/api.numbers/.test(of[0]) || (/api.run/.test(of[0]) && ++window.runs > arguments[0])
+  ? new Promise(() => {}) : answered(...of));"""
+
+
+@pytest.mark.parametrize("runs", [0, 1])
+def test_nothing_of_the_machine_before_stays(page, folder, runs):
+    (folder / "other.yaml").write_text("extends: reference\nname: other\n")
+    page.driver.refresh()
+    ready(page)
+    settled(page)
+    page.run(BLOCKED, runs)
+    switched(page, "other.yaml")
+    drawn = ("verdict", "measures", "variants", "envelopes", "orbits", "scene", "forces", "profile")
+    if runs == 0:  # the run that finds the load to show never ends: the machine is not open yet
+        page.wait("return document.getElementById('numbers').className === 'old'")
+        classes = page.run(
+            "return arguments[0].map((id) => document.getElementById(id).className)", drawn
+        )
+        assert all("old" in of.split() for of in classes)
+        return
+    page.wait("return document.querySelector('#about').textContent.startsWith('other')")
+    for of in (
+        "#measures tr",
+        "#variants tr",
+        "#envelopes .now-area[d]",
+        "#forces svg",
+        "#orbits path.now-line[d]",
+        "#scene path",
+        ".loads button",
+    ):
+        assert page.run("return document.querySelectorAll(arguments[0]).length", of) == 0, of
 
 
 def test_gasket_is_taken_out(page):

@@ -6,7 +6,7 @@ from wm_drake.errors import InputError
 from wm_drake.studies.study import STUDIES
 from wm_drake.studio.forms import arguments, forms
 
-OFFERED = [name for name, study in STUDIES.items() if study.group == "study"]
+OFFERED = ["verdict", *(name for name, study in STUDIES.items() if study.group == "study")]
 
 
 @pytest.mark.parametrize("name", OFFERED)

@@ -11,7 +11,9 @@ import pytest
 
 from wm_drake.errors import InputError
 from wm_drake.live.state import PageState
+from wm_drake.parameters import load_machine
 from wm_drake.studio import jobs as jobs_module
+from wm_drake.studio.answers import picture, picture_runner_of
 from wm_drake.studio.jobs import Jobs
 from wm_drake.studio.machines import Machines
 
@@ -76,6 +78,34 @@ def test_study_with_the_machine_as_argument_runs_and_its_answer_is_shown(jobs, o
     shown = waited(jobs, identifier, "finished")
     assert shown["command"] == "wm-drake study next machine.yaml --out results --budget=2"
     assert shown["answer"] == "Gap 3 < 4 mm."
+
+
+def test_study_is_known_by_its_machine(jobs, opened):
+    machines, machine = opened
+    written = {"gasket.stiffness_x": "4000 N/m"}
+    states = [
+        STATE,
+        STATE.model_copy(update={"values": written, "load": "front"}),
+        STATE.model_copy(update={"values": {}}),
+        STATE.model_copy(update={"gasket": False}),
+    ]
+    started = [jobs.start(machines, machine, state, "gasket", {}) for state in states]
+    marks = [jobs.shown(identifier)["mark"] for identifier in started]
+    assert marks[0] == marks[1]
+    assert len(set(marks)) == 3
+    drawn = [picture(machine, picture_runner_of(machine), state)["mark"] for state in states]
+    assert drawn == marks
+    assert PageState(**jobs.shown(started[0])["chosen"]) == STATE
+
+
+def test_verdict_is_started_and_a_machine_has_its_own_name(jobs, opened):
+    first = jobs.start(*opened, STATE, "verdict", {"samples": "32"})
+    as_it_is = STATE.model_copy(update={"values": {}})
+    second = jobs.start(*opened, as_it_is, "verdict", {"samples": "32"})
+    command = "wm-drake verdict machine.yaml --out results --samples=32"
+    assert jobs.shown(first)["command"] == command
+    names = [load_machine(jobs.folder / one / "machine.yaml").name for one in (first, second)]
+    assert names == ["reference, changed", "reference"]
 
 
 def test_study_is_cancelled_and_continued(jobs, opened):

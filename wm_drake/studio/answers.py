@@ -45,6 +45,7 @@ from wm_drake.simulation.measures.record import foot_loads_of
 from wm_drake.simulation.outputs import point_displacements
 from wm_drake.simulation.records import Record, cabinet_in
 from wm_drake.studies.inputs import friction_warnings
+from wm_drake.studio.saving import mark_of
 
 LANES = WIDTH - 1
 """How many numbers one run turns."""
@@ -97,6 +98,7 @@ def picture(machine: OpenMachine, runner: Runner, state: PageState) -> dict[str,
     main = runs[0]
     return {
         **_motion(main, setup),
+        "mark": mark_of(case.parameters, state),
         "duration": profile.duration,
         "profile": {
             "time": list(profile.time),

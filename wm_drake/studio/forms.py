@@ -12,8 +12,11 @@ from wm_drake.errors import input_error
 from wm_drake.studies.run import input_error_of, options_of_driver
 from wm_drake.studies.study import STUDIES, Study
 
-NOT_OFFERED = {"machine", "sets"}
-"""Options that the page sets itself."""
+NOT_OFFERED = {"machine", "sets", "variant"}
+"""Options that the page sets itself, or that need more than a line."""
+
+OFFERED = ("verdict",)
+"""Studies with a command of their own that a page may start, beside those of the group study."""
 
 _TEXT = re.compile(r"\w[\w.,+ %=-]*")
 """Form of a text that a page may give: no path and no option."""
@@ -24,7 +27,9 @@ def forms() -> dict[str, list[dict[str, Any]]]:
 
     A field has its name, kind (integer, number, boolean, text), description, default, and limits.
     """
-    return {name: _fields(study) for name, study in STUDIES.items() if study.group == "study"}
+    offered = {n: s for n, s in STUDIES.items() if n in OFFERED or s.group == "study"}
+    names = sorted(offered, key=lambda name: name not in OFFERED)
+    return {name: _fields(offered[name]) for name in names}
 
 
 def arguments(name: str, given: dict[str, str]) -> list[str]:

@@ -24,7 +24,7 @@ from wm_drake.report.provenance import now
 from wm_drake.studies.study import STUDIES
 from wm_drake.studio.forms import arguments
 from wm_drake.studio.machines import Machines
-from wm_drake.studio.saving import chosen, write_machine
+from wm_drake.studio.saving import chosen, mark_of, write_machine
 from wm_drake.written_files import unwritable, write_files
 
 MOST_RUNNING = 4
@@ -75,10 +75,20 @@ class Jobs:
         identifier = self._new_folder(study)
         folder = self.folder / identifier
         try:
-            write_machine(folder / "machine.yaml", base, parameters, machine)
+            name = machine.parameters.name
+            is_other = bool(state.values or state.masses or not state.gasket)
+            title = f"{name}, changed" if is_other else name
+            write_machine(folder / "machine.yaml", base, parameters, machine, title)
             given = ["machine.yaml"] if _takes_machine(study) else ["--machine", "machine.yaml"]
-            command = ["study", study, *given, "--out", "results", *words]
-            about = {"study": study, "command": command, "started": now(), "machine": state.machine}
+            command = [*STUDIES[study].command.split(), *given, "--out", "results", *words]
+            about = {
+                "study": study,
+                "command": command,
+                "started": now(),
+                "machine": state.machine,
+                "mark": mark_of(machine.moved(state.values), state),
+                "chosen": state.model_dump(),
+            }
             write_files({folder / "job.json": json.dumps(about, indent=1) + "\n"}, replace=False)
             self._enqueue(identifier, command)
         except WmDrakeError:
@@ -129,6 +139,8 @@ class Jobs:
             "study": about["study"],
             "machine": about["machine"],
             "started": about["started"],
+            "mark": about.get("mark", ""),
+            "chosen": about.get("chosen"),
             "command": " ".join(["wm-drake", *about["command"]]),
             "state": _state(runs, place, has_report),
             "place": place,

@@ -11,6 +11,7 @@ from wm_drake.live.state import DESCRIBED, PageState
 from wm_drake.parameters import MachineParameters, load_machine, machine_path, shipped_machines
 from wm_drake.parameters.files import extended_files, machine_changes, yaml_text
 from wm_drake.report.provenance import now
+from wm_drake.studies.run import machine_text
 from wm_drake.studio.machines import Machines
 from wm_drake.written_files import unwritable, write_files
 
@@ -74,8 +75,22 @@ def chosen(machine: OpenMachine, state: PageState) -> MachineParameters:
     return parameters.model_copy(update=changes)
 
 
+def mark_of(parameters: MachineParameters, state: PageState) -> str:
+    """Return a text that is the same for the same machine: numbers, described load, gasket.
+
+    Args:
+        parameters: The machine with the numbers of the state.
+    """
+    masses = " ".join(mass.model_dump_json() for mass in state.masses)
+    return f"{machine_text(parameters)} {masses} {state.gasket}"
+
+
 def write_machine(
-    path: Path, base: str | Path, parameters: MachineParameters, machine: OpenMachine
+    path: Path,
+    base: str | Path,
+    parameters: MachineParameters,
+    machine: OpenMachine,
+    name: str = "",
 ) -> None:
     """Write a machine file that extends another one and contains only what differs.
 
@@ -83,10 +98,11 @@ def write_machine(
 
     Args:
         base: Name of a shipped machine, or path of the file to extend.
+        name: Name of the new machine; that of the file without.
     """
     extends = base if isinstance(base, str) else os.path.relpath(base.resolve(), path.parent)
     about = f"{machine.parameters.name}, changed in wm-drake studio"[:LONGEST_ABOUT]
-    tree = {"extends": str(extends), "name": path.stem, "about": about}
+    tree = {"extends": str(extends), "name": name or path.stem, "about": about}
     tree |= machine_changes(machine.parameters, parameters)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

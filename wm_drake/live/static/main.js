@@ -31,11 +31,14 @@ let ghost = null;      // the answer of the machine as it was, with the same loa
 let variants = [];     // {name, state, answer}
 let turned = [];       // keys of the seven numbers
 let ranking = [];      // arrows of all numbers
+let rankedOf = '';     // the state for which they were computed, as JSON
+let studies = null;    // the studies of the server, null without one
 let asked = 0;         // number of the latest request
 let settled = 0;       // number of the latest request that has a picture or a problem
 let drawn = 0;         // number of the request whose picture is drawn
 let numbered = 0;      // number of the request whose numbers are shown
 let pending = 0;       // how many requests wait for an answer
+let opening = false;   // whether another machine is being opened
 let refused = '';      // why the machine as it is now has not run, '' if it has
 let notice = '';       // what a link has that is not here
 let keyed = null;      // the slider or the choice that keys move, until something else is used
@@ -82,9 +85,11 @@ async function setState(wanted) {
   await run();
 }
 
-/** Open the machine of a state, which then is that of the page. */
+/** Open the machine of a state, which then is that of the page; until then the one before is pale. */
 async function openMachine(next) {
   status('opening …');
+  opening = true;
+  showWhetherOld();
   const opened = await get(`machine?id=${encodeURIComponent(next.machine)}`);
   if (!next.masses.length && !opened.loads.includes(next.load)) {
     if (next.load) notice = `the machine has no load '${next.load}'; the load with the smallest gap is opened`;
@@ -92,9 +97,11 @@ async function openMachine(next) {
   }
   machine = opened;
   state = next;
+  opening = false;
   list.fill(machine.numbers, machine.parts);
   scene.shapes(machine.shapes);
   turned = [];
+  ranking = [];
   byId('machine').value = state.machine;
   byId('about').textContent = `${machine.name}: ${machine.about}`;
   byId('load').replaceChildren(...[...machine.loads, DESCRIBED].map((name) => make('option', {value: name}, name)));
@@ -154,6 +161,9 @@ function chooseLoad(what) {
 
 async function run() {
   const number = ++asked;
+  for (const id of ['save-result', 'taken', 'command']) byId(id).textContent = ''; // of the state before
+  byId('replace').hidden = true;
+  showWhetherOld();
   showPlace(number);
   await busyWith(async () => {
     await runPicture(number);
@@ -232,6 +242,7 @@ async function showPlace(number) {
 async function runGhost() {
   const as = {...state, values: {}, gasket: true};
   const wanted = JSON.stringify(as);
+  if (runGhost.wanted !== wanted) ghost = null; // that of another load
   runGhost.wanted = wanted;
   try {
     const found = await wholeAnswer('ghost', as);
@@ -247,7 +258,10 @@ async function rank() {
   try {
     const found = await post('ranking', {page: PAGE, state: as, keys: machine.numbers.filter((of) => isDesigned(of, as)).map(({key}) => key)});
     if (found.overtaken) return;
-    if (as.machine === state.machine) ranking = found.arrows;
+    if (as.machine === state.machine) {
+      ranking = found.arrows;
+      rankedOf = JSON.stringify(as);
+    }
     chooseTurned();
   } catch { /* a wrong number is shown by the run itself */ }
   byId('rank').disabled = false;
@@ -269,11 +283,11 @@ function chooseTurned() {
   busyWith(() => runNumbers(asked));
 }
 
-/** Offer every kind of measure of the first answer for the choice of the seven numbers. */
+/** Offer every kind of measure of the machine for the choice of the seven numbers. */
 function offerKinds() {
   const choice = byId('rank-by');
-  if (choice.options.length) return;
   const kinds = [...new Set(answer.rows.map((row) => row.kind))];
+  if (kinds.join() === [...choice.options].map((one) => one.value).join()) return;
   choice.replaceChildren(...kinds.map((kind) => make('option', {value: kind}, kind)));
   if (ranking.length) chooseTurned();
 }
@@ -281,11 +295,14 @@ function offerKinds() {
 /* ---- drawing ---- */
 
 function makePanels() {
-  for (const kind of ['envelopes', 'forces', 'orbits']) byId(kind).replaceChildren();
+  for (const kind of ['envelopes', 'forces', 'orbits', 'measures', 'variants']) byId(kind).replaceChildren();
   for (const range of Object.values(times)) { range.panels.clear(); range.range = null; }
   panels.envelopes = new Map(Object.keys(machine.sensors).map((name) => [name, new BandPanel(byId('envelopes'), name, 'mm', times.envelopes)]));
   panels.forces = new Map();
   panels.orbits = ['front', 'rear'].map((name) => new OrbitPanel(byId('orbits'), name));
+  scene.clear();
+  byId('frame-time').textContent = '';
+  profile.show(machine.numbers, {});
   answer = ghost = null;
   drawn = ++asked; // answers of the machine before are overtaken
   refused = '';
@@ -327,8 +344,13 @@ function showNumbers() {
 
 /** Show what is not that of the machine as it is now paler: table and forces follow the picture. */
 function showWhetherOld() {
-  for (const id of ['measures', 'forces', 'variants']) byId(id).classList.toggle('old', Boolean(refused) || numbered < drawn);
-  for (const id of ['envelopes', 'orbits', 'scene']) byId(id).classList.toggle('old', Boolean(refused));
+  const isOld = opening || Boolean(refused) || drawn < asked;
+  for (const id of ['measures', 'forces', 'variants']) byId(id).classList.toggle('old', isOld || numbered < asked);
+  for (const id of ['envelopes', 'profile', 'orbits', 'scene', 'frame-time']) byId(id).classList.toggle('old', isOld);
+  byId('numbers').classList.toggle('old', opening);
+  byId('verdict').classList.toggle('old', opening || (isOld && !refused)); // a refusal says what its numbers are of
+  byId('ranked').hidden = !ranking.length || rankedOf === JSON.stringify(state);
+  studies?.showWhetherOld(isOld ? '' : answer?.mark);
 }
 
 const verdict = () => showVerdict(byId('verdict'), answer, ghost, refused, showOtherLoad);
@@ -509,7 +531,7 @@ function showVariants() {
     ...Object.entries(of.state.values).map(([key, text]) => `${key} = ${text}`)].filter(Boolean).join('; ');
   const head = columns.map((of, index) => (index === 0 ? make('th', {}, 'now') : make('th', {title: what(of)},
     make('span', {class: `dot v${index - 1}`}), of.name,
-    make('button', {title: 'go back to this variant', onclick: () => goTo(of)}, 'open'),
+    make('button', {title: 'go back to this variant', onclick: () => goTo(`variant ${of.name}`, of.state)}, 'open'),
     make('button', {'aria-label': `remove ${of.name}`, onclick: () => removeVariant(of)}, '×'))));
   const drawnCell = ({text, alarm}) => make('td', {class: alarm ? 'alarm' : ''}, text);
   byId('variants').replaceChildren(
@@ -518,9 +540,9 @@ function showVariants() {
   byId('keep').disabled = variants.length >= MOST_VARIANTS || !answer;
 }
 
-function goTo(variant) {
-  history_.add(`variant ${variant.name}`, variant.state);
-  setState(variant.state);
+function goTo(what, wanted) {
+  history_.add(what, wanted);
+  setState(wanted).catch(fail);
 }
 
 function keepVariant() {
@@ -648,6 +670,8 @@ function listen() {
 }
 
 const fail = (error) => {
+  opening = false;
+  if (state) byId('machine').value = state.machine;
   showRefusal(error);
   status('not opened');
 };
@@ -668,7 +692,9 @@ async function begin() {
   showHistory();
   showLoad();
   await runVariants();
-  if (found.studies) new Studies(found.studies, () => state);
+  if (!found.studies) return;
+  studies = new Studies(found.studies, () => state, goTo);
+  showWhetherOld();
 }
 
 begin().catch(fail);

@@ -148,8 +148,11 @@ export class NumberList {
       const fits = wanted.every((word) => name.includes(word)) && (!onlyMoved || element.classList.contains('moved'));
       element.hidden = !fits && problem.hidden && warning.hidden;
     }
+    const isMostlyZero = (found) => 2 * found.filter(({dataset}) => this.rows.get(dataset.key).number.value === 0).length >= found.length;
     for (const fold of this.folds) {
-      fold.hidden = !fold.querySelector('.number:not([hidden])');
+      const found = [...fold.querySelectorAll('.number:not([hidden])')];
+      fold.hidden = !found.length;
+      fold.style.order = wanted.length && isMostlyZero(found) ? '1' : ''; // what the machine has comes first
       if (wanted.length || onlyMoved) fold.open = !fold.hidden;
     }
   }

@@ -3,8 +3,8 @@
 import {digits, draw} from './dom.js';
 import {roundUp, ticks} from './curves.js';
 
-const WIDTH = 500;
-const HEIGHT = 150;
+const WIDTH = 740; // texts are then as large as those of the other panels
+const HEIGHT = 190;
 const LEFT = 46;
 const RIGHT = 12;
 const TOP = 18;

@@ -95,6 +95,12 @@ export class SceneView {
     this.reach = Math.max(0.1, ...points.map((p) => Math.hypot(...p)));
   }
 
+  /** Draw nothing until the next frame: the machine has not run yet. */
+  clear() {
+    this.pose = null;
+    this.svg.replaceChildren();
+  }
+
   /**
    * Show a frame: pose of the tub (roll, pitch, yaw, x, y, z), angle of the drum and balls of each
    * ring; what turns with the drum, as for `inDrum`; the nearest points [m] if given; `words` say

@@ -6,10 +6,12 @@ import {get, post} from './server.js';
 const PERIOD = 1000;
 
 export class Studies {
-  /** `forms` has the fields of each study; `state()` returns the state of the page. */
-  constructor(forms, state) {
-    this.forms = forms;
-    this.state = state;
+  /**
+   * `forms` has the fields of each study; `state()` returns the state of the page; `goTo(what,
+   * state)` shows another one.
+   */
+  constructor(forms, state, goTo) {
+    Object.assign(this, {forms, state, goTo, all: [], mark: ''});
     byId('study').replaceChildren(...Object.keys(forms).map((name) => make('option', {value: name}, name)));
     byId('study').addEventListener('change', () => this.choose());
     byId('start').addEventListener('click', () => this.start());
@@ -37,12 +39,23 @@ export class Studies {
     await this.act(() => post('studies', {state: this.state(), study: 'next', options: {quick: 'true'}}));
   }
 
-  /** Show the answer of the latest study of what to measure next, or that it runs. */
-  showNext(studies) {
-    const latest = studies.find(({study}) => study === 'next');
-    const path = latest && `reports/${latest.id}/report.html`;
-    byId('next').replaceChildren(...(!latest ? [] : isUnderWay(latest) ? [`${latest.state} …`]
-      : [`${latest.answer || latest.state} `, latest.report ? make('a', {href: path, target: '_blank', rel: 'noopener'}, latest.id) : '']));
+  /** Show studies of another machine than the one that is drawn, which has this mark, paler. */
+  showWhetherOld(mark = '') {
+    this.mark = mark;
+    for (const row of byId('studies').children) row.classList.toggle('old', !this.isOf(row.dataset.mark));
+    this.showNext();
+  }
+
+  isOf(mark) { return Boolean(mark) && mark === this.mark; }
+
+  /** Show what to measure next: of the machine that is drawn, or the latest, paler, with its date. */
+  showNext() {
+    const asked = this.all.filter(({study}) => study === 'next');
+    const shown = asked.find(({mark}) => this.isOf(mark)) ?? asked[0];
+    const isOld = Boolean(shown) && !this.isOf(shown.mark);
+    byId('next').classList.toggle('old', isOld);
+    byId('next').replaceChildren(...(shown ? [isOld ? `${shown.machine} with other numbers, ${shown.started}: ` : '',
+      isUnderWay(shown) ? `${shown.state} …` : `${shown.answer || shown.state} `, shown.report ? reportLink(shown, shown.id) : ''] : []));
   }
 
   async act(request) {
@@ -64,8 +77,9 @@ export class Studies {
       byId('study-problem').textContent = error.message;
       return;
     }
+    this.all = studies;
     byId('studies').replaceChildren(...studies.map((study) => this.row(study)));
-    this.showNext(studies);
+    this.showWhetherOld(this.mark);
     if (studies.some(isUnderWay)) this.timer = setTimeout(() => this.update(), PERIOD);
   }
 
@@ -73,18 +87,22 @@ export class Studies {
     const path = `studies/${study.id}`;
     const running = study.state === 'running';
     const [done, all] = study.progress ?? [0, 0];
-    return make('div', {class: 'study', 'data-study': study.id},
+    return make('div', {class: 'study', 'data-study': study.id, 'data-mark': study.mark},
       make('strong', {}, study.id), ` · ${study.state}${study.place ? `, place ${study.place} of the queue` : ''} · ${study.machine} · started ${study.started} `,
       running ? make('progress', all ? {max: String(all), value: String(done)} : {}) : null,
       running && all ? ` ${done} of ${all} ` : null,
       isUnderWay(study) ? make('button', {onclick: () => this.act(() => post(`${path}/cancel`, {}))}, 'cancel') : null,
       study.state === 'not finished' ? make('button', {onclick: () => this.act(() => post(`${path}/resume`, {}))}, 'continue') : null,
-      study.report ? make('a', {href: `reports/${study.id}/report.html`, target: '_blank', rel: 'noopener'}, 'report') : null,
+      study.report ? reportLink(study, 'report') : null,
+      study.chosen ? make('button', {onclick: () => this.goTo(`machine of ${study.id}`, study.chosen)}, 'show its machine') : null,
       make('div', {}, make('code', {}, study.command)),
       study.answer ? make('p', {}, study.answer) : null,
       study.output ? make('pre', {}, study.output.trim()) : null);
   }
 }
+
+const reportLink = ({id}, words) =>
+  make('a', {href: `reports/${id}/report.html`, target: '_blank', rel: 'noopener'}, words);
 
 /** Return whether a study runs or waits for its turn. */
 function isUnderWay(study) {

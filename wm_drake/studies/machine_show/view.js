@@ -37,14 +37,26 @@ const MachineView = (() => {
     return { thing, line, wide, label };
   });
 
+  const LINE = 15, CHARACTER = 7.5; // height and width of a label's text [px]
+
+  /* The nearest place below that no other label takes. */
+  function free(place, width, taken) {
+    const meets = other => Math.abs(other.y - place.y) < LINE && place.x < other.x + other.width && other.x < place.x + width;
+    while (taken.some(meets)) place.y += 1;
+    taken.push({ ...place, width });
+    return place;
+  }
+
   function draw() {
+    const taken = [];
     for (const { thing, line, wide, label } of drawn) {
       const d = path(thing.lines);
       line.setAttribute("d", d);
       wide.setAttribute("d", thing.kind === "housing" ? "" : d);
       if (!label) continue;
-      const [x, y] = seen(thing.lines[0][thing.lines[0].length - 1]);
-      label.setAttribute("x", x + 5); label.setAttribute("y", y - 5);
+      const [right, down] = seen(thing.lines[0][thing.lines[0].length - 1]);
+      const { x, y } = free({ x: right + 5, y: down - 5 }, CHARACTER * thing.label.length, taken);
+      label.setAttribute("x", x); label.setAttribute("y", y);
     }
   }
 
