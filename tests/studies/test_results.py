@@ -8,7 +8,7 @@ from wm_drake.errors import InputError
 
 @pytest.fixture(scope="module")
 def result():
-    """Return a quick result with four tables."""
+    """Return a quick result with several tables."""
     return wm.run_study("drive", load=["middle"], quick=True, quiet=True)
 
 
@@ -29,5 +29,5 @@ def test_plot_is_a_figure_of_the_page(result):
 
 def test_notebook_shows_each_table_under_its_name(result):
     shown = result._repr_html_()
-    assert [shown.count(f"<h4>{name}</h4>") for name in result.tables()] == [1, 1, 1, 1]
-    assert shown.count("<table") == 4
+    assert [shown.count(f"<h4>{name}</h4>") for name in result.tables()] == [1] * len(result.tables())
+    assert shown.count("<table") == len(result.tables()) > 1
