@@ -19,6 +19,7 @@ from wm_drake.errors import input_error, reason_of
 from wm_drake.parameters.text_files import is_file
 from wm_drake.report.provenance import now, source_revision, version
 from wm_drake.studies.result_folder import LEDGER
+from wm_drake.written_files import write_files
 
 if TYPE_CHECKING:
     from wm_drake.parameters import MachineParameters
@@ -55,14 +56,17 @@ class Archived(NamedTuple):
     run: Mapping[str, Any]
 
 
-def write_archive(path: Path, study: Archived, result: "Answer", ledger: Path | None) -> None:
+def write_archive(
+    path: Path, study: Archived, result: "Answer", ledger: Path | None, *, replace: bool
+) -> None:
     """Write the archive of a study.
 
     Args:
         ledger: Closed ledger of its runs, if it has one.
+        replace: Whether a file that exists is replaced.
 
     Raises:
-        InputError: the file cannot be written.
+        InputError: the file exists already or cannot be written.
     """
     content, names = dict[str, bytes](), dict[str, str]()
     options = _packed(study.options, content, names)
@@ -80,19 +84,18 @@ def write_archive(path: Path, study: Archived, result: "Answer", ledger: Path | 
         "files": names,
         "run": dict(study.run),
     }
-    try:
-        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
-            archive.writestr(ABOUT, json.dumps(about, indent=1))
-            for number, one in enumerate(machines):
-                archive.writestr(f"machine_{number}.json", json.dumps(one))
-            for name, data in content.items():
-                archive.writestr(name, data)
-            for name, table in result.tables().items():
-                archive.writestr(f"{TABLES}{name}.csv", _csv(table))
-            if ledger is not None and ledger.exists():
-                archive.write(ledger, LEDGER)
-    except OSError as error:
-        raise input_error(reason_of(error), where=str(path)) from None
+    whole = io.BytesIO()
+    with zipfile.ZipFile(whole, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr(ABOUT, json.dumps(about, indent=1))
+        for number, one in enumerate(machines):
+            archive.writestr(f"machine_{number}.json", json.dumps(one))
+        for name, data in content.items():
+            archive.writestr(name, data)
+        for name, table in result.tables().items():
+            archive.writestr(f"{TABLES}{name}.csv", _csv(table))
+        if ledger is not None and ledger.exists():
+            archive.write(ledger, LEDGER)
+    write_files({path: whole.getvalue()}, replace=replace)
 
 
 def libraries() -> dict[str, str]:

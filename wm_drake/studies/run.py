@@ -44,6 +44,7 @@ from wm_drake.studies.study import (
     Study,
     option,
 )
+from wm_drake.written_files import check_new
 
 if TYPE_CHECKING:  # importing Drake takes a second, too long for --help
     from wm_drake.batch.ledger import Ledger
@@ -222,10 +223,8 @@ def execute(order: Order) -> tuple["Answer", Facts, tuple[str, ...]]:
 
 def _executed(order: Order) -> tuple["Answer", Facts, tuple[str, ...]]:
     begin, study, options = time.perf_counter(), order.study, order.options
-    archive = order.run.archive
-    if archive is not None and archive.exists() and not order.run.overwrite:
-        message = "exists; add --overwrite to replace it, or choose another file with --archive"
-        raise input_error(message, where=str(archive))
+    archive, replaces = order.run.archive, order.run.overwrite
+    check_new(filter(None, [archive]), replace=replaces)
     machines = tuple(_machine_of(order, name) for name in order.machines)
     machine = machines[0] if len(machines) == 1 else None
     given = getattr(options, "profile", None)
@@ -263,7 +262,7 @@ def _executed(order: Order) -> tuple["Answer", Facts, tuple[str, ...]]:
         from wm_drake.studies.archive import write_archive  # most studies have none
 
         ledger = None if order.run.out is None else order.run.out / LEDGER
-        write_archive(archive, _archived(order), result, ledger)
+        write_archive(archive, _archived(order), result, ledger, replace=replaces)
     return result, facts, files
 
 

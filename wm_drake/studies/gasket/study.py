@@ -58,7 +58,7 @@ class GasketTrials:
 
     @cached_property
     def parameters(self) -> MachineParameters:
-        """The machine at level 0 of all factors; only the factors change."""
+        """Machine at level 0 of all factors; only the factors change."""
         return self.varying.at_levels([0] * len(self.factors))
 
     @property

@@ -22,8 +22,8 @@ class SampleShare:
     Attributes:
         count: Number of samples with the property.
         lower, upper: Ends of the 95 % interval. That of Clopper and Pearson holds in 95 of 100
-            repeats at least, in 97 to 99 for rare properties; that of Wilson in 95 on average, in 89
-            to 98 where 0.2 to 8 samples with the property are expected, in fewer below that.
+            repeats at least, in 97 to 99 for rare properties; that of Wilson in 95 on average, in
+            89 to 98 where 0.2 to 8 samples with the property are expected, in fewer below that.
     """
 
     count: int
