@@ -107,6 +107,7 @@ def test_package_and_bodies_come_from_the_wheel(python, tmp_path):
 EACH_COMMAND = """
 machine list --json
 machine schema file
+cite --format bibtex
 machine new mine --tub-mass '40 kg' --springs 2
 machine check mine.yaml
 machine show mine.yaml
@@ -131,7 +132,8 @@ study cycle --profile short_cycle.yaml --out cycle
 study design gasket --quick --profile short_cycle.yaml --out design
 study detect --quick --out detect
 study drive --quick --load middle --out drive
-study gasket --quick --response D --profile short_cycle.yaml --out gasket
+study gasket --quick --response D --profile short_cycle.yaml --archive gasket.zip --out gasket
+rerun gasket.zip --out gasket_again
 study gasket-damping --mesh 20 --record middle=spin/record_middle.nc --out gasket_damping
 study gasket-geometry --quick --profile short_cycle.yaml --out gasket_geometry
 study modes --quick --out modes
