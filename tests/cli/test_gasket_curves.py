@@ -28,6 +28,33 @@ def drawing(**changes):
 
 
 @pytest.mark.slow
+def test_the_shipped_machine_has_the_curves_of_its_drawing(wm_drake):
+    sizes = ("--points", "2", "--twist", "2.5 deg", "--tilt", "0.75 deg")
+    ended = wm_drake(
+        "gasket",
+        "curves",
+        "folded",
+        *sizes,
+        "--axial",
+        "2.25 mm",
+        "--radial",
+        "3 mm",
+        "--out",
+        "out",
+    )
+    assert ended.code == 0, ended.err
+    found, shipped = (load_machine(m).gasket for m in ("out/machine.yaml", "reference_folded"))
+    for axis in "xyz":
+        for kind in ("stiffness", "rotational_stiffness"):
+            table, whole = (getattr(gasket, f"{kind}_{axis}") for gasket in (found, shipped))
+            x, y = map(np.array, table.curve)
+            np.testing.assert_allclose(y, whole.values(x), rtol=2e-3, atol=2e-3 * max(y))
+    assert found.cross_stiffness_x_about_z == pytest.approx(
+        shipped.cross_stiffness_x_about_z, rel=1e-3
+    )
+
+
+@pytest.mark.slow
 def test_curves_of_a_drawing_give_a_machine_that_spins(wm_drake):
     ended = wm_drake("gasket", "curves", "folded", *SMALL, "--out", "out")
     assert ended.code == 0, ended.err

@@ -44,6 +44,7 @@ ALIKE = {
     "reference": "test_fmu.py runs it",
     "light_cabinet": "the machine of rubber has its feet",
     "heavy_cabinet": "other numbers of light_cabinet",
+    "reference_folded": "other curves of the gasket of reference",
     "reference_sponge": "a law of dampers whose derivatives both engines share in tests/elements",
     "rodrigues_2010": "two bushings alone",
     "free_stroke": TOGETHER,

@@ -29,5 +29,7 @@ def test_plot_is_a_figure_of_the_page(result):
 
 def test_notebook_shows_each_table_under_its_name(result):
     shown = result._repr_html_()
-    assert [shown.count(f"<h4>{name}</h4>") for name in result.tables()] == [1] * len(result.tables())
+    assert [shown.count(f"<h4>{name}</h4>") for name in result.tables()] == [1] * len(
+        result.tables()
+    )
     assert shown.count("<table") == len(result.tables()) > 1
