@@ -20,7 +20,10 @@ def rerun(
         bool, typer.Option("--overwrite", help="Replace earlier results in the folder.")
     ] = False,
 ) -> None:
-    """Run the study of an archive again, and say what differs; exit code 1 if anything does."""
+    """Run the study of an archive again, and say what differs.
+
+    The exit code is 1 if anything does.
+    """
     from wm_drake.errors import check_known
     from wm_drake.studies.archive import differences, libraries, read_archive
     from wm_drake.studies.run import execute, order_of
