@@ -56,8 +56,8 @@ COMMANDS = {
         "wm_drake.studies.rig.options:RIG",
         "Test a component on a bench: harmonic motion, steady force loops.",
     ),
-    "rerun": ("wm_drake.cli.rerun:rerun", "Run the study of an archive again, and say what differs."),
-    "cite": ("wm_drake.cli.cite:cite", "Print how to cite the program and the papers of its equations."),
+    "rerun": ("wm_drake.cli.rerun:rerun", "Run the study of an archive again, and compare."),
+    "cite": ("wm_drake.cli.cite:cite", "Print how to cite the program and its papers."),
     "study": ("wm_drake.cli.components:app", "Run a study of many runs and write a report."),
 }
 """Home and line of help of each command: a function, declared studies, or a group of commands."""

@@ -22,7 +22,7 @@ class Form(StrEnum):
 def cite(
     form: Annotated[Form, typer.Option("--format", help="bibtex or cff.")] = Form.bibtex,
 ) -> None:
-    """Print how to cite the program and the papers of its equations."""
+    """Print how to cite the program and its papers."""
     text = CITATION.read_text(encoding="utf-8")
     typer.echo(text if form is Form.cff else bibtex(text), nl=False)
 

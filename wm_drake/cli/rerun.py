@@ -20,9 +20,9 @@ def rerun(
         bool, typer.Option("--overwrite", help="Replace earlier results in the folder.")
     ] = False,
 ) -> None:
-    """Run the study of an archive again, and say what differs.
+    """Run the study of an archive again, and compare.
 
-    The exit code is 1 if anything does.
+    Say what differs; the exit code is 1 if anything does.
     """
     from wm_drake.errors import check_known
     from wm_drake.studies.archive import differences, libraries, read_archive
