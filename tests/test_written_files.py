@@ -143,6 +143,7 @@ INTO_TEMPORARY = {
     "compiler/cache_files", "compiler/kept", "simulation/first_call",  # compiled code
     "export/fmu", "model/sdf_files",  # a temporary folder
     "written_files", "studies/result_folder",  # the two homes
+    "studies/archive",  # a text in memory
     "report/publication", "studies/answer", "studies/run", "studies/spin/study", "studies/study",
     "studio/jobs",  # the output of a process while it runs
 }  # fmt: skip

@@ -198,7 +198,7 @@ CASES = {  # command -> arguments, message, more files
         ("--design d-optmal", "--design: 'd-optmal' is neither a kind of design nor a file (did you mean"),
         ("--design d-optimal --trials 10", "10 trials cannot determine the 19 coefficients"),
         ("--design d-optimal --trials 19", "19 trials for 19 coefficients of main+2fi leave no degree of freedom"),
-        ("--model mian", "unknown model 'mian' (did you mean 'main'?"),
+        ("--model mian", "no model 'mian' of this design (did you mean 'main'?"),
         ("--factor gasket.stifness_x", "gasket.stifness_x: unknown key 'stifness_x' (did you mean 'stiffness_x'?"),
         ("--factor K_Lx", "--factor: 'K_Lx' is given twice"),
         ("--response gpa", "--response: no response 'gpa' (did you mean 'gap'"),

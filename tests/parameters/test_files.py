@@ -265,10 +265,11 @@ def test_machine_that_extends_itself_is_refused(write):
 
 
 def test_missing_machine_is_refused_with_the_nearest(tmp_path):
-    assert refused("refrence") == [
+    (message,) = refused("refrence")
+    assert message.startswith(
         "refrence: no such file, and no shipped machine of that name (did you mean 'reference'? "
-        f"known: {', '.join(shipped_machines())})"
-    ]
+        "known: reference, "
+    )
     assert refused(tmp_path)[0].startswith(f"{tmp_path}: is a folder")
 
 

@@ -203,7 +203,8 @@ class DocumentedSchema(GenerateJsonSchema):
 class _FileSchema(DocumentedSchema):
     """JSON schema of a file that may extend another one.
 
-    No key is required, any value may be null, which removes it, and each group may have a source.
+    No key is required, any value may be null, which removes it, and each group may have a source. A
+    key of another law or kind may be null: it removes that of the extended machine.
     """
 
     def field_is_required(self, *_: Any, **_named: Any) -> bool:
@@ -225,6 +226,8 @@ class _FileSchema(DocumentedSchema):
             return {"anyOf": [self.generate_inner(k.__pydantic_core_schema__) for k in kinds]}
         group = super().model_schema(schema)
         keys = {name: _or_null(value) for name, value in group.get("properties", {}).items()}
+        if group.get("additionalProperties") is False:
+            group = {**group, "additionalProperties": {"type": "null"}}
         return {**group, "properties": {**keys, **_SOURCE}}
 
     def dict_schema(self, schema: core_schema.DictSchema) -> JsonSchemaValue:

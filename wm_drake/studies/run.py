@@ -153,7 +153,7 @@ def run_study(name: str, machine: Any = None, *, quiet: bool = False, **options:
         >>> import wm_drake as wm
         >>> result = wm.run_study("drive", load=["middle"], quick=True, quiet=True)
         >>> list(result.tables())
-        ['map', 'estimation', 'thresholds', 'errors']
+        ['map', 'thresholds']
     """
     study = STUDIES.find(name)
     several = machine if isinstance(machine, (list, tuple)) else [machine]
