@@ -37,6 +37,9 @@ SAME = 1e-6
 """Difference of two numbers, relative to the largest of their column, up to which they count as the
 same: tables have nine digits, and other processors round otherwise."""
 
+TIMES = "wall_s"
+"""Column with the time that a run took, which is another one each time."""
+
 
 class Archived(NamedTuple):
     """Study in an archive.
@@ -214,6 +217,7 @@ def differences(
             yield f"{name}: is only in the {'new result' if name in after else 'archive'}"
             continue
         one, other = before[name], pd.read_csv(io.StringIO(_with_names(_csv(after[name]), names)))
+        one, other = (table.drop(columns=TIMES, errors="ignore") for table in (one, other))
         if list(one.columns) != list(other.columns) or len(one) != len(other):
             yield f"{name}: has other columns or another number of rows"
             continue
