@@ -63,7 +63,7 @@ class GasketTrials:
 
     @property
     def factors(self) -> tuple[Varied, ...]:
-        """The factors."""
+        """Return the factors."""
         return self.varying.every
 
     @cached_property
