@@ -1,5 +1,8 @@
 """The page of an exported machine: what it has, what it refuses, and that no name is markup."""
 
+import base64
+import gzip
+import hashlib
 import json
 import re
 
@@ -12,6 +15,7 @@ from wm_drake.errors import InputError
 from wm_drake.live import exported
 from wm_drake.live.exported import bundled, export_page
 from wm_drake.parameters import SpinProfile
+from wm_drake.report.scripts import Scripts
 from wm_drake.simulation.cases import Case
 
 
@@ -69,6 +73,21 @@ def test_the_page_reaches_nothing(tmp_path, monkeypatch):
     text = (tmp_path / "machine.html").read_text(encoding="utf-8")
     assert not re.search(r'(?:src|href)="(?!data:)', text)
     assert "default-src &#x27;none&#x27;" in text
+
+
+def test_a_report_allows_the_page_in_its_frame_and_nothing_of_its_texts(monkeypatch, reference):
+    bad = "sha256-bad' https://elsewhere"
+    monkeypatch.setattr(exported, "page_data", lambda parameters: SMALLEST | {"name": bad})
+    page, _ = exported.page_text(reference)
+    scripts = Scripts()
+    packed = scripts.framed(page)
+    assert gzip.decompress(base64.b64decode(packed)).decode() == page
+    script = re.search(r'<script type="module">(.*?)</script>', page, re.DOTALL)[1]
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    assert f"'sha256-{digest}'" in scripts.policy()
+    assert "bad" not in scripts.policy()
+    assert "frame-src blob:" in scripts.policy()
+    assert "frame-src" not in Scripts().policy()
 
 
 def test_live_needs_one_variant():

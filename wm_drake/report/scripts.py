@@ -10,6 +10,7 @@ import gzip
 import hashlib
 import importlib.metadata
 import importlib.util
+import re
 from pathlib import Path
 
 from markupsafe import Markup
@@ -20,9 +21,15 @@ FOLDER = Path(__file__).parent
 
 POLICY = (
     "default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; "
-    "script-src blob: {scripts}; base-uri 'none'; form-action 'none'"
+    "script-src blob: {scripts}; {frames}base-uri 'none'; form-action 'none'"
 )
 """What a page may do: show its own images and styles, and run the scripts with these hashes."""
+
+FRAMES = "frame-src blob:; worker-src blob:; "
+"""What a page with another one in a frame may do beside that."""
+
+_POLICY = re.compile(r'http-equiv="Content-Security-Policy" content="([^"]*)"')
+_HASH = re.compile(r"sha256-[\w+/]+=*")
 
 
 class Scripts:
@@ -31,6 +38,7 @@ class Scripts:
     def __init__(self) -> None:
         """Begin a page without scripts."""
         self._allowed: list[str] = []
+        self._frames = ""
 
     def file(self, path: str | Path) -> Markup:
         """Return a script as an element, and allow it.
@@ -50,9 +58,23 @@ class Scripts:
         self._allowed.append(f"'sha256-{digest}'")
         return Markup(f"<script>{text}</script>")
 
+    def framed(self, page: str) -> str:
+        """Return a page, gzip-packed as Base64 text, and allow what it does in a frame.
+
+        A frame inherits the policy of the page around it.
+
+        Args:
+            page: A page with a policy, which begins with it. It may use WebAssembly and workers.
+        """
+        policy = _POLICY.search(page)
+        hashes = _HASH.findall(policy[1]) if policy else []
+        self._allowed += ["'wasm-unsafe-eval'", *(f"'{digest}'" for digest in hashes)]
+        self._frames = FRAMES
+        return base64.b64encode(gzip.compress(page.encode(), 6, mtime=0)).decode()
+
     def policy(self) -> str:
         """Return the policy of the page, with the scripts that were added before."""
-        return POLICY.format(scripts=" ".join(dict.fromkeys(self._allowed)))
+        return POLICY.format(scripts=" ".join(dict.fromkeys(self._allowed)), frames=self._frames)
 
 
 @functools.cache
