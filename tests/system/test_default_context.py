@@ -97,7 +97,10 @@ def test_numbers_of_the_built_machine_do_not_stay_in_a_set_up(machine, reference
     ],
 )
 def test_a_plain_simulator_moves_as_the_compiled_engine(name):
-    """Compare the sensors after 3 s of Drake's default integrator with those at a fine step."""
+    """Compare the sensors after 3 s of Drake's default integrator with those at a fine step.
+
+    The default accuracy of 1e-4 leaves 1 um (`reference_folded`); with 1e-6 it is 0.02 um.
+    """
     machine = build_machine(name)
     simulator = Simulator(machine.diagram)
     simulator.AdvanceTo(3.0)
@@ -109,7 +112,7 @@ def test_a_plain_simulator_moves_as_the_compiled_engine(name):
     found = machine.diagram.GetOutputPort("displacement").Eval(simulator.get_context())
     size = float(np.abs(record.displacement).max())
     np.testing.assert_allclose(
-        found, record.displacement[-1], rtol=0.0, atol=max(1e-6, 3e-4 * size)
+        found, record.displacement[-1], rtol=0.0, atol=max(2e-6, 3e-4 * size)
     )
 
 
