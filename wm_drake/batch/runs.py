@@ -18,14 +18,13 @@ from wm_drake.engines import DEFAULT_ENGINE
 from wm_drake.engines.compiled.local_error import SUMS_SIZE, estimates_of
 from wm_drake.engines.compiled.mechanics import DRUM_ANGLE, DRUM_RATE, STATE_SIZE
 from wm_drake.engines.compiled.run import RunLanes, integrate_runs
-from wm_drake.engines.compiled.samples import trajectory_of
+from wm_drake.engines.compiled.samples import torque_at_samples, trajectory_of
 from wm_drake.engines.memory import available_memory, needed_memory
 from wm_drake.engines.schedule import Schedule, schedule_of
 from wm_drake.engines.trajectory import (
     LARGEST_ANGLE,
     LARGEST_DISPLACEMENT,
     Divergence,
-    Trajectory,
     divergence_text,
     diverging_coordinate,
 )
@@ -510,11 +509,6 @@ class LaneRun(Run):
     def time(self) -> FloatArray:
         return self.schedule.time[: self.good]
 
-    @functools.cached_property
-    def _trajectory(self) -> Trajectory:
-        samples = np.ascontiguousarray(self.lane.samples)
-        return trajectory_of(samples, self.schedule, self.item.packed, self.item.layout)
-
     @property
     def drum_angle(self) -> FloatArray:
         return self.lane.samples[: self.good, DRUM_ANGLE]
@@ -525,7 +519,9 @@ class LaneRun(Run):
 
     @property
     def motor_torque(self) -> FloatArray:
-        return self._trajectory.motor_torque
+        samples = np.ascontiguousarray(self.lane.samples)
+        of_run = samples, self.schedule, self.item.packed, self.item.layout
+        return torque_at_samples(*of_run)[: self.good]
 
     @property
     def largest(self) -> FloatArray:

@@ -39,42 +39,58 @@ def trajectory_of(
         p, layout: From `pack`.
     """
     states, rates = np.split(samples, [layout.states.size], axis=1)
-    motion, carrier, stretches = (
-        layout.states.take(states, kind) for kind in (TUB, CARRIER, STRETCHES)
-    )
-    cabinet, of_tub = layout.states.cabinet(states), rates[:, :RATES_SIZE]
-    of_carrier = rates[:, RATES_SIZE : 2 * RATES_SIZE] if carrier.shape[1] else of_tub
-    moving, turning = None, _motion_of_drum_and_carrier(motion, carrier)
-    if cabinet is not None:
+    carrier, cabinet = layout.states.take(states, CARRIER), layout.states.cabinet(states)
+    torque = torque_at_samples(samples, schedule, p, layout)
+    if cabinet is not None and carrier.shape[1]:
+        # samples have the carrier in W, and the tub seen from the cabinet
         in_world = cabinet[:, :BODY_STATE_SIZE], rates[:, -RATES_SIZE:]
-        if carrier.shape[1]:  # samples have the carrier in W, and the tub seen from the cabinet
-            carrier, _ = seen_from_cabinet(*in_world, carrier, of_carrier)
-        else:
-            moving = np.hstack(in_world)
-    torque: FloatArray = np.empty((len(samples), 1))
-    if layout.motor >= 0:
-        torque = torque_of_motor(states, schedule, p, layout)
-    else:
-        drum_acceleration = schedule.acceleration[schedule.row >= 0, None]
-        left = np.ascontiguousarray(layout.states.take(states, WATER))
-        motions = turning, of_carrier, drum_acceleration, left
-        torque_history(*motions, p, moving, layout.elements.water, torque)
-        if any(kind.on_drum for kind in layout.kinds):
-            subtract_torque_of_elements(states, p, layout.mounts.others, torque)
+        carrier, _ = seen_from_cabinet(*in_world, carrier, rates[:, RATES_SIZE : 2 * RATES_SIZE])
     trajectory = Trajectory(
         schedule.time,
-        motion,
+        layout.states.take(states, TUB),
         layout.states.deformation(states),
-        torque[:, 0],
-        of_tub,
+        torque,
+        rates[:, :RATES_SIZE],
         layout.states.tubes(states),
         carrier,
-        stretches,
+        layout.states.take(states, STRETCHES),
         cabinet=cabinet,
         element_states=layout.states.take(states, ELEMENT) if layout.kinds else None,
         water=layout.states.take(states, WATER) if layout.water else None,
     )
     return cut_at_divergence(trajectory)
+
+
+def torque_at_samples(
+    samples: FloatArray, schedule: Schedule, p: FloatArray, layout: Layout
+) -> FloatArray:
+    """Return the torque of the motor on the drum at all samples (n,). [N m]
+
+    Args:
+        samples, schedule, p, layout: See `trajectory_of`.
+    """
+    states, rates = np.split(samples, [layout.states.size], axis=1)
+    if layout.motor >= 0:
+        return torque_of_motor(states, schedule, p, layout)[:, 0]
+    motion, carrier = layout.states.take(states, TUB), layout.states.take(states, CARRIER)
+    begin = RATES_SIZE if carrier.shape[1] else 0
+    cabinet, moving = layout.states.cabinet(states), None
+    if cabinet is not None and not carrier.shape[1]:
+        moving = np.hstack([cabinet[:, :BODY_STATE_SIZE], rates[:, -RATES_SIZE:]])
+    torque: FloatArray = np.empty((len(samples), 1))
+    torque_history(
+        _motion_of_drum_and_carrier(motion, carrier),
+        rates[:, begin : begin + RATES_SIZE],
+        schedule.acceleration[schedule.row >= 0, None],
+        np.ascontiguousarray(layout.states.take(states, WATER)),
+        p,
+        moving,
+        layout.elements.water,
+        torque,
+    )
+    if any(kind.on_drum for kind in layout.kinds):
+        subtract_torque_of_elements(states, p, layout.mounts.others, torque)
+    return torque[:, 0]
 
 
 def torque_of_motor(
