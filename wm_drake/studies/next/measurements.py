@@ -25,6 +25,7 @@ from wm_drake.parameters.candidates import (
     NumberCandidate,
     RunCandidate,
 )
+from wm_drake.parameters.components import ComponentParameters
 from wm_drake.parameters.elements import BushingType, CurveTable
 from wm_drake.parameters.keys import field_at, unit_of
 from wm_drake.parameters.types import FloatArray
@@ -175,13 +176,14 @@ def _of_bench(
         check_known(candidate.component, known, message, key="component")
     share = _share(candidate.accuracy)
     for component in (key for key in known if fnmatchcase(key, candidate.component)):
-        is_bushing = isinstance(value_at(parameters, component), BushingType)
+        described = value_at(parameters, component)
+        is_bushing = isinstance(described, BushingType)
         if is_bushing and not candidate.axes:
             raise input_error("is missing; write for example [x, y, about_y]", key="axes")
         for axis in candidate.axes if is_bushing else ("",):
             label = shape_name(axis or component.partition(".")[2])
             loops = _Loops(component, axis, tuple(_motions(candidate, axis)))
-            loops.bench(parameters)  # the axis is checked
+            loops.bench(described)  # the axis is checked
             yield _measurement(
                 f"{name}.{label}", candidate, label, _of_moduli(share), loops.numbers
             )
@@ -203,19 +205,24 @@ class _Loops:
     axis: str
     motions: tuple[Harmonic, ...]
 
-    def bench(self, parameters: MachineParameters) -> Bench:
-        """Return the component of a machine on the bench."""
-        component = value_at(parameters, self.component)
-        return bushing_bench(component, self.axis) if self.axis else damper_bench(component)
+    def bench(self, component: ComponentParameters) -> Bench:
+        """Return a component on the bench."""
+        if isinstance(component, BushingType):
+            return bushing_bench(component, self.axis)
+        return damper_bench(component)
 
     def numbers(self, machines: TriedMachines) -> FloatArray:
-        """Return the moduli of machines. (machines, 2 loops)"""
-        rows = []
-        for parameters in machines.parameters:
-            loops = map(measures_of, force_loops(self.bench(parameters), self.motions))
-            moduli = [m.dynamic_stiffness * np.exp(1j * m.loss_angle) for m in loops]
-            rows.append([part for z in moduli for part in (z.real, z.imag)])
-        return np.array(rows)
+        """Return the moduli of machines, of which many share the component. (machines, 2 loops)"""
+        components = [value_at(parameters, self.component) for parameters in machines.parameters]
+        texts = [component.model_dump_json() for component in components]
+        moduli = {t: self._moduli(c) for t, c in dict(zip(texts, components, strict=True)).items()}
+        return np.array([moduli[text] for text in texts])
+
+    def _moduli(self, component: ComponentParameters) -> list[float]:
+        """Return the moduli of a component. (2 loops)"""
+        loops = map(measures_of, force_loops(self.bench(component), self.motions))
+        moduli = [m.dynamic_stiffness * np.exp(1j * m.loss_angle) for m in loops]
+        return [part for z in moduli for part in (z.real, z.imag)]
 
 
 def _of_moduli(share: float) -> Callable[[FloatArray], FloatArray]:
