@@ -3,12 +3,15 @@
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
 from wm_drake.errors import input_error, nearest_names
+from wm_drake.model.bodies import sdf_path
 from wm_drake.model.scene import Scene
+from wm_drake.model.sdf_files import sdf_roots
 from wm_drake.parameters import MachineParameters, SpinProfile
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
@@ -165,5 +168,15 @@ def measures_of(parameters: MachineParameters, responses: Iterable[Response]) ->
 
 
 def has_gap(parameters: MachineParameters) -> bool:
-    """Return whether the SDF has shapes on both the tub and the housing."""
-    return bool(Scene(parameters).pair_names())
+    """Return whether the SDF has shapes on both the tub and the housing.
+
+    Its files are read again only if one of them has changed: their shapes take a while to build.
+    """
+    files = tuple((file, file.stat().st_mtime_ns) for file in sdf_roots(sdf_path(parameters.model)))
+    if files not in _HAVE_PAIRS:
+        _HAVE_PAIRS[files] = bool(Scene(parameters).pair_names())
+    return _HAVE_PAIRS[files]
+
+
+_HAVE_PAIRS: dict[tuple[tuple[Path, int], ...], bool] = {}
+"""Answers of `has_gap`, by the files of the SDF and when they were changed."""
