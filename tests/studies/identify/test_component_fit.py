@@ -20,7 +20,9 @@ from wm_drake.studies.components import Target
 from wm_drake.studies.fitting.methods import METHODS, identify
 from wm_drake.studies.fitting.page import estimates_of
 from wm_drake.studies.identify.fragment import Destination, fragment
+from wm_drake.studies.identify.inputs import given_by_law
 from wm_drake.studies.identify.models import Given, TestedAxis, bushing_model, damper_model
+from wm_drake.studies.identify.options import IdentifyOptions
 from wm_drake.studies.identify.problem import fit_problem
 
 MSTV = load_component("mstv_damper").parameters
@@ -308,6 +310,13 @@ def test_a_number_that_is_kept_by_default_is_searched_between_the_users_bounds()
         assert found[name].logarithmic
     bench = model.bench(np.array([unknown.upper for unknown in model.unknowns]))
     assert law_numbers(bench.packed).friction_damping == 200.0
+
+
+def test_bounds_are_a_range_of_either_form():
+    forms = ("friction_force=(50, 100) N", "friction_force=50 N..0.1 kN")
+    given = [given_by_law("mstv", "", IdentifyOptions(files=(), bounds=(form,))) for form in forms]
+    assert given[0] == given[1]
+    assert given[0]["mstv"].bounds == {"friction_force": (50.0, 100.0)}
 
 
 @pytest.mark.slow

@@ -7,6 +7,7 @@ from pathlib import Path
 from wm_drake.errors import InputError, Problem, check_known, input_error, nearest_names
 from wm_drake.parameters import DAMPER_LAWS, MeasuredLoop, quantities, read_loops
 from wm_drake.parameters.units import Share, Unit
+from wm_drake.parameters.variation import range_of
 from wm_drake.report.quantity import MASS, Quantity
 from wm_drake.report.terminal import say
 from wm_drake.rigs.measured import MeasuredMotion, inertia_share, measured_motion, without_inertia
@@ -141,14 +142,12 @@ def kept_fields(target: Target, law: str, given: Given) -> dict[str, float]:
 def _ranges(entries: Sequence[str]) -> dict[str, tuple[float, float]]:
     ranges = {}
     for key, text in pairs_of(entries, "--bounds"):
-        values = quantities_of(text, _unit_of_field(key, "--bounds"), "--bounds")
-        if len(values) != 2:
-            raise input_error(
-                f"'{text}' is not a range; write for example '(50, 300) N/mm'",
-                where="--bounds",
-                key=key,
-            )
-        ranges[key] = (values[0], values[1])
+        unit, ends = _unit_of_field(key, "--bounds"), range_of(text)
+        if ends is None:
+            message = f"'{text}' is not a range; write for example '(50, 300) N/mm'"
+            raise input_error(message, where="--bounds", key=key)
+        low, high = (quantities_of(end, unit, "--bounds")[0] for end in ends)
+        ranges[key] = (low, high)
     return ranges
 
 

@@ -24,7 +24,9 @@ class IdentifyOptions(ComponentOptions):
     )
     method: str = option("least-squares", "least-squares, response-surface or evolution.", "NAME")
     bounds: tuple[str, ...] = option(
-        (), "Of an unknown: sponge_stiffness='(50, 300) N/mm'. Repeatable.", "KEY=RANGE"
+        (),
+        "Of an unknown: sponge_stiffness='(50, 300) N/mm' or LOW..HIGH. Repeatable.",
+        "KEY=RANGE",
     )
     fix: tuple[str, ...] = option(
         (), "A number that is known: slider_damping='0.4 N s/mm'. Repeatable.", "KEY=VALUE"
