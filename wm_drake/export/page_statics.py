@@ -31,7 +31,7 @@ from wm_drake.export.kernel import (
 from wm_drake.export.page_plan import BODY_CONSTANTS, BODY_SIZE, FREE_LENGTH, PUSHES, SOLVED, SUMS
 from wm_drake.laws.feet import normal_loads
 from wm_drake.laws.table import stiffness_force
-from wm_drake.model.tub_statics import balance_tub, weight_wrench, wrench_on_tub
+from wm_drake.model.tub_statics import balance_tub, weight_wrench, wrenches_on_tub
 
 REMAINING = 1e-10
 """Largest force [N] or moment [N m] that remains on the tub at rest."""
@@ -148,8 +148,8 @@ def settler(plan: Any, set_taut: Any) -> Any:
     """
     at, size, limits, resting = plan.at, plan.elements.begins.size, plan.limits, plan.resting
     numbers, wrenches = plan.count.numbers, WRENCH_SIZE * _resting_count(plan)
-    on_tub = for_one_run(wrench_on_tub)
-    balance = for_one_run(balance_tub, wrench_on_tub=on_tub)
+    on_tub = for_one_run(wrenches_on_tub)
+    balance = for_one_run(balance_tub, wrenches_on_tub=on_tub)
     preload_springs = _preloads(plan, set_taut)
 
     @njit(**OPTIONS)
@@ -159,11 +159,12 @@ def settler(plan: Any, set_taut: Any) -> Any:
         for k in range(size):
             trial[k] = state[k] if k >= 6 else 0.0
         packed, weight = part(v, at.packed, numbers), weight_of_bodies(p)
-        status = preload_springs(v, on_tub(trial, packed, resting, weight, of_mounts))
+        left = part(v, at.extremes, 6)
+        on_tub(trial, packed, resting, weight, of_mounts, left)
+        status = preload_springs(v, left)
         if status < 0.0:
             return status
-        slopes, step = part(v, at.slopes, 36), part(v, at.step, 6)
-        left = balance(trial, packed, resting, weight, REMAINING, of_mounts, slopes, step)
+        balance(trial, packed, resting, weight, REMAINING, of_mounts, left)
         for k in range(6):
             rest[k] = trial[k]
             if not abs(left[k]) <= REMAINING:

@@ -10,7 +10,8 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context
 
 from wm_drake.compiler.compilation import law, long_running
-from wm_drake.compiler.lanes import number_array
+from wm_drake.compiler.lane_memory import aligned, fill_lanes
+from wm_drake.compiler.lanes import WIDTH, align_stack, lane_array
 from wm_drake.compiler.matrices import plus, scaled, six, solve
 from wm_drake.compiler.vectors import add, cross, rotate
 from wm_drake.elements.motion import tub_motion
@@ -23,6 +24,9 @@ from wm_drake.parameters.types import FloatArray
 
 POSE_STEP = 1e-6
 """Step of the differences of the slopes. [rad, m]"""
+
+POSES = 7
+"""Poses of a step of Newton's method: one, and six that are moved in one coordinate each."""
 
 MOST_STEPS = 20
 """Steps of Newton's method; springs are nearly linear, and three or four suffice."""
@@ -73,56 +77,89 @@ def weight_wrench(motion, weight):
 
 
 @long_running
-def wrench_on_tub(x, p, mounts, weight, wrenches):
-    """Return moment about the origin of W and force on a tub at rest, six numbers. [N m, N]
+def wrenches_on_tub(states, p, mounts, weight, wrenches, totals):
+    """Write moment about the origin of W and force on a tub at rest, at `WIDTH` states. [N m, N]
+
+    All arrays are flat arrays of lanes.
 
     Args:
-        x: State at rest: pose of the tub, and what the mounts read beside it.
+        states: States at rest: pose of the tub, and what the mounts read beside it.
         p, mounts: Packed numbers, and the `Mounts` that act at rest.
         weight: As for `weight_wrench`.
         wrenches: Array to work in: `WRENCH_SIZE` numbers for each mount.
+        totals: Six numbers, written.
     """
-    state, of_mounts = number_array(x), number_array(wrenches)
-    write_mount_wrenches(state, number_array(p), mounts, of_mounts)
-    total = weight_wrench(tub_motion(state), weight)
-    for at in range(0, len(wrenches), WRENCH_SIZE):
+    align_stack()
+    x, of_mounts, answer = lane_array(states), lane_array(wrenches), lane_array(totals)
+    write_mount_wrenches(x, lane_array(p), mounts, of_mounts)
+    total = weight_wrench(tub_motion(x), weight)
+    for at in range(0, len(wrenches) // WIDTH, WRENCH_SIZE):
         total = plus(total, scaled(-1.0, six(of_mounts, at)))
-    return total
+    for k in range(6):
+        answer[k] = total[k] + 0.0 * x[0]
 
 
 @long_running
-def balance_tub(x, p, mounts, weight, tolerance, wrenches, slopes, step):
+def balance_tub(x, p, mounts, weight, tolerance, wrenches, left):
     """Look for the pose at which gravity and mounts balance, by Newton's method.
 
     Args:
         x: State at rest, of which the pose of the tub is moved from where it begins.
-        p, mounts, weight, wrenches: As for `wrench_on_tub`.
+        p, mounts, weight, wrenches: As for `wrenches_on_tub`.
         tolerance: Largest force or moment that may remain. [N, N m]
-        slopes, step: Arrays to work in. (36,), (6,)
-
-    Returns:
-        Moment and force at the last pose; they are larger if there is no such pose near.
+        left: Moment and force that remain, written; larger ones if there is no such pose near.
     """
-    now = wrench_on_tub(x, p, mounts, weight, wrenches)
+    states, totals = np.empty(len(x) * WIDTH), np.empty(6 * WIDTH)
+    slopes, step = np.empty(36), np.empty(6)
     for _ in range(MOST_STEPS):
-        largest = 0.0
-        for i in range(6):
-            step[i], largest = now[i], max(largest, abs(now[i]))
-        if not tolerance < largest < np.inf:
-            break
-        for k in range(6):
-            at = x[k]
-            x[k] = at + POSE_STEP
-            moved = wrench_on_tub(x, p, mounts, weight, wrenches)
-            x[k] = at
-            for i in range(6):
-                slopes[6 * i + k] = (moved[i] - now[i]) / POSE_STEP
+        for begin in range(0, POSES, WIDTH):
+            write_poses(x, begin, WIDTH, states)
+            wrenches_on_tub(states, p, mounts, weight, wrenches, totals)
+            if begin == 0:
+                largest = 0.0
+                for i in range(6):
+                    left[i] = totals[i * WIDTH]
+                    step[i], largest = left[i], max(largest, abs(left[i]))
+                if not tolerance < largest < np.inf:
+                    return
+            write_slopes(totals, begin, WIDTH, left, slopes)
         if not solve(slopes, step, 6):
-            break
+            return
         for k in range(6):
             x[k] = x[k] - step[k]
-        now = wrench_on_tub(x, p, mounts, weight, wrenches)
-    return now
+
+
+@law
+def write_poses(x, begin, width, states):
+    """Write a state into lanes: the first of `POSES` as it is, each other moved in one coordinate.
+
+    Args:
+        x: State.
+        begin, width: Number of the first lane among all, and how many there are.
+        states: Flat array of lanes, written.
+    """
+    for k in range(len(x)):
+        for lane in range(width):
+            states[k * width + lane] = x[k]
+            if k < 6 and begin + lane == k + 1:
+                states[k * width + lane] = x[k] + POSE_STEP
+
+
+@law
+def write_slopes(totals, begin, width, left, slopes):
+    """Write the slopes of moment and force along the coordinates that are moved in these lanes.
+
+    Args:
+        totals: Flat array of lanes: moment and force at the poses of `write_poses`.
+        begin, width: Number of the first lane among all, and how many there are.
+        left: Moment and force at the first pose.
+        slopes: (36,), by rows, written.
+    """
+    for lane in range(width):
+        k = begin + lane - 1
+        if 0 <= k < 6:
+            for i in range(6):
+                slopes[6 * i + k] = (totals[i * width + lane] - left[i]) / POSE_STEP
 
 
 class TubStatics:
@@ -139,20 +176,24 @@ class TubStatics:
         if elements.others:
             self._states[states.span(ELEMENT)] = elements.initial_of_others()
         numbers = tuple(weight.force.tolist()), tuple(weight.centre.tolist())
-        self._numbers = packed, elements.mounts(begins, states), numbers
-        self._wrenches = np.zeros(sum(map(len, begins.values())) * WRENCH_SIZE)
+        lanes = fill_lanes(aligned(len(packed) * WIDTH), [packed])
+        self._numbers = lanes, elements.mounts(begins, states), numbers
+        self._wrenches = aligned(sum(map(len, begins.values())) * WRENCH_SIZE * WIDTH)
 
     def wrench(self, pose: FloatArray) -> FloatArray:
         """Return moment and force at a pose: roll, pitch, yaw, x, y, z. (6,) [N m, N]"""
         self._states[:6] = pose
-        return np.array(wrench_on_tub(self._states, *self._numbers, self._wrenches))
+        states = fill_lanes(aligned(len(self._states) * WIDTH), [self._states])
+        totals = aligned(6 * WIDTH)
+        wrenches_on_tub(states, *self._numbers, self._wrenches, totals)
+        return totals[::WIDTH].copy()
 
     def balance(self, tolerance: float) -> tuple[FloatArray, FloatArray]:
         """Return the pose at rest near the drawn one, and the wrench there; see `balance_tub`."""
         self._states[:6] = 0.0
-        work = self._wrenches, np.empty(36), np.empty(6)
-        wrench = balance_tub(self._states, *self._numbers, tolerance, *work)
-        return self._states[:6].copy(), np.array(wrench)
+        left = np.empty(6)
+        balance_tub(self._states, *self._numbers, tolerance, self._wrenches, left)
+        return self._states[:6].copy(), left
 
 
 def about_tub(wrench: FloatArray, pose: FloatArray) -> FloatArray:
