@@ -1,6 +1,7 @@
 """Command `wm-drake record`: channels of a file, and orders of strangers' measurements."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -42,6 +43,53 @@ def test_channels_of_every_format_are_listed(wm_drake, suffix):
     assert "Acc 1" in wm_drake("record", "channels", f"x{suffix}").out
 
 
+def faulty(fault):
+    """Return channels of a recorder with a fault: time, acceleration, speed and tacho."""
+    generator = np.random.default_rng(2)
+    time, speed = TIME.copy(), np.linspace(60.0, 300.0, len(TIME))
+    turns = np.cumsum(speed / 60.0) * 0.01
+    at = np.flatnonzero(np.diff(np.floor(turns)) > 0.0)
+    if fault == "pulses":
+        at = np.delete(at, [20, 30])
+    pulses = np.where(np.isin(np.arange(len(TIME)), at), 5.0, 0.0)
+    wave = np.round(speed**2 / 1e4 * np.cos(2.0 * np.pi * turns), 3)
+    wave += np.round(generator.normal(0.0, 0.02, len(TIME)), 3)
+    if fault == "line":
+        wave[1100:1200] = np.linspace(wave[1099], wave[1200], 102)[1:-1]
+    elif fault == "clock":
+        time[900:] += 1.0
+    elif fault == "back":
+        time[900:] -= 0.5
+    elif fault == "ticks":
+        time = np.floor(time / 0.05 + 1e-9) * 0.05
+    return {"Acc 1": (time, wave, "g"), "Drum": (time, speed, "rpm"), "Tacho": (time, pulses, "V")}
+
+
+@pytest.mark.parametrize(
+    ("fault", "remarks"),
+    [
+        ("none", {}),
+        ("line", {"Acc 1": "a straight line from .* (11 to 11.99 s); 100 samples"}),
+        ("clock", {"Drum": "time jumps by 1 s, .* (8.99 to 10 s)"}),
+        ("back", dict.fromkeys(("Acc 1", "Drum", "Tacho"), "time falls: 8.5 after 8.99")),
+        ("ticks", dict.fromkeys(("Acc 1", "Drum", "Tacho"), "are ticks of 0.05 s; .* 100 Hz")),
+        ("pulses", {"Tacho": "2 pulses are missing; they are counted"}),
+    ],
+)
+def test_faults_are_remarked_on_in_the_list(wm_drake, fault, remarks):
+    """Write columns with one time, and find the fault with its place."""
+    channels = faulty(fault)
+    rows = np.column_stack([channels["Drum"][0], *(values for _, values, _ in channels.values())])
+    head = "time [s]," + ",".join(f"{name} [{unit}]" for name, (_, _, unit) in channels.items())
+    np.savetxt("x.csv", rows, delimiter=",", header=head, comments="", fmt="%.6g")
+    ended = wm_drake("record", "channels", "x.csv", "--json")
+    found = {each["name"]: each["remark"] for each in json.loads(ended.out)["channels"][1:]}
+    for name, remark in remarks.items():
+        assert re.search(re.escape(remark).replace(r"\.\*", ".*"), found[name])
+    if fault != "clock":  # whose jump is a pulse that is missing, too
+        assert {name for name, text in found.items() if text} == set(remarks)
+
+
 def test_a_slow_recorder_has_empty_orders_above_half_its_rate(wm_drake):
     """100 Hz at 1400 rpm resolves orders up to 2.14."""
     written("phone.csv", rpm=1400.0)
@@ -57,6 +105,36 @@ def test_a_slow_recorder_has_empty_orders_above_half_its_rate(wm_drake):
         assert maps.amplitude.sizes == {"time": len(third), "order": 96, "signal": 1}
         assert (maps.amplitude.units, maps.speed.units) == ("g", "rad/s")
     assert Path("o/report.html").is_file()
+
+
+@pytest.mark.parametrize("suffix", CLOCKS)
+def test_orders_of_every_format_in_other_units(wm_drake, suffix):
+    """Write a time in ms, a speed in U/min that ends after 12 s, and accelerations in g."""
+    wave, until = 0.3 * np.cos(2.0 * np.pi * 5.0 * TIME), 1200
+    speed = (TIME[:until], np.full(until, 300.0), "U/min")
+    CLOCKS[suffix](Path(f"x{suffix}"), {"speed": speed, "Acc 1": (TIME, wave, "g")}, "ms")
+    names = ("--channels", "speed=speed,Acc 1=Acc 1")
+    for words in ((), names):
+        ended = wm_drake(
+            "record", "orders", f"x{suffix}", *words, "--json", "--out", "o", "--overwrite"
+        )
+        assert "do not cover the same time" in ended.err
+        first = amplitudes_of(ended)
+        assert 10.0 < first.index.max() < 12.0
+        np.testing.assert_allclose(first, 0.3, rtol=0.01)
+
+
+@pytest.mark.parametrize(
+    "head", ["Time (ms),Speed (rpm),Acc 1 (g)", "Time [ms],Speed [1/min],Acc 1 [g]"]
+)
+def test_units_in_the_header_of_a_table(wm_drake, head):
+    wave = 0.3 * np.cos(2.0 * np.pi * 5.0 * TIME)
+    rows = np.column_stack([1e3 * TIME, np.full(len(TIME), 300.0), wave])
+    np.savetxt("x.csv", rows, delimiter=",", header=head, comments="")
+    time, speed, _ = head.split(",")
+    for words in ((), ("--channels", f"time={time},speed={speed},Acc 1=Acc 1")):
+        ended = wm_drake("record", "orders", "x.csv", *words, "--json", "--out", "o", "--overwrite")
+        np.testing.assert_allclose(amplitudes_of(ended), 0.3, rtol=0.01)
 
 
 def test_a_record_of_three_seconds_has_orders(wm_drake):

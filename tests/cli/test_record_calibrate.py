@@ -189,6 +189,13 @@ def test_noise_is_refused(calibrate):
     assert len(error.strip().splitlines()) == 1
 
 
+def test_a_record_of_one_load_given_for_another_is_refused(calibrate):
+    (file,) = plant({}, repeats=1)
+    Path("copy.mf4").write_bytes(Path(file).read_bytes())
+    error = calibrate([file, "counter=copy.mf4"], "--unknown", FRICTION, code=2)
+    assert error.startswith("copy.mf4: has the same samples as run_0.mf4")
+
+
 @pytest.mark.slow
 def test_signals_over_time_tell_the_angle_of_the_drum_and_the_clock(calibrate):
     """Plant a drum that stood 40 degrees further at the start."""

@@ -207,6 +207,12 @@ def zeros(of):
         of[name][0][3000:3700] = 0.0
 
 
+def straight(of):
+    for name in set(of) - {"time", "Drum"}:
+        x = of[name][0]
+        x[3000:3700] = np.round(np.linspace(x[2999], x[3700], 702)[1:-1], 6)
+
+
 def clipped(of):
     np.clip(of["Acc 2"][0], None, 1.4, out=of["Acc 2"][0])
 
@@ -270,6 +276,7 @@ def ac_coupled(of):
         (partial(lost, name="Acc 3", value=40.0), "impossible beside their neighbours", 0.0),
         (partial(lost, name="Drum", value=65535.0), "are 65535, a mark", 0.0),
         (clipped, "S1_z: is clipped", 0.0),
+        (straight, "is a straight line", 0.0),
         (speed_off, "speed: stays at exactly 0", 0.0),
         (ac_coupled, "S1_z: gravity is taken out of it (gravity: removed)", 0.0),
         (in_ticks, "its time stamps are ticks of 0.05 s", 0.0),
@@ -306,6 +313,19 @@ def test_planted_faults_are_named_or_left_out(wm_drake, laboratory, plant, messa
         assert row["within_percent"] > 95.0
 
 
+def test_a_speed_that_drops_out_does_not_drive_the_model(wm_drake, laboratory):
+    time, channels, rpm = laboratory
+    every = {**channels, "Drum": (np.round(rpm, 2), "rpm")}
+    speed_off(every)
+    write_test()
+    write_csv("run.csv", time, every)
+    words = ("--test", "test.yaml", "--profile", "p.yaml", "--speed", "measured", "--json")
+    ended = wm_drake("record", "compare", "run.csv", *words)
+    assert "speed: stays at exactly 0 while it moves before and after" in ended.err
+    for row in json.loads(ended.out)["sensors_acceleration"]:
+        assert abs(row["difference_percent"]) < 1.0
+
+
 def test_milliseconds_without_a_unit_are_asked_for(compare, laboratory):
     time, channels, rpm = laboratory
     write_csv("run.csv", 1e3 * time, {**channels, "Drum": (rpm, "rpm")})
@@ -331,17 +351,32 @@ def test_a_drum_that_turned_the_other_way_is_named(compare, tmp_path_factory):
     assert "the drum turned the other way" in compare("run.csv", "--test", "test.yaml", code=2)
 
 
-def rounded(time, channels):
-    return time, {n: (np.round(v, 3), u) for n, (v, u) in channels.items()}
+def in_hundredths(values):
+    return np.round(values, 2)
 
 
-def cut_and_later(time, channels):
-    return 5.0 + time[700:], {n: (v[700:], u) for n, (v, u) in channels.items()}
+def in_three_digits(values):
+    return np.array([float(f"{value:.3g}") for value in values])
 
 
-@pytest.mark.parametrize("changed", [lambda *record: record, rounded, cut_and_later])
+def half_the_rate(values):
+    return values[1::2]
+
+
+def means_of_two(values):
+    return np.round(0.5 * (values[:-1:2] + values[1::2]), 3)
+
+
+def cut_and_later(values):
+    return values[700:]
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [np.copy, in_hundredths, in_three_digits, half_the_rate, means_of_two, cut_and_later],
+)
 def test_a_copy_is_no_repeat(compare, laboratory, changed):
-    """Copy a record, also with fewer digits, or cut, with other time stamps."""
+    """Copy a record, also with fewer digits, at half the rate or cut, with other time stamps."""
     time, channels, _ = laboratory
     generator = np.random.default_rng(4)
 
@@ -353,8 +388,12 @@ def test_a_copy_is_no_repeat(compare, laboratory, changed):
     write_test(speed="")
     first = noisy()
     write_csv("run.csv", time, first)
-    write_csv("copy.csv", *changed(time, first))
-    write_csv("repeat.csv", time, noisy())
+    copied = {name: (changed(values), unit) for name, (values, unit) in first.items()}
+    size = len(copied["Acc 1"][0])
+    later = 5.0 + (time[::2][:size] if size <= len(time) // 2 + 1 else time[:size])
+    write_csv("copy.csv", later, copied)
+    repeated = {name: (changed(values), unit) for name, (values, unit) in noisy().items()}
+    write_csv("repeat.csv", later, repeated)
     words = ("--test", "test.yaml")
     error = compare("run.csv", "repeat.csv", "copy.csv", *words, code=2)
     assert "copy.csv: has the same samples as run.csv" in error

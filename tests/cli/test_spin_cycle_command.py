@@ -207,6 +207,26 @@ def test_accelerations_unlike_the_model_are_explained(study, channels, factor, c
     assert cause in text
 
 
+FIT = ("study", "spin-identify", "--unknown", "damper_types.friction.friction_force=(20, 60) N")
+
+
+def test_an_identification_says_what_accelerations_are_not_like(wm_drake):
+    """Exchange two cables; then give the record of one case, with fewer digits, for another."""
+    signals = accelerations_of_the_machine()
+    signals["S1_x"], signals["S1_z"] = signals["S1_z"], signals["S1_x"]
+    words = (*INPUT, "--accelerations", "records", "--json", "--out", "out")
+    Path("records").mkdir()
+    pd.DataFrame(signals).to_csv("records/front.csv", index=False)
+    ended = wm_drake(*FIT, *words, "--case", "front")
+    assert ended.code == 0, ended.err
+    assert "the channels of S1_x and S1_z are exchanged" in ended.err
+    pd.DataFrame(signals).round(3).to_csv("records/both.csv", index=False)
+    for command in (FIT, ("study", "spin-cycle")):
+        refused = wm_drake(*command, *words, "--case", "front", "--case", "both", "--overwrite")
+        assert refused.code == 2
+        assert "both.csv: has the same samples as records/front.csv" in refused.err
+
+
 @pytest.mark.slow
 def test_a_drum_that_can_whirl_is_run_and_said(study, whirling_file):
     shown = json.loads(study("--machine", whirling_file, "--json").out)

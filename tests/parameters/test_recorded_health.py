@@ -78,6 +78,14 @@ def held(of):
     of["S"][550:700] = of["S"][550]
 
 
+def straight(of):
+    of["S"][700:850] = np.linspace(of["S"][699], of["S"][850], 152)[1:-1]
+
+
+def straight_and_rounded(of):
+    of["S"][1000:1040] = np.round(np.linspace(of["S"][999], of["S"][1040], 42)[1:-1], 3)
+
+
 def zeros_at_the_end(of):
     of["S"][-150:] = 0.0
 
@@ -132,6 +140,8 @@ def speed_mark(of):
         (zeros, "constant spans", 150),
         (held, "constant spans", 150),
         (zeros_at_the_end, "constant spans", 150),
+        (straight, "straight spans", 150),
+        (straight_and_rounded, "straight spans", 40),
         (marks, "marks of lost samples", 3),
         (spikes, "spikes", 3),
         (repeated, "repeated spans", 60),

@@ -93,11 +93,24 @@ def laboratory(request):
     return Laboratory(request.param)
 
 
+def rounded(channels, digits):
+    """Return channels with some digits of their deviation."""
+    values = {}
+    for name, column in channels.values.items():
+        digit = 10.0 ** (np.round(np.log10(np.std(column))) + 1 - digits)
+        values[name] = np.round(column / digit) * digit
+    return Synchronous(Path(f"{digits}_{channels.path}"), channels.time, values)
+
+
 def test_repeats_are_no_copies_and_the_tacho_has_its_ratio(laboratory):
     for rate in RATES:
         for noise in NOISES:
             repeats = [laboratory.recorded(rate, noise, seed) for seed in range(3)]
-            check_distinct(repeats)
+            check_distinct([repeat.channels for repeat in repeats])
+            for digits in (2, 3):
+                check_distinct([rounded(repeat.channels, digits) for repeat in repeats])
+            slow = laboratory.recorded(rate / 2.0, noise, 3).channels
+            check_distinct([repeats[0].channels, rounded(repeats[1].channels, 3), slow])
             for recording in repeats:
                 check_orders(Recorded(recording.channels, recording.speed, about=SPEED))
 

@@ -248,6 +248,11 @@ def test_a_recorded_case_gives_the_planted_number(wm_drake):
     assert load_machine("out/identified.yaml").gasket.stiffness_y == pytest.approx(
         1e3 * estimate["value"], rel=1e-3
     )
+    write_mdf(Path("copy.mf4"), record.time.values, channels)
+    copied = ("--record", "2=run_2.mf4", "--record", "5=copy.mf4")
+    other = wm_drake(*words, *copied, *sought, "--overwrite")
+    assert other.code == 2
+    assert "copy.mf4: has the same samples as run_2.mf4" in other.err
     other = wm_drake(*words, "--record", "9q=run_2.mf4", *sought, "--overwrite")
     assert other.code == 2
     assert "--record: unknown case '9q'" in other.err

@@ -210,7 +210,7 @@ def _clocks(path: Path, signals: Mapping[str, Signal]) -> list[_Clock]:
         kept = np.isfinite(time)
         if not kept.all():
             notice(path, f"{np.sum(~kept)} samples have no time; they are left out")
-        _check_rising(path, time, kept, signal)
+        check_rising(path, time, kept, signal)
         table = np.column_stack(
             [time[kept] + 1e-9 * (start - first), *(one[kept] for one in columns)]
         )
@@ -228,7 +228,12 @@ def _clocks(path: Path, signals: Mapping[str, Signal]) -> list[_Clock]:
     return clocks
 
 
-def _check_rising(path: Path, time: FloatArray, kept: np.ndarray, signal: Signal) -> None:
+def check_rising(path: Path, time: FloatArray, kept: np.ndarray, signal: Signal) -> None:
+    """Check that the time of a channel does not fall, of the samples that are kept.
+
+    Raises:
+        InputError: it does.
+    """
     places = np.flatnonzero(kept)
     falls = np.flatnonzero(np.diff(time[kept]) < 0.0)
     if len(falls):

@@ -57,6 +57,13 @@ CLIPPED, CLIPPED_PAIRS = 5.0, 3
 nearest third of its range, and in so many pairs of neighbouring samples. A sine that is rounded has
 the ratio 2.4."""
 
+LEAST_LINE, BENDS, SIDE = 10, 8.0, 12
+"""Smallest number of samples of a straight span. Of so many samples on each side, three quarters
+have larger second differences than all inside, by this ratio but for those at a corner."""
+
+STRAIGHT = 5e-3
+"""Largest second difference of a straight span, by the median of all; or 1.5 digits."""
+
 NEARLY = 0.005
 """Part of the range within which samples count as the largest value: noise may follow a limit."""
 
@@ -284,6 +291,32 @@ def _is_stuck(channel: Channel, number: int) -> bool:
     return bool(np.nanmax(steps, initial=0.0) > least)
 
 
+def _straight(channel: Channel) -> np.ndarray:
+    """Return the samples of spans that are a straight line, in a signal that bends on both sides.
+
+    A line that is rounded has second differences of up to a digit.
+    """
+    values = channel.values
+    mask = np.zeros(len(values), dtype=bool)
+    bends = np.abs(np.diff(values, 2))  # of sample k + 1
+    levels = np.unique(values[np.isfinite(values)])
+    digit = np.min(np.diff(levels), initial=np.ptp(levels))
+    limit = max(1.5 * digit, STRAIGHT * np.nanmedian(bends), 1e-9 * np.ptp(levels))
+    is_line = bends <= limit
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], is_line, [False]]).astype(int)))
+    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        if end - begin < LEAST_LINE or not SIDE < begin <= end < len(bends) - SIDE:
+            continue
+        sides = np.nan_to_num([bends[begin - 1 - SIDE : begin][::-1], bends[end : end + SIDE + 1]])
+        quarter = np.percentile(sides, 25.0, axis=1)
+        inside, corners = max(np.max(bends[begin:end]), digit), sides[:, 0]
+        rise = abs(values[end] - values[begin + 1])
+        is_bent = np.maximum(quarter, corners) > BENDS * inside
+        if rise > digit and is_bent.all() and (quarter > limit).all():
+            mask[begin + 1 : end + 1] = True
+    return mask
+
+
 def _clipped(channel: Channel) -> np.ndarray:
     """Return spans in which a channel stays at its largest or smallest value."""
     values = channel.values
@@ -416,6 +449,14 @@ CHECKS: Sequence[Check] = (
         ("vibration", "speed"),
         _stuck,
         "stays at exactly {value} while it moves before and after: a dropout that was filled",
+        LONGEST_BRIDGE,
+    ),
+    Check(
+        "straight spans",
+        ("vibration",),
+        _straight,
+        "is a straight line from {value} on while it bends before and after: a dropout that was "
+        "interpolated",
         LONGEST_BRIDGE,
     ),
     Check(

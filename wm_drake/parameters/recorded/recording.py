@@ -8,11 +8,18 @@ from typing import Any
 import numpy as np
 
 from wm_drake.errors import InputError, input_error, nearest_names, shortened
-from wm_drake.parameters.recorded.clock import Synchronous, Use, notice, synchronous
+from wm_drake.parameters.recorded.clock import (
+    Synchronous,
+    Use,
+    check_rising,
+    notice,
+    synchronous,
+)
 from wm_drake.parameters.recorded.formats import read_signals
 from wm_drake.parameters.recorded.health import Channel, Kind, examined
+from wm_drake.parameters.recorded.pulses import LEAST_PULSES, counted, rises
 from wm_drake.parameters.recorded.signal import SECOND, Abscissa, Signal, word_of
-from wm_drake.parameters.recorded.stamps import clock_jumps
+from wm_drake.parameters.recorded.stamps import clock_jumps, with_ticks_spread
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit, factor_of, plain_unit
 
@@ -183,11 +190,10 @@ class Recording:
             }
             try:
                 time = signal.time(self.path)
-            except InputError as error:
-                row["remark"] = "time" if is_time(signal) else error.problems[0].message
-            else:
                 row |= _rate_and_span(time)
                 row["remark"] = signal.fault or self._findings(address, signal, time)
+            except InputError as error:
+                row["remark"] = "time" if is_time(signal) else error.problems[0].message
             rows.append(row)
         return rows
 
@@ -195,17 +201,23 @@ class Recording:
         """Return what the checks of its health find in a channel, with the kind that it looks."""
         if is_time(signal) or len(time) != len(signal.values) or not np.isfinite(time).all():
             return ""
+        check_rising(self.path, time, np.isfinite(time), signal)
+        table, remark = with_ticks_spread(self.path, np.column_stack([time, signal.values]))
+        time, values = table.T
         kind: Kind = "vibration"
         unit, factor = self.unit_of(address, signal), 1.0
         if not unit and word_of(signal.name)[0] in ("speed", "rpm"):
             unit = SPEED.shown
         if is_speed(unit):
             kind, factor = "speed", factor_of(unit, SPEED)
-        elif len(np.unique(signal.values)) <= FEW_LEVELS:
+        elif len(np.unique(values)) <= FEW_LEVELS:
             kind = "pulses"
-        channel = Channel(address, kind, time, signal.values, factor)
-        findings = [*clock_jumps([channel])] if np.all(np.diff(time) > 0.0) else []
-        return "; ".join(map(str, [*findings, *examined(channel)[1]]))
+        channel = Channel(address, kind, time, values, factor)
+        findings = [*clock_jumps([channel]), *examined(channel)[1]]
+        pulses = rises(time, values) if kind == "pulses" else time[:0]
+        if len(pulses) >= LEAST_PULSES:
+            findings += counted(pulses, address, float(np.median(np.diff(time))))[1]
+        return "; ".join(filter(None, [remark, *map(str, findings)]))
 
     def synchronous(
         self, uses: Mapping[str, ChannelUse], time_unit: str = "s", duration: float | None = None

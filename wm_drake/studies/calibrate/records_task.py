@@ -71,7 +71,7 @@ class CalibrateRecordsTask(Task):
             CompareTask(options.model_copy(update={"records": files, "load": load}), machine)
             for load, files in _by_load(options).items()
         ]
-        check_distinct([recording for test in self.tests for recording in test.recordings])
+        check_distinct([one.channels for test in self.tests for one in test.recordings])
 
     @property
     def identity(self) -> Mapping[str, Any]:

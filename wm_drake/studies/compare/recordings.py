@@ -27,9 +27,13 @@ from wm_drake.parameters.units import Unit, factor_of
 LEAST_SAMPLES = 200
 """Smallest number of samples of a recording."""
 
-MATCHED, COPIED = 100, 0.3
-"""Samples of a record that are looked for in another one, and largest RMS difference of a copy, by
-the noise of its samples; that of two repeats is at least 1.4."""
+MATCHED, SEARCHED, MOST_RATIO = 100, 1000, 50
+"""Samples of a record that are looked for in another one, samples on each side that are compared
+then, and largest ratio of two rates of a copy."""
+
+LEAST_LEVELS, DISORDER, SCALED = 20, 5e-4, 2e-3
+"""Smallest number of values of a signal that tell a copy from a repeat; of a copy, largest part of
+samples that are not in order, and largest change of its gain, and of its mean by its deviation."""
 
 ROUNDED = 1.0
 """Largest distance of time stamps from a straight line, in steps, of a clock that rounds them."""
@@ -209,39 +213,70 @@ def pulse_angle(about: SpeedChannel) -> float:
     return 2.0 * np.pi / (about.pulses_per_turn * about.ratio)
 
 
-def check_distinct(recordings: Sequence[TestRecording]) -> None:
-    """Check that no recording is a copy of another one, with other stamps, name or length.
-
-    Repeats have noise of their own: the difference of two is larger than their noise. A copy has
-    none but what was rounded.
+def check_distinct(records: Sequence[Synchronous]) -> None:
+    """Check that no record is a copy of another one: with other stamps, digits, length or rate.
 
     Raises:
         InputError: two have the same samples.
     """
-    for number, one in enumerate(recordings):
-        for other in recordings[:number]:
-            names = [name for name in one.channels.values if name in other.channels.values]
-            pairs = [(one.channels.values[n], other.channels.values[n]) for n in names]
-            if pairs and all(_is_copy(a, b) for a, b in pairs):
+    for number, one in enumerate(records):
+        for other in records[:number]:
+            names = [name for name in one.values if name in other.values]
+            if names and all(_is_copy(one, other, name) for name in names):
                 raise input_error(
-                    f"has the same samples as {other.path}; a copy is no repeat, and tells nothing "
-                    "of the scatter: give it once",
+                    f"has the same samples as {other.path}; a copy is no repeat and no other case, "
+                    "and tells nothing of the scatter: give it once",
                     where=str(one.path),
                 )
 
 
-def _is_copy(a: FloatArray, b: FloatArray) -> bool:
-    """Return whether two signals have the same samples where they overlap best."""
-    short, long = sorted((a[np.isfinite(a)], b[np.isfinite(b)]), key=len)
-    noise = float(np.std(np.diff(short, 4))) / np.sqrt(70.0) if len(short) > 8 else 0.0
-    if not noise:
+def _is_copy(one: Synchronous, other: Synchronous, name: str) -> bool:
+    """Return whether a signal of a record has the same samples as that of another one.
+
+    What rounds keeps the order of samples by their values; the noise of a repeat does not.
+    """
+    slow, fast = sorted((one, other), key=lambda record: -_step(record))
+    ratio = min(round(_step(slow) / _step(fast)), MOST_RATIO)
+    means = np.convolve(fast.values[name], np.full(ratio, 1.0 / ratio), "valid")
+    kept = [each[k::ratio] for each in (fast.values[name], means) for k in range(ratio)]
+    _, a, b = min((_overlap(slow.values[name], each) for each in kept), key=lambda pair: pair[0])
+    levels = len(np.unique(a)), len(np.unique(b))
+    if min(levels, default=0) < LEAST_LEVELS:
         return False
-    block = short[len(short) // 3 : len(short) // 3 + MATCHED]
-    if len(block) < MATCHED or len(long) < MATCHED:
+    fine, coarse = (a, b) if levels[0] > levels[1] else (b, a)
+    gain, offset = np.polyfit((fine - np.mean(fine)) / np.std(fine), coarse - fine, 1)
+    if max(abs(gain), abs(offset)) > SCALED * np.std(fine):
         return False
-    windows = np.lib.stride_tricks.sliding_window_view(long, MATCHED)
-    least = np.min(np.mean((windows - block) ** 2, axis=1))
-    return bool(np.sqrt(least) < COPIED * noise)
+    ordered = coarse[np.lexsort((coarse, fine))]
+    return bool(np.mean(np.diff(ordered) < 0.0) <= DISORDER)
+
+
+def _step(record: Synchronous) -> float:
+    return float(np.median(np.diff(record.time)))
+
+
+def _overlap(a: FloatArray, b: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+    """Return parts of two signals of one rate where they are most alike, and how far apart.
+
+    The loudest samples of the shorter one are looked for in the other one.
+    """
+    short, long = sorted((a, b), key=len)
+    if len(short) < MATCHED or not np.isfinite(short).any():
+        return np.inf, short[:0], short[:0]
+    middle = np.nanmedian(short)
+    begin = max(0, int(np.nanargmax(np.abs(short - middle))) - MATCHED // 2)
+    block = short[begin : begin + MATCHED] - middle
+    weight = np.isfinite(block).astype(float)
+    block = np.nan_to_num(block)
+    filled = np.nan_to_num(long - middle, nan=10.0 * np.ptp(block))
+    apart = np.correlate(filled**2, weight, "valid") - 2.0 * np.correlate(filled, block, "valid")
+    later = int(np.argmin(apart)) - begin
+    first = max(0, -later, begin - SEARCHED)
+    parts = short[first : begin + SEARCHED], long[first + later : begin + later + SEARCHED]
+    size = min(map(len, parts))
+    known = np.isfinite(parts[0][:size]) & np.isfinite(parts[1][:size])
+    least = float(apart.min() / max(float(block @ block), 1e-300))
+    return least, parts[0][:size][known], parts[1][:size][known]
 
 
 def used_sensors(

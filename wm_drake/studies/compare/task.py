@@ -85,7 +85,7 @@ class CompareTask(Task):
         recordings = [
             read_test(path, self.test, names, unit, self.case.profile.duration) for path in paths
         ]
-        check_distinct(recordings)
+        check_distinct([recording.channels for recording in recordings])
         for recording in recordings:
             check_orders(recording)
         self.sensors = used_sensors(recordings, self.test)

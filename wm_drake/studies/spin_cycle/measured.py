@@ -10,14 +10,20 @@ import xarray as xr
 from wm_drake.errors import check_known, input_error
 from wm_drake.parameters import SpinProfile
 from wm_drake.parameters.csv_files import read_csv
-from wm_drake.parameters.recorded import ACCELERATION, ChannelNames, ChannelUse, read_recording
+from wm_drake.parameters.recorded import (
+    ACCELERATION,
+    ChannelNames,
+    ChannelUse,
+    Synchronous,
+    read_recording,
+)
 from wm_drake.parameters.recorded.clock import UNEVEN
 from wm_drake.parameters.recorded.formats import SUFFIXES
-from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import Unit
 from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.band import HIGH_PASS_HZ
 from wm_drake.simulation.vibration import displacement_of, region_rms
+from wm_drake.studies.compare.recordings import check_distinct
 
 DIMS = ("case", "region", "accelerometer", "axis")
 
@@ -101,22 +107,18 @@ def read_accelerations(
             where=str(folder),
         )
     empty = np.full([len(labels[dim]) for dim in DIMS[1:]], np.nan)
-    rows, seen = [], dict[Path, FloatArray]()
+    rows, records = [], list[Synchronous]()
     for path in paths.values():
         if path is None:
             rows.append(empty)
             continue
-        time, acceleration = _samples(path, _words(labels), names, unit or ACCELERATION.si)
-        for other, samples in seen.items():
-            if np.array_equal(samples, acceleration):
-                raise input_error(
-                    f"has the same samples as {other}; a copy tells nothing of another case",
-                    where=str(path),
-                )
-        seen[path] = acceleration
+        records.append(_samples(path, _words(labels), names, unit or ACCELERATION.si))
+        time = records[-1].time
+        acceleration = np.stack(list(records[-1].values.values()), axis=1)
         period = float((time[-1] - time[0]) / (len(time) - 1))
         rms = region_rms(displacement_of(acceleration, period), period, profile)
         rows.append(rms.reshape(empty.shape))
+    check_distinct(records)
     return xr.DataArray(np.array(rows), labels, DIMS)
 
 
@@ -138,10 +140,8 @@ def _words(labels: Mapping[str, Sequence[str]]) -> list[str]:
     return [f"{sensor}_{axis}" for sensor in labels["accelerometer"] for axis in labels["axis"]]
 
 
-def _samples(
-    path: Path, words: list[str], names: ChannelNames, unit: str
-) -> tuple[FloatArray, FloatArray]:
-    """Return time (n,) [s] and accelerations (n, k) [m/s^2] of a file, evenly spaced from 0.
+def _samples(path: Path, words: list[str], names: ChannelNames, unit: str) -> Synchronous:
+    """Return the accelerations of a file, evenly spaced from 0.
 
     Raises:
         InputError: a channel is missing, has a gap or is too short, or the time does not fit.
@@ -182,4 +182,4 @@ def _samples(
             "the time has another unit, name it: --unit time=ms",
             where=str(path),
         )
-    return time, np.stack(list(channels.values.values()), axis=1)
+    return channels

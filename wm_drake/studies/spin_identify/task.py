@@ -77,7 +77,7 @@ class SpinIdentifyTask(Task):
             name: CompareTask(CompareOptions(records=paths, **shared), self.machine, runs[name])
             for name, paths in files.items()
         }
-        check_distinct([recording for test in tests.values() for recording in test.recordings])
+        check_distinct([one.channels for test in tests.values() for one in test.recordings])
         return tests
 
     @property
