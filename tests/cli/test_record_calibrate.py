@@ -189,6 +189,32 @@ def test_noise_is_refused(calibrate):
     assert len(error.strip().splitlines()) == 1
 
 
+def exchange(one, other):
+    """Exchange two cables."""
+    text = Path("test.yaml").read_text().replace(f"Acc {one},", "Acc ,")
+    text = text.replace(f"Acc {other},", f"Acc {one},").replace("Acc ,", f"Acc {other},")
+    Path("test.yaml").write_text(text)
+
+
+def test_exchanged_cables_are_named_before_the_fit(calibrate):
+    files = plant({FRICTION: 1.2 * 34.38}, repeats=1)
+    exchange(1, 2)
+    error = calibrate(files, "--unknown", FRICTION, code=2)
+    assert "what explains it: the channels of S1_x and S1_z are exchanged" in error
+
+
+@pytest.mark.slow
+def test_a_cause_that_only_the_fitted_machine_shows_is_named(wm_drake):
+    """Exchange sensors along one axis, and let the friction differ as much as they do."""
+    files = plant({FRICTION: 1.2 * 34.38}, repeats=1)
+    exchange(2, 4)
+    words = ("--test", "test.yaml", "--profile", "p.yaml", "--unknown", FRICTION)
+    ended = wm_drake("calibrate", *files, *words, "--by", "order", "--out", "out", "--json")
+    assert json.loads(ended.out)["numbers"][0]["structure"] == "wrong"
+    assert "what explains it: the channels of S1_z and S3_z are exchanged" in ended.err
+    assert "none of these explains it" not in ended.err
+
+
 def test_a_record_of_one_load_given_for_another_is_refused(calibrate):
     (file,) = plant({}, repeats=1)
     Path("copy.mf4").write_bytes(Path(file).read_bytes())

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from wm_drake.errors import input_error
+from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Machine
 from wm_drake.parameters.vary_file import VARY_FILES, load_vary
 from wm_drake.simulation.cases import load_of
@@ -25,7 +26,7 @@ from wm_drake.studies.calibrate.test_file import (
 )
 from wm_drake.studies.compare.pairs import QUANTITIES
 from wm_drake.studies.compare.recordings import check_distinct
-from wm_drake.studies.compare.task import CompareTask
+from wm_drake.studies.compare.task import CompareTask, doubt_again
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.experiment import Experiment, record_here
 from wm_drake.studies.fitting.free_numbers import FreeNumbers, free_numbers_of_texts
@@ -131,8 +132,16 @@ def fitted_answer(
     calibrated_sensors = calibrated_test(model, fit, tests[0].test)
     name, text = f"{words[1]}_test.yaml", test_text(calibrated_sensors, clock_remarks(model, fit))
     of_next = {name: text, f"{words[1]}_vary.yaml": vary_text(model.free, fit, texts.source)}
-    warnings = [warning for test in tests for warning in test.warnings]
-    return replace(answer, files={**answer.files, **of_next}, warned=(*warnings, *answer.warned))
+    doubts = [warning for test in tests for warning in test.warnings]
+    if fit.rmse > model.most_misfit:
+        fitted_machine = build_machine(model.free.solved(fit, texts.source))
+        loaded = [load.load_at(fitted_machine.parameters) for load in model.loads]
+        doubts = [
+            doubt_again(executor, test.options, fitted_machine, replace(test.case, load=load))
+            for test, load in zip(tests, loaded, strict=True)
+        ]
+    warned = (*filter(None, doubts), *answer.warned)
+    return replace(answer, files={**answer.files, **of_next}, warned=warned)
 
 
 def recorded_load(test: CompareTask, executor: Executor, load_at: Any) -> RecordedLoad:

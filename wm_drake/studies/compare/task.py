@@ -1,12 +1,14 @@
 """Check the options of the comparison of recordings with a machine, and run it."""
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from wm_drake.errors import InputError, input_error
+from wm_drake.errors import InputError, InputNotice, input_error
 from wm_drake.model.frame_poses import FramePoses
 from wm_drake.model.machine import Machine
 from wm_drake.model.scene import Scene
@@ -192,6 +194,12 @@ class CompareTask(Task):
             if reason := why_diverged(record):
                 raise input_error(f"the run diverged: {reason}", key="machine")
         return [records[number] for number in range(len(cases))]
+
+
+def doubt_again(executor: Executor, options: Any, machine: Machine, case: Case) -> str:
+    """Return why records that were read before are not like their predictions; "" if they are."""
+    with warnings.catch_warnings(action="ignore", category=InputNotice):
+        return CompareTask(options, machine, case).doubt(executor)
 
 
 def sensor_points(machine: Machine, test: RecordedTest) -> dict[str, FloatArray]:

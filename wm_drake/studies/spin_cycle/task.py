@@ -1,19 +1,17 @@
 """Check the options of the study of a spin cycle, and run it."""
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from wm_drake.errors import InputNotice
 from wm_drake.model.machine import Machine
 from wm_drake.parameters.recorded import ACCELERATION
 from wm_drake.simulation.cases import Case
 from wm_drake.studies.answer import Answer
 from wm_drake.studies.compare.diagnosis import UNLIKE
 from wm_drake.studies.compare.options import CompareOptions
-from wm_drake.studies.compare.task import CompareTask
+from wm_drake.studies.compare.task import doubt_again
 from wm_drake.studies.executor import Executor
 from wm_drake.studies.inputs import runnable_profile
 from wm_drake.studies.spin_cycle.measured import DIMS, RMS, file_of_case
@@ -85,6 +83,5 @@ def acceleration_doubts(
         path = file_of_case(folder, run.name)
         if path is not None:
             compared = CompareOptions(records=(path,), unit=units, channels=options.channels)
-            with warnings.catch_warnings(action="ignore", category=InputNotice):  # said before
-                doubts.append(CompareTask(compared, machine, run).doubt(executor))
+            doubts.append(doubt_again(executor, compared, machine, run))
     return tuple(filter(None, doubts))
