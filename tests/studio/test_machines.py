@@ -38,6 +38,29 @@ def test_each_number_has_a_part_of_the_machine_and_words(machines, name):
     assert not [text for text in words if "_" in text or "frames" in text]
 
 
+def test_sliders_end_where_a_vary_file_says(machines, tmp_path):
+    path = tmp_path / "ranges.yaml"
+    path.write_text(
+        "vary:\n  gasket.damping_x: 50 %..200 %\n  bodies.tub.mass: (20, 30) kg\n"
+        "  gasket.damping_y: {mean: 100 %, deviation: 7 %}\n"
+    )
+    usual = machines.open("reference").sliders
+    given = Machines("reference", tmp_path, str(path)).open("reference").sliders
+    assert (given["bodies.tub.mass"].low, given["bodies.tub.mass"].high) == (20.0, 30.0)
+    nominal = usual["gasket.damping_x"].number.nominal * usual["gasket.damping_x"].unit.from_si(1.0)
+    ends = given["gasket.damping_x"].low, given["gasket.damping_x"].high
+    assert ends == pytest.approx((0.5 * nominal, 2.0 * nominal))
+    del usual["bodies.tub.mass"], usual["gasket.damping_x"]
+    assert usual.items() <= given.items()
+
+
+def test_a_vary_file_of_another_machine_is_refused(tmp_path):
+    path = tmp_path / "ranges.yaml"
+    path.write_text("vary:\n  gasket.dampin_x: 50 %..200 %\n")
+    with pytest.raises(InputError, match=r"ranges\.yaml.*gasket\.dampin_x.*damping_x"):
+        Machines("reference", tmp_path, str(path)).open("reference")
+
+
 @pytest.mark.parametrize("name", ["reference", "free_stroke", "rodrigues_2010"])
 def test_both_ends_of_each_slider_are_allowed(machines, name):
     machine = machines.open(name)

@@ -21,6 +21,9 @@ def studio(
     folder: Annotated[
         Path, typer.Option(help="Folder for saved machine files and studies.", metavar="DIR")
     ] = DEFAULT_FOLDER,
+    vary: Annotated[
+        str, typer.Option(help="Vary file with the ends of sliders: low and high.", metavar="FILE")
+    ] = "",
     no_browser: Annotated[
         bool, typer.Option("--no-browser", help="Print the address and open no browser.")
     ] = False,
@@ -48,7 +51,7 @@ def studio(
     from wm_drake.studio.server import Studio, application
 
     given = machine if machine in shipped_machines() else str(machine_path(machine).resolve())
-    served = Studio(given, folder.resolve())
+    served = Studio(given, folder.resolve(), vary)
     served.machines.open(served.machines.first)  # an error of the file is shown here
     token = secrets.token_urlsafe(24)
     with _loopback(port) as listening:

@@ -253,7 +253,7 @@ def _places(contents: Contents, count: Any) -> Any:
         "state": begins.size,
         "rest": 6,
         "trial": begins.size,
-        "wrenches": WRENCH_SIZE * count.mounts,
+        "wrenches": WRENCH_SIZE * (count.mounts + 1),
         "slopes": solved * solved,
         "step": solved,
         "rate": begins.size,

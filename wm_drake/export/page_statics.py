@@ -147,7 +147,7 @@ def settler(plan: Any, set_taut: Any) -> Any:
     as they can, then the pose at which nothing remains. It returns 0, or why there is no such pose.
     """
     at, size, limits, resting = plan.at, plan.elements.begins.size, plan.limits, plan.resting
-    numbers, wrenches = plan.count.numbers, WRENCH_SIZE * _resting_count(plan)
+    numbers, wrenches = plan.count.numbers, WRENCH_SIZE * (_resting_count(plan) + 1)
     on_tub = for_one_run(wrenches_on_tub)
     balance = for_one_run(balance_tub, wrenches_on_tub=on_tub)
     preload_springs = _preloads(plan, set_taut)
@@ -159,11 +159,12 @@ def settler(plan: Any, set_taut: Any) -> Any:
         for k in range(size):
             trial[k] = state[k] if k >= 6 else 0.0
         packed, weight = part(v, at.packed, numbers), weight_of_bodies(p)
-        left = part(v, at.extremes, 6)
-        on_tub(trial, packed, resting, weight, of_mounts, left)
+        left = part(v, at.wrenches + wrenches - 6, 6)
+        on_tub(trial, packed, resting, weight, of_mounts)
         status = preload_springs(v, left)
         if status < 0.0:
             return status
+        left = part(v, at.step, 6)
         balance(trial, packed, resting, weight, REMAINING, of_mounts, left)
         for k in range(6):
             rest[k] = trial[k]

@@ -59,12 +59,14 @@ class OpenMachine:
         parameters: The machine as its file has it.
         machine: A built machine with the same elements.
         scene: Its shapes. One thread at a time may use it.
+        ranges: Ends of sliders by key path, in place of the usual ones. [SI]
         lock: Held while `machine` or `scene` are used.
     """
 
     parameters: MachineParameters
     machine: Machine
     scene: Scene
+    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     lock: threading.Lock = field(default_factory=threading.Lock)
     _preparations: dict[tuple[int, float, str], Preparation] = field(default_factory=dict)
     _others: list[Machine] = field(default_factory=list)
@@ -80,6 +82,9 @@ class OpenMachine:
             keys = [f"bodies.{link}.{part}" for link in names.links for part in parts]
             keys += [f"frames.{name}" for name in names.movable_frames]
             sliders = sliders_of(with_sdf_values(plant, self.parameters, keys))
+            for key in self.ranges.keys() & sliders.keys():
+                low, high = map(sliders[key].unit.from_si, self.ranges[key])
+                sliders[key] = replace(sliders[key], low=low, high=high)
             possible = [self._possible(slider) for slider in sliders.values()]
             possible.sort(key=lambda slider: bool(slider.needs))
             self._sliders.update({slider.key: slider for slider in possible})

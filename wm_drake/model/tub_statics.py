@@ -77,7 +77,7 @@ def weight_wrench(motion, weight):
 
 
 @long_running
-def wrenches_on_tub(states, p, mounts, weight, wrenches, totals):
+def wrenches_on_tub(states, p, mounts, weight, wrenches):
     """Write moment about the origin of W and force on a tub at rest, at `WIDTH` states. [N m, N]
 
     All arrays are flat arrays of lanes.
@@ -86,17 +86,16 @@ def wrenches_on_tub(states, p, mounts, weight, wrenches, totals):
         states: States at rest: pose of the tub, and what the mounts read beside it.
         p, mounts: Packed numbers, and the `Mounts` that act at rest.
         weight: As for `weight_wrench`.
-        wrenches: Array to work in: `WRENCH_SIZE` numbers for each mount.
-        totals: Six numbers, written.
+        wrenches: Written: the six numbers, behind the `WRENCH_SIZE` numbers of each mount.
     """
     align_stack()
-    x, of_mounts, answer = lane_array(states), lane_array(wrenches), lane_array(totals)
-    write_mount_wrenches(x, lane_array(p), mounts, of_mounts)
-    total = weight_wrench(tub_motion(x), weight)
-    for at in range(0, len(wrenches) // WIDTH, WRENCH_SIZE):
-        total = plus(total, scaled(-1.0, six(of_mounts, at)))
+    x, answer = lane_array(states), lane_array(wrenches)
+    write_mount_wrenches(x, lane_array(p), mounts, answer)
+    total, end = weight_wrench(tub_motion(x), weight), len(wrenches) // WIDTH - 6
+    for at in range(0, end, WRENCH_SIZE):
+        total = plus(total, scaled(-1.0, six(answer, at)))
     for k in range(6):
-        answer[k] = total[k] + 0.0 * x[0]
+        answer[end + k] = total[k] + 0.0 * x[0]
 
 
 @long_running
@@ -109,12 +108,12 @@ def balance_tub(x, p, mounts, weight, tolerance, wrenches, left):
         tolerance: Largest force or moment that may remain. [N, N m]
         left: Moment and force that remain, written; larger ones if there is no such pose near.
     """
-    states, totals = np.empty(len(x) * WIDTH), np.empty(6 * WIDTH)
+    states, totals = np.empty(len(x) * WIDTH), wrenches[len(wrenches) - 6 * WIDTH :]
     slopes, step = np.empty(36), np.empty(6)
     for _ in range(MOST_STEPS):
         for begin in range(0, POSES, WIDTH):
             write_poses(x, begin, WIDTH, states)
-            wrenches_on_tub(states, p, mounts, weight, wrenches, totals)
+            wrenches_on_tub(states, p, mounts, weight, wrenches)
             if begin == 0:
                 largest = 0.0
                 for i in range(6):
@@ -178,15 +177,14 @@ class TubStatics:
         numbers = tuple(weight.force.tolist()), tuple(weight.centre.tolist())
         lanes = fill_lanes(aligned(len(packed) * WIDTH), [packed])
         self._numbers = lanes, elements.mounts(begins, states), numbers
-        self._wrenches = aligned(sum(map(len, begins.values())) * WRENCH_SIZE * WIDTH)
+        self._wrenches = aligned((sum(map(len, begins.values())) + 1) * WRENCH_SIZE * WIDTH)
 
     def wrench(self, pose: FloatArray) -> FloatArray:
         """Return moment and force at a pose: roll, pitch, yaw, x, y, z. (6,) [N m, N]"""
         self._states[:6] = pose
         states = fill_lanes(aligned(len(self._states) * WIDTH), [self._states])
-        totals = aligned(6 * WIDTH)
-        wrenches_on_tub(states, *self._numbers, self._wrenches, totals)
-        return totals[::WIDTH].copy()
+        wrenches_on_tub(states, *self._numbers, self._wrenches)
+        return self._wrenches[-6 * WIDTH :: WIDTH].copy()
 
     def balance(self, tolerance: float) -> tuple[FloatArray, FloatArray]:
         """Return the pose at rest near the drawn one, and the wrench there; see `balance_tub`."""

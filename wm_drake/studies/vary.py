@@ -14,7 +14,7 @@ from wm_drake.model.machine import Machine
 from wm_drake.parameters import MachineParameters, located, with_values
 from wm_drake.parameters.variation import Change, changes_of, number_at
 from wm_drake.parameters.vary import LAUNDRY, Entry
-from wm_drake.parameters.vary_file import Known, VaryFile
+from wm_drake.parameters.vary_file import VARY_FILES, Known, VaryFile, load_vary
 from wm_drake.parameters.varying import Varying, varying
 
 _TYPES = {
@@ -86,6 +86,23 @@ def varying_of(
     fixed = dict(known or {})
     named = [key for number in fixed.values() for key in number.sets]
     return varying(with_sdf_values(machine.drawn.plant, changed, named), full, fixed, tables)
+
+
+def ranges_in(machine: Machine, name_or_path: str | Path) -> dict[str, tuple[float, float]]:
+    """Return the range that a vary file gives each number of a machine, by key path. [SI]
+
+    The laundry, and numbers that enter sums, have none.
+    """
+    file = load_vary(name_or_path)
+    with in_vary_file(VARY_FILES.path(name_or_path), file):
+        every = varying_of(machine, file.entries(without=()), file.known).every
+    ends = {}
+    for varied in every:
+        if {"low", "high"} <= varied.at.keys():
+            for number in varied.numbers:
+                low, _, high = varied.levels_of(number)
+                ends[number.key] = low, high
+    return ends
 
 
 def _draws(

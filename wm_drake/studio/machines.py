@@ -10,6 +10,7 @@ from wm_drake.model.same_elements import check_same_elements
 from wm_drake.model.scene import Scene
 from wm_drake.parameters import MachineParameters, load_machine, shipped_machines
 from wm_drake.simulation.steps import checked_step
+from wm_drake.studies.vary import ranges_in
 from wm_drake.studio.turns import SharedValues
 
 GIVEN = "given"
@@ -28,10 +29,12 @@ class Machines:
     Attributes:
         given: Name or path of the machine of the command line.
         folder: Folder for saved machine files.
+        vary: Name or path of a vary file with the ends of its sliders; "" for the usual ones.
     """
 
     given: str
     folder: Path
+    vary: str = ""
     _open: "SharedValues[OpenMachine]" = field(default_factory=lambda: SharedValues(MOST_OPEN))
 
     def listed(self) -> dict[str, str]:
@@ -65,16 +68,21 @@ class Machines:
             key = path.resolve(), path.stat().st_mtime_ns
         except OSError:
             raise input_error("this file is gone", where=identifier, key="machine") from None
-        return self._open.get(key, lambda: self._opened(load_machine(name)))
+        vary = self.vary if identifier == self.first else ""
+        return self._open.get(key, lambda: self._opened(load_machine(name), vary))
 
-    def _opened(self, parameters: MachineParameters) -> "OpenMachine":
+    def _opened(self, parameters: MachineParameters, vary: str) -> "OpenMachine":
         """Return a machine, built anew only if no open one has the same elements."""
         checked_step(parameters, None)
+        if vary:
+            built = build_machine(parameters)
+            return OpenMachine(parameters, built, Scene(parameters), ranges_in(built, vary))
         for other in self._open.ready():
             try:
                 check_same_elements(other.machine.parameters, parameters)
             except InputError:
                 continue
             if list(other.parameters.sensors) == list(parameters.sensors):
-                return OpenMachine(parameters, other.machine, Scene(parameters), other.lock)
+                scene = Scene(parameters)
+                return OpenMachine(parameters, other.machine, scene, lock=other.lock)
         return OpenMachine(parameters, build_machine(parameters), Scene(parameters))

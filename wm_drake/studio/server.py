@@ -97,9 +97,9 @@ class StudyRequest(_Body):
 class Studio:
     """What all pages share: open machines, the threads that run them, studies."""
 
-    def __init__(self, given: str, folder: Path) -> None:
-        """Serve a machine, and save into a folder."""
-        self.machines = Machines(given, folder)
+    def __init__(self, given: str, folder: Path, vary: str = "") -> None:
+        """Serve a machine, save into a folder, and take ends of sliders from a vary file."""
+        self.machines = Machines(given, folder, vary)
         self.jobs = Jobs(folder / "studies")
         self._workers = os.cpu_count() or 1
         self._executor = ThreadPoolExecutor(self._workers, thread_name_prefix="studio")
