@@ -32,8 +32,9 @@ MATCHED, SEARCHED, MOST_RATIO = 100, 1000, 50
 then, and largest ratio of two rates of a copy."""
 
 LEAST_LEVELS, DISORDER, SCALED = 20, 5e-4, 2e-3
-"""Smallest number of values of a signal that tell a copy from a repeat; of a copy, largest part of
-samples that are not in order, and largest change of its gain, and of its mean by its deviation."""
+"""Smallest number of values of a signal that tell a copy from a repeat. Of a copy: largest part of
+samples that are not in order; largest change of its gain, and of its mean by its deviation or a
+digit."""
 
 ROUNDED = 1.0
 """Largest distance of time stamps from a straight line, in steps, of a clock that rounds them."""
@@ -245,7 +246,8 @@ def _is_copy(one: Synchronous, other: Synchronous, name: str) -> bool:
         return False
     fine, coarse = (a, b) if levels[0] > levels[1] else (b, a)
     gain, offset = np.polyfit((fine - np.mean(fine)) / np.std(fine), coarse - fine, 1)
-    if max(abs(gain), abs(offset)) > SCALED * np.std(fine):
+    limit, digit = SCALED * np.std(fine), np.median(np.diff(np.unique(coarse)))
+    if abs(gain) > limit or abs(offset) > max(limit, digit):
         return False
     ordered = coarse[np.lexsort((coarse, fine))]
     return bool(np.mean(np.diff(ordered) < 0.0) <= DISORDER)
