@@ -45,6 +45,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="five cases, before 10 s")
     parser.add_argument("--few", action="store_true", help="five cases, one of each group at least")
     parser.add_argument("--only", default="", metavar="WORDS", help="causes with these words")
+    parser.add_argument("--skip", metavar="WORDS", help="no causes with these words")
     parser.add_argument("--ledger", type=Path, default=Path("compare_error_causes.sqlite"))
     parser.add_argument("--page", type=Path, help="page to renew between its marks")
     parser.add_argument("--out", type=Path, help="also write the text to this file")
@@ -62,6 +63,7 @@ def main() -> None:
             return 100.0 * average_errors(perfect, found(with_cause(machine, imperfections)))
 
         causes = [name for name in CAUSES if arguments.only in name]
+        causes = [name for name in causes if not arguments.skip or arguments.skip not in name]
         errors = {name: _errors(CAUSES[name], error_of, cases) for name in causes}
     published = _published(cases)
     common = float(np.mean([published[name] for name in GROUPS if name not in AT_AN_ANGLE]))
@@ -71,7 +73,9 @@ def main() -> None:
             for group, error in errors[f"phase error, {size}"].items()
         }
     lines = [[name, *map(_percent, of_group.values())] for name, of_group in errors.items()]
-    text = page.origin("python analyses/compare_error_causes.py --page docs/error-causes.md", [])
+    command = "python analyses/compare_error_causes.py --page docs/error-causes.md"
+    command += f' --skip "{arguments.skip}"' if arguments.skip else ""
+    text = page.origin(command, [])
     text += page.table_text(
         "Error of a model without the cause",
         ["cause, size", *GROUPS],

@@ -22,7 +22,7 @@ LOOSE = {
 SIZES = ("0.05 mm", "10 g", "2 deg"), ("0.15 mm", "20 g", "5 deg"), ("0.5 mm", "50 g", "10 deg")
 """Small, middle and large size of the three causes. All are assumptions."""
 
-ASKED_FOR = ("19 deg", "22 deg", "24 deg")
+ASKED_FOR = ("19 deg", "24 deg")
 """Errors of the phase that the excess of [A] at 180 and at 90 degrees asks for, if all groups have
 a common error in quadrature."""
 
