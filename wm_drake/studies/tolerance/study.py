@@ -160,7 +160,7 @@ class ToleranceTrials:
 
     @property
     def gaps(self) -> Experiment:
-        """Runs of which gaps and contacts are measured only: they take two thirds of the time."""
+        """Return the same runs with gaps and contacts only, which take less time to measure."""
         return replace(self.experiment, measures=(GAP, CONTACTS))
 
     def runs(self, experiment: Experiment, scores: FloatArray, what: str) -> xr.Dataset:
