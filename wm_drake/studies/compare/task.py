@@ -4,7 +4,6 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -196,7 +195,7 @@ class CompareTask(Task):
         return [records[number] for number in range(len(cases))]
 
 
-def doubt_again(executor: Executor, options: Any, machine: Machine, case: Case) -> str:
+def doubt_again(executor: Executor, options: CompareOptions, machine: Machine, case: Case) -> str:
     """Return why records that were read before are not like their predictions; "" if they are."""
     with warnings.catch_warnings(action="ignore", category=InputNotice):
         return CompareTask(options, machine, case).doubt(executor)
