@@ -4,17 +4,23 @@ import os
 import subprocess
 import sys
 
+import pytest
+
 from wm_drake.elements.mount import mount_wrench_history
+from wm_drake.engines.compiled.integration import integrate_lanes
+from wm_drake.engines.compiled.linear import growth_lanes
 from wm_drake.engines.compiled.samples import torque_history
 from wm_drake.simulation import first_call
 from wm_drake.simulation.histories import output_history
 from wm_drake.simulation.signals import filter_both_ways
 
+OF_RECORDS = (mount_wrench_history, output_history, torque_history)
 
-def test_the_second_process_runs_what_reads_samples(reference):
-    first_call.compile_readers(reference)
-    functions = (mount_wrench_history, output_history, torque_history, filter_both_ways)
-    assert all(function.signatures for function in functions)
+
+@pytest.mark.parametrize(("batch", "readers"), [(True, (integrate_lanes,)), (False, OF_RECORDS)])
+def test_the_second_process_compiles_what_follows_set_up(reference, batch, readers):
+    first_call.compile_meanwhile(reference, batch=batch)
+    assert all(function.signatures for function in (growth_lanes, filter_both_ways, *readers))
 
 
 def test_one_process_is_started_for_a_folder_of_compiled_code(reference, tmp_path, monkeypatch):

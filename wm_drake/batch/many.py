@@ -141,7 +141,7 @@ def run_cases(
     """
     check_known(options.engine, ENGINES, f"no engine '{options.engine}'", key="engine")
     parameters = machine.parameters
-    compile_in_two_processes(parameters)
+    compile_in_two_processes(parameters, batch=not options.histories)
     if any("feet" in MEASURES[name].needs for name in options.measures):
         cabinet_of(parameters)
     workers = options.workers or os.cpu_count() or 1

@@ -4,6 +4,7 @@ numba itself trusts its files. A file that is cut short, empty or changed ends i
 reader or of the linker, or crashes the process.
 """
 
+import contextlib
 import functools
 import hashlib
 import pickle
@@ -12,6 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from wm_drake.compiler.claims import claimed
 from wm_drake.compiler.inlined import INLINED, InlinedLibrary
 from wm_drake.compiler.numba_internals import (
     CompileResult,
@@ -112,6 +114,7 @@ class LawCache(FunctionCache):
             RuntimeError, OSError: the folder cannot be written to.
         """
         super().__init__(function)
+        self._kept = set[Any]()
         files = self._cache_file
         folder, stamp = _shared(Path(files._cache_path), function) or (
             files._cache_path,
@@ -120,6 +123,36 @@ class LawCache(FunctionCache):
         self._cache_file = CheckedCacheFile(folder, self._impl.filename_base, stamp)
         if read_only:
             self._cache_file.read_only = str(Path(read_only, Path(folder).name))
+
+    def compile_once(self, dispatcher: Any) -> None:
+        """Let one process at a time compile a form of the function; the others read its files."""
+        compile_form = dispatcher._compiler.compile
+
+        def compile_or_read(args: Any, return_type: Any) -> CompileResult:
+            form = tuple(args)
+            with self._claimed(str(form)):
+                read = self.load_overload(form, dispatcher.targetctx)
+                if read is not None:
+                    entry = read.entry_point, read.fndesc, [read.library]
+                    dispatcher.targetctx.insert_user_function(*entry)
+                    self._kept.add(form)
+                    return read
+                compiled = compile_form(args, return_type)
+                self.save_overload(form, compiled)
+                return compiled
+
+        dispatcher._compiler.compile = compile_or_read
+
+    def save_overload(self, sig: Any, data: CompileResult) -> None:
+        """Save a compiled form once, while no other process changes the index of the function."""
+        if sig not in self._kept:
+            self._kept.add(sig)
+            with self._claimed("index"):
+                super().save_overload(sig, data)
+
+    def _claimed(self, what: str) -> contextlib.AbstractContextManager[None]:
+        folder = Path(self._cache_file._cache_path)
+        return claimed(folder.parent, f"{folder.name} {self._cache_file._index_name} {what}")
 
 
 def _shared(folder: Path, function: Callable[..., Any]) -> tuple[str, str] | None:

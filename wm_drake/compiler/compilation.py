@@ -116,6 +116,7 @@ def _compiled(function: Callable[..., Any], **options: Any) -> Any:
         return compiled
     finally:
         config.CACHE_DIR = chosen_by_user
+    compiled._cache.compile_once(compiled)
     return compiled
 
 

@@ -1,8 +1,10 @@
 """The first run after an installation compiles in two processes; this module is the second one.
 
-A run compiles the integration, for some ten seconds, and then what reads its samples. The second
-process compiles the latter meanwhile. Files of compiled code take it from process to process, so
-nobody waits for it, and nothing is lost if it ends early.
+A run compiles the laws of the mounts with its set-up, the integration, and then what reads its
+samples. The second process begins with what needs no set-up. Then it compiles the integration
+before a batch, and before a single run what reads samples, which takes as long as the integration.
+Files of compiled code take it from process to process, and neither compiles what the other does
+(`wm_drake.compiler.claims`). Nothing is lost if the second one ends early.
 """
 
 import atexit
@@ -19,11 +21,15 @@ from wm_drake.compiler.compilation import CACHE_FOLDER, READ_ONLY_FOLDER
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.engines.compiled.linear import is_followed
 from wm_drake.engines.compiled.packing import initial_state, pack
+from wm_drake.engines.compiled.run import advance_of, one_run
 from wm_drake.engines.compiled.samples import trajectory_of
+from wm_drake.engines.compiled.stepping import Stepping
 from wm_drake.engines.schedule import schedule_of
 from wm_drake.model.build import build_machine
+from wm_drake.model.machine import Setup
 from wm_drake.parameters import Load, MachineParameters, SpinProfile
 from wm_drake.simulation.cases import Case
+from wm_drake.simulation.displacements import amplitudes, filtered
 from wm_drake.simulation.measures import measure
 from wm_drake.simulation.records import as_record
 
@@ -31,17 +37,18 @@ STANDSTILL = SpinProfile(time=(0.0, 10.0), speed=(0.0, 0.0))
 """Long enough for the filter of the displacements."""
 
 
-def compile_in_two_processes(parameters: MachineParameters) -> None:
+def compile_in_two_processes(parameters: MachineParameters, *, batch: bool = False) -> None:
     """Start the second process, once for each folder of compiled code.
 
     Args:
         parameters: The machine that is about to run.
+        batch: Whether many runs follow whose samples are not kept.
     """
     started = Path(CACHE_FOLDER, "second_process")
     if READ_ONLY_FOLDER or not CACHE_FOLDER or (os.cpu_count() or 1) < 2:
         return
     try:
-        machine = pickle.dumps(parameters)
+        machine = pickle.dumps((parameters, batch))
         started.open("x").close()
         second = subprocess.Popen(
             [sys.executable, "-m", __name__],
@@ -64,15 +71,22 @@ def _end(second: "subprocess.Popen[bytes]", started: Path) -> None:
         started.unlink(missing_ok=True)
 
 
-def compile_readers(parameters: MachineParameters) -> None:
-    """Compile what makes a record of samples and measures it, with samples at rest.
+def compile_meanwhile(parameters: MachineParameters, *, batch: bool) -> None:
+    """Compile what judges the step and filters samples, then integration or readers of samples.
 
-    Before that comes what judges the step: the first process needs it soonest.
+    Arguments as for `compile_in_two_processes`.
     """
-    is_followed(np.zeros((WIDTH, 1, 1)), np.zeros(1, dtype=int), 1.0)
-    setup = build_machine(parameters).set_up()
-    p, layout = pack(setup)
     period = parameters.output_period
+    is_followed(np.zeros((WIDTH, 1, 1)), np.zeros(1, dtype=int), 1.0)
+    amplitudes(filtered(np.zeros((round(10.0 / period), 1)), period, (0.5, 20.0)))
+    setup = build_machine(parameters).set_up()
+    (compile_integration if batch else compile_readers)(setup)
+
+
+def compile_readers(setup: Setup) -> None:
+    """Compile what makes a record of samples and measures it, with samples at rest."""
+    p, layout = pack(setup)
+    period = setup.parameters.output_period
     schedule = schedule_of(STANDSTILL, period, period, layout.control_period)
     at_rest = np.pad(initial_state(setup, STANDSTILL), (0, layout.states.begins.rates))
     samples = np.tile(at_rest, (len(schedule.time), 1))
@@ -80,5 +94,15 @@ def compile_readers(parameters: MachineParameters) -> None:
     measure(as_record(setup, Case("at rest", Load(unbalances=()), STANDSTILL), trajectory))
 
 
+def compile_integration(setup: Setup) -> None:
+    """Compile the loop of the integrator that the machine most likely takes."""
+    period, tubes = setup.parameters.output_period, len(setup.telescopes)
+    stepping = Stepping("midpoint" if tubes else "multistep", period, np.zeros((tubes, 14, 14)))
+    how = stepping.integrator, stepping.relaxation
+    schedule, layout, lanes = one_run(setup, STANDSTILL, period, period, *how)
+    advance_of(schedule, stepping.one_derivative(schedule), layout, lanes)(0, 0)
+
+
 if __name__ == "__main__":
-    compile_readers(pickle.load(sys.stdin.buffer))
+    machine, follows = pickle.load(sys.stdin.buffer)
+    compile_meanwhile(machine, batch=follows)

@@ -245,11 +245,15 @@ def existing_file(path: Path, option: str) -> Path:
     return path
 
 
-def build_checked(file: str, parameters: "MachineParameters") -> "Machine":
-    """Return the built machine, after the checks of `built_with_problems`, to run it."""
+def build_checked(file: str, parameters: "MachineParameters", *, batch: bool = True) -> "Machine":
+    """Return the built machine, after the checks of `built_with_problems`, to run it.
+
+    Args:
+        batch: Whether it makes many runs whose samples are not kept.
+    """
     from wm_drake.simulation.first_call import compile_in_two_processes
 
-    compile_in_two_processes(parameters)
+    compile_in_two_processes(parameters, batch=batch)
     return built_with_problems(file, parameters)[0]
 
 

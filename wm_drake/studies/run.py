@@ -305,7 +305,7 @@ def _machine_of(order: Order, name: str) -> "Machine":
             replace(p, where=f"--set in machine '{name}'") if p.where == "--set" else p
             for p in error.problems
         ) from None
-    return build_checked(name, parameters)
+    return build_checked(name, parameters, batch=isinstance(order.run, LedgerOptions))
 
 
 def _engine(options: RunOptions) -> str:

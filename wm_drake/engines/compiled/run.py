@@ -76,21 +76,33 @@ def run_compiled(
     """
     period = period or profile.sample_period(setup.parameters.output_period)
     check_size(profile, step, period)
-    p, layout, water = pack_run(setup)
-    begin = np.concatenate([initial_state(setup, profile), water])
-    schedule = schedule_of(profile, step, period, layout.control_period)
-    rows, size = len(schedule.time), len(begin) + layout.states.begins.rates
-    relaxed = None
-    if integrator == "midpoint" and relaxation is not None:
-        relaxed = _in_lanes(relaxation)
-    sums, history = aligned(SUMS_SIZE * WIDTH), aligned(rows * size * WIDTH)
-    lanes = RunLanes(_in_lanes(p), _in_lanes(begin), history, sums, relaxed)
+    schedule, layout, lanes = one_run(setup, profile, step, period, integrator, relaxation)
     one_derivative = Stepping(integrator, step).one_derivative(schedule)
     for done in integrate_runs(schedule, one_derivative, layout, lanes):
         progress(done)
-    samples = lanes.samples.reshape(rows, size, WIDTH)[..., 0].copy()
-    estimates = estimates_of(sums)
+    samples = lanes.samples.reshape(len(schedule.time), -1, WIDTH)[..., 0].copy()
+    p, estimates = lanes.p.reshape(-1, WIDTH)[:, 0].copy(), estimates_of(lanes.sums)
     return replace(trajectory_of(samples, schedule, p, layout), estimates=estimates[0])
+
+
+def one_run(
+    setup: Setup,
+    profile: SpinProfile,
+    step: float,
+    period: float,
+    integrator: Integrator,
+    relaxation: FloatArray | None,
+) -> tuple[Schedule, Layout, RunLanes]:
+    """Return the steps of a single run and its lanes before the first; see `run_compiled`."""
+    p, layout, water = pack_run(setup)
+    begin = np.concatenate([initial_state(setup, profile), water])
+    schedule = schedule_of(profile, step, period, layout.control_period)
+    size = len(begin) + layout.states.begins.rates
+    relaxed = None
+    if integrator == "midpoint" and relaxation is not None:
+        relaxed = _in_lanes(relaxation)
+    sums, history = aligned(SUMS_SIZE * WIDTH), aligned(len(schedule.time) * size * WIDTH)
+    return schedule, layout, RunLanes(_in_lanes(p), _in_lanes(begin), history, sums, relaxed)
 
 
 def _in_lanes(values: FloatArray) -> FloatArray:
