@@ -46,6 +46,32 @@ def test_study_is_the_same_again_from_one_file(wm_drake, archive):
     pd.testing.assert_frame_equal(pd.read_csv("again/runs.csv"), pd.read_csv("out/runs.csv"))
 
 
+@pytest.mark.parametrize(
+    "words", [("rig gasket", "--axis", "axial", "-f", "3 Hz", "-a", "5 mm"), ("calibrate",)]
+)
+def test_files_that_files_name_are_in_the_archive(wm_drake, words):
+    folder = Path("inputs/below")
+    folder.mkdir(parents=True)
+    shutil.copy(SDF_FOLDER / "oscillating_group.sdf", folder.parent / "mine.sdf")
+    (folder.parent / "base.yaml").write_text("extends: reference\nname: base\nmodel: mine.sdf\n")
+    profile = "profile: {time: '(0, 4, 6) s', speed: '(60, 250, 250) rpm'}"
+    (folder / "mine.yaml").write_text(f"extends: ../base.yaml\nname: mine\n{profile}\n")
+    if words[0] == "calibrate":
+        (folder / "free.yaml").write_text(
+            "vary:\n  k: {sets: damper_types.friction.friction_force, bounds: '(10, 60) N', prior: '(30, 10) N', source: test}\n"
+        )
+        table = "load,gasket,source,Xr,Yr,Zr,Xf,Yf,Zf\nmiddle,yes,experiment,16,5,12,17,5,13\n"
+        (folder / "measured.csv").write_text(table)
+        files = ("--vary", folder / "free.yaml", "--targets", folder / "measured.csv")
+        words = (*words, *files, "--starts", "1", "--iterations", "1")
+    given = ("--machine", folder / "mine.yaml", "--archive", "a.zip", "--out", "out")
+    ended = wm_drake(*words, *given)
+    assert ended.code == 0, ended.err
+    shutil.rmtree(folder.parent)
+    ended = wm_drake("rerun", "a.zip")
+    assert ended.code == 0, ended.err + ended.out
+
+
 def test_what_differs_is_named(wm_drake, archive):
     with zipfile.ZipFile(archive) as old, zipfile.ZipFile("b.zip", "w") as new:
         for name in old.namelist():

@@ -24,22 +24,26 @@ def rerun(
 
     Say what differs; the exit code is 1 if anything does.
     """
-    from wm_drake.errors import check_known
-    from wm_drake.studies.archive import differences, libraries, read_archive
+    from wm_drake.studies.archive import differences, libraries, read_archive, study_of
     from wm_drake.studies.run import execute, order_of
-    from wm_drake.studies.study import STUDIES
 
     with tempfile.TemporaryDirectory() as folder:
         archived, about, tables = read_archive(archive, Path(folder))
-        check_known(archived.study, list(STUDIES), "no study", where=str(archive))
+        study = study_of(archived.study, str(archive))
         say(f"{archived.command}  ({about['date']}, revision {about['revision']})")
         here = {"wm_drake": version(), "revision": source_revision(), **libraries()}
         there = {"wm_drake": about["version"], "revision": about["revision"], **about["libraries"]}
         for name in here:
             if here[name] != there.get(name):
                 say(f"{name}: {there.get(name, 'not known')} in the archive, {here[name]} here")
-        study, machines = STUDIES[archived.study], list(archived.machines)
-        given = {**archived.options, **archived.run, "out": out, "overwrite": overwrite}
+        machines = list(archived.machines)
+        defaults = study.all_options.model_construct().model_dump(mode="json")
+        options = {
+            name: value
+            for name, value in archived.options.items()
+            if name in archived.chosen or value != defaults.get(name)
+        }
+        given = {**options, **archived.run, "out": out, "overwrite": overwrite}
         if machines:
             is_one = study.all_options.model_fields["machine"].annotation is str
             given["machine"] = machines[0] if is_one else machines

@@ -2,21 +2,23 @@
 
 It is a zip file with `archive.json` (study, options, versions), the machines as `machine_N.json`
 with their numbers in SI before `--set`, their SDF files, the input files of the options, the tables
-of the result, and the ledger of its runs. A file that an input file names in turn is not in it.
+of the result, and the ledger of its runs. Files that these files name are in it too, if they do so
+relative to themselves.
 """
 
 import io
 import json
+import os
+import re
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from wm_drake.errors import input_error, reason_of
-from wm_drake.parameters.text_files import is_file
+from wm_drake.errors import check_known, input_error, reason_of
 from wm_drake.report.provenance import now, source_revision, version
 from wm_drake.studies.result_folder import LEDGER
 from wm_drake.written_files import write_files
@@ -24,11 +26,17 @@ from wm_drake.written_files import write_files
 if TYPE_CHECKING:
     from wm_drake.parameters import MachineParameters
     from wm_drake.studies.answer import Answer
+    from wm_drake.studies.study import Study
 
 FORMAT = "wm_drake archive 1"
 ABOUT, TABLES, INPUTS = "archive.json", "tables/", "inputs/"
 NOT_AGAIN = ("out", "overwrite", "figures", "archive", "resume", "cluster", "workers")
 """Options of the driver that belong to a place and not to the study."""
+
+NAMING = (".yaml", ".yml", ".sdf", ".gltf")
+"""Suffixes of files that may name others: what they extend, tables, meshes."""
+
+_WORD = re.compile(r"[^\s\"'<>\[\]{},]+|\"[^\"\n]+\"|'[^'\n]+'")
 
 FILES_OF_MACHINE = ("model", "measured", "published")
 """Fields of a machine that are files."""
@@ -45,10 +53,11 @@ class Archived(NamedTuple):
     """Study in an archive.
 
     Attributes:
-        study: Its name.
+        study: Words of its command.
         command: Command line or Python call.
         machines: Machines before `--set`, by what their option names.
-        options: Options of the study, without its machines.
+        options: Options of the study, without machines that the driver builds.
+        chosen: Names of those that the user has set.
         run: Options of the driver, without those of `NOT_AGAIN`.
     """
 
@@ -56,7 +65,25 @@ class Archived(NamedTuple):
     command: str
     machines: "Mapping[str, MachineParameters]"
     options: Mapping[str, Any]
+    chosen: Sequence[str]
     run: Mapping[str, Any]
+
+
+def study_of(command: str, where: str) -> "Study":
+    """Return a study by the words of its command.
+
+    Raises:
+        InputError: no study has this command.
+    """
+    from wm_drake.studies.compare.options import COMPARE
+    from wm_drake.studies.identify.options import IDENTIFY
+    from wm_drake.studies.orders.options import ORDERS
+    from wm_drake.studies.rig.options import RIG
+    from wm_drake.studies.study import STUDIES
+
+    every = {s.command: s for s in (*STUDIES.values(), *RIG, *IDENTIFY, COMPARE, ORDERS)}
+    check_known(command, list(every), f"no study '{command}'", where=where)
+    return every[command]
 
 
 def write_archive(
@@ -84,6 +111,7 @@ def write_archive(
         "libraries": libraries(),
         "machines": list(study.machines),
         "options": options,
+        "chosen": list(study.chosen),
         "files": names,
         "run": dict(study.run),
     }
@@ -132,20 +160,44 @@ def _packed(
     def of(value: Any) -> Any:
         if isinstance(value, (list, tuple)):
             return [of(one) for one in value]
-        if not isinstance(value, str) or not value or not _is_file(value):
-            return value
-        data, number = Path(value).read_bytes(), len(content)
-        known = next((name for name, other in content.items() if other == data), None)
-        name = known or f"{INPUTS}{number}/{Path(value).name}"
-        content[name], names[name] = data, value
-        return name
+        text = str(value) if isinstance(value, (str, Path)) else ""
+        before, _, after = text.partition("=")
+        if _is_file(text) or (isinstance(value, Path) and value.is_dir()):
+            name = _added(Path(text), f"{INPUTS}{len(content)}", content)
+            names[name] = text
+            return name
+        return f"{before}={of(after)}" if _is_file(after) else text or value
 
     return {key: of(value) for key, value in values.items()}
 
 
-def _is_file(text: str) -> bool:
+def _added(path: Path, place: str, content: dict[str, bytes]) -> str:
+    """Add a file with those that it names, or a folder, to an archive; return its name there."""
+    path, files = Path(os.path.normpath(path.absolute())), dict[Path, bytes]()
+    for one in path.iterdir() if path.is_dir() else [path]:
+        if one.is_file() and one.name != LEDGER and one.suffix != ".html":
+            _find_with_others(one, files)
+    root = os.path.commonpath([path.parent, *(one.parent for one in files)])
+    content.update({f"{place}/{one.relative_to(root)}": data for one, data in files.items()})
+    return f"{place}/{path.relative_to(root)}"
+
+
+def _find_with_others(path: Path, files: dict[Path, bytes]) -> None:
+    """Add a file and those that it names to files."""
+    if path in files:
+        return
+    files[path] = path.read_bytes()
+    if path.suffix.lower() in NAMING:
+        text = files[path].decode(errors="replace")
+        for word in _WORD.findall(text):
+            other = Path(word.strip("\"'"))
+            if not other.is_absolute() and _is_file(path.parent / other):
+                _find_with_others(Path(os.path.normpath(path.parent / other)), files)
+
+
+def _is_file(path: str | Path) -> bool:
     try:
-        return is_file(Path(text))
+        return bool(path) and Path(path).is_file()
     except (OSError, ValueError):
         return False
 
@@ -183,6 +235,7 @@ def read_archive(
                 about["command"],
                 dict(zip(about["machines"], machines, strict=True)),
                 _unpacked(about["options"], folder, names),
+                about["chosen"],
                 about["run"],
             )
     except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
@@ -197,7 +250,9 @@ def _unpacked(values: Mapping[str, Any], folder: Path, files: set[str]) -> dict[
     def of(value: Any) -> Any:
         if isinstance(value, list):
             return [of(one) for one in value]
-        return str(folder / value) if isinstance(value, str) and value in files else value
+        before, equals, place = str(value).rpartition("=")
+        is_known = place in files or (place and any(f.startswith(f"{place}/") for f in files))
+        return f"{before}{equals}{folder / place}" if is_known else value
 
     return {key: of(value) for key, value in values.items()}
 

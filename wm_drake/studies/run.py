@@ -272,10 +272,11 @@ def _archived(order: Order) -> "Archived":
     from wm_drake.studies.archive import NOT_AGAIN, Archived
 
     return Archived(
-        order.study.name,
+        order.study.command,
         order.command,
         {n: order.parameters.get(n) or load_machine(n) for n in order.machines},
-        order.options.model_dump(mode="json", exclude={"machine"}),
+        order.options.model_dump(exclude={"machine"} if order.study.has_machine else None),
+        sorted(order.options.model_fields_set),
         order.run.model_dump(mode="json", exclude=set(NOT_AGAIN)),
     )
 
