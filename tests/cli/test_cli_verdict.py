@@ -5,10 +5,13 @@ import re
 import shlex
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import wm_drake as wm
-from wm_drake.parameters import with_values
+from wm_drake.parameters import SpinProfile, with_values
+from wm_drake.studies.experiment import Experiment
+from wm_drake.studies.verdict.study import influences, smallest
 
 PROFILE = "time: (0, 2) s\nspeed: (0, 300) rpm\n"
 
@@ -88,12 +91,44 @@ def test_limits_and_parts_that_may_change_are_the_users(verdict):
     assert any("changes by" in row["why_not"] for row in shown["influences"])
 
 
-def test_a_smaller_change_is_not_better_than_the_default(verdict):
+@pytest.mark.parametrize("limit", ["F=10", "mount_force_peak=5"])
+def test_a_smaller_change_is_not_better_than_the_default(verdict, limit):
     gaps = []
     for change in ("20", "9"):
-        shown = json.loads(verdict("reference", "--change", change, "--json", "--out", change).out)
+        words = ("--change", change, "--limit", limit, "--json", "--out", change)
+        shown = json.loads(verdict("reference", *words).out)
         gaps += [row["after"] for row in shown["proposal"] if row["response"] == "gap"]
     assert gaps[0] >= gaps[1]
+
+
+def test_a_proposal_stays_within_the_effort_of_the_user(verdict):
+    friction = "damper_types.friction.friction_force"
+    words = (f"{friction}=4", "--effort", "bodies=0.5", "--most-effort", "1")
+    shown = json.loads(verdict("reference", "--effort", *words, "--json", "--out", "out").out)
+    made = [row["keys"] for row in shown["changes"]]
+    assert made
+    assert sum(0.5 if key.startswith("bodies") else 1.0 for key in made) <= 1.0
+    why = {row["key"]: row["why_not"] for row in shown["influences"]}
+    assert why[friction] == "its effort, 4, is above 1"
+
+
+class Refusing(Experiment):
+    """Experiment with a machine that refuses stiff springs."""
+
+    def can_run(self, machine):
+        return machine.spring_types["suspension"].stiffness < 8000.0
+
+
+def test_a_change_that_the_machine_refuses_is_listed():
+    reference = wm.load_machine("reference")
+    profile = SpinProfile(time=(0.0, 2.0), speed=(0.0, 30.0))
+    case = wm.Case("middle", reference.loads["middle"], profile)
+    experiment = Refusing(wm.build_machine(reference), ("gap",), loads=(case,))
+    tried = influences(experiment, ["spring_types.suspension.stiffness"], 0.2)
+    assert tried.is_refused.values.tolist() == [[False, True]]
+    less, more = smallest(tried).values[0]
+    assert less > 0.0
+    assert more == -np.inf
 
 
 @pytest.mark.parametrize(
@@ -106,6 +141,7 @@ def test_a_smaller_change_is_not_better_than_the_default(verdict):
         (("nothing.yaml",), 2, "nothing.yaml"),
         (("--limit", "G=5"), 2, "--limit: G: unknown response"),
         (("--limit", "F=-5"), 2, "is negative"),
+        (("--effort", "gasket=-1"), 2, "--effort: gasket: is -1"),
         (("--only", "gaskett"), 2, "--only: gaskett: nothing that can change"),
         (("rodrigues_2010",), 0, ""),  # no springs, so no frequency of bouncing either
     ],

@@ -9,7 +9,7 @@ of a part. Of each response the worst load counts. The rule:
    desirability (Derringer and Suich): the geometric mean over the responses of a number from 0 at
    the worst to 1 at the best value that any run had.
 3. The best candidate must gain `LEAST_GAIN` of the range of the aim. Of those that keep all but
-   `SMALL_SHARE` of its gain, the one with the fewest changes is proposed.
+   `SMALL_SHARE` of its gain, the one with the fewest changes, or the least effort, is proposed.
 4. It is proposed only if runs confirm it (`is_confirmed`): models may choose, and runs decide.
 """
 
@@ -126,12 +126,12 @@ class Aim:
         """Return by how much candidates are better than the machine. (n,)"""
         return self.value(values) - self.value(self.machine[None])
 
-    def proposed(self, values: FloatArray, changes: Sequence[int]) -> int | None:
+    def proposed(self, values: FloatArray, changes: Sequence[float]) -> int | None:
         """Return the number of the proposed candidate; None if none is clearly better.
 
         Args:
             values: Responses of the candidates, as of `value`.
-            changes: How many numbers or factors each changes.
+            changes: How many numbers or factors each changes, or its effort.
         """
         if not self.can_choose or not len(values):
             return None

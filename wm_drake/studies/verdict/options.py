@@ -51,6 +51,15 @@ class VerdictOptions(Options):
         "Repeatable. Default: springs, dampers, bushings, gasket, counterweights.",
         "KEY",
     )
+    effort: tuple[str, ...] = option(
+        (),
+        "Effort or cost of a change, in any unit, by a key path or its first parts: "
+        "damper_types=2. The first that fits counts. Repeatable. Default: 1 for each change.",
+        "KEY=NUMBER",
+    )
+    most_effort: float = option(
+        3.0, "Largest effort of a proposal, the sum of its changes.", "NUMBER", gt=0.0
+    )
     profile: Path | None = PROFILE
     seed: int = SEED
 

@@ -44,14 +44,17 @@ PHYSICAL = ("N/m", "N*s/m", "N", "N*m/rad", "N*m*s/rad", "N*m")
 """SI units of stiffness, damping and friction; other numbers, such as the velocity at which
 friction is full, belong to a law and not to a part."""
 
-MOST_COMBINED = 3
-"""Largest number of changes in a combination: more are hard to make."""
-
 MOST_TRIED = 10
 """Number of single changes, the best ones, that a combination may contain."""
 
 SMALLER = (0.5, 0.25)
 """Parts of the change that are tried too of these: a limit may allow less of a change only."""
+
+SCALES = np.arange(0.1, 0.95, 0.1)
+"""Parts of a change beyond a limit that are tried too."""
+
+MOST_SCALED = 3
+"""Number of changes beyond a limit, the best ones, of which parts are tried."""
 
 SIDES = ("less", "more")
 STATES = ("as it is", "with the proposal")
@@ -86,6 +89,59 @@ class ChangedRuns(NamedTuple):
     changes: Mapping[str, str]
 
 
+@dataclass(frozen=True)
+class ProposalSearch:
+    """What a proposal is searched with.
+
+    Attributes:
+        experiment: Runs of the machine with all loads.
+        aim: As of `aim_of`.
+        chosen: Responses.
+        change: Change of a number that is tried, as a share of it.
+        efforts: Effort of the change of each number by its key path.
+        most_effort: Largest effort of a proposal, the sum of its changes.
+    """
+
+    experiment: Experiment
+    aim: Aim
+    chosen: Sequence[Response]
+    change: float
+    efforts: Mapping[str, float]
+    most_effort: float
+
+    def effort(self, changes: Iterable[str]) -> float:
+        """Return the effort of changes of some key paths."""
+        return sum(map(self.efforts.__getitem__, changes))
+
+    def is_too_hard(self, changes: Iterable[str]) -> bool:
+        """Return whether the effort of changes is too large, but for rounding."""
+        return self.effort(changes) > self.most_effort * (1.0 + 1e-9)
+
+    def runs_of(self, every: Iterable[Mapping[str, str]], what: str) -> list[ChangedRuns]:
+        """Run changes that the machine and its step allow."""
+        named = {"; ".join(f"{k}={t}" for k, t in each.items()): each for each in every}
+        machines = self.experiment.allowed(named)
+        if not machines:
+            return []
+        data = self.experiment.at(list(machines), machines.values(), what)
+        return [ChangedRuns(data.sel(point=name), named[name]) for name in machines]
+
+    def worst(self, every: Iterable[ChangedRuns]) -> FloatArray:
+        """Return the responses of changes, each of its worst load. (n, responses)"""
+        goals = self.aim.goals
+        return np.array([worst_of(values_of(one.runs, self.chosen), goals) for one in every])
+
+    def text(self, key: str, factor: float) -> str:
+        """Return a multiple of a number of the machine as text."""
+        return _text(self.experiment.machine.parameters, key, factor)
+
+    def scaled(self, changes: Mapping[str, str], part: float) -> dict[str, str]:
+        """Return a part of changes."""
+        machine = self.experiment.machine.parameters
+        ratios = {key: _ratio(machine, key, text) for key, text in changes.items()}
+        return {key: self.text(key, 1.0 + part * (ratio - 1.0)) for key, ratio in ratios.items()}
+
+
 class Judged(NamedTuple):
     """What a verdict found.
 
@@ -114,30 +170,26 @@ def influences(experiment: Experiment, keys: Iterable[str], change: float) -> xr
 
     Returns:
         The measures over `key`, the strongest first, `side`, less and more, and `load`; `text`, the
-        value as `--set` takes it. Numbers of which machine or step refuse a side are left out.
+        value as `--set` takes it; `is_refused`, whether the machine or its step refuses it.
     """
     parameters, factors = experiment.machine.parameters, (1.0 - change, 1.0 + change)
     texts = {key: [_text(parameters, key, factor) for factor in factors] for key in keys}
-    names = {key: [f"{key}={text}" for text in both] for key, both in texts.items()}
-    machines = experiment.allowed(
-        {n: {k: t} for k in texts for n, t in zip(names[k], texts[k], strict=True)}
-    )
-    complete = [key for key in texts if all(name in machines for name in names[key])]
-    runs = experiment.over(
-        {"key": complete, "side": SIDES, "load": [case.name for case in experiment.loads]},
-        (
-            case
-            for key in complete
-            for name in names[key]
-            for case in experiment.cases_of(machines[name], name)
-        ),
-        "single changes",
-    )
+    every = {f"{key}={text}": {key: text} for key in texts for text in texts[key]}
+    machines = experiment.allowed(every)
+    runs = experiment.at(list(machines), machines.values(), "single changes")
+    runs = runs.reindex(point=list(every)).drop_vars("point")
+    runs = runs.coarsen(point=len(SIDES)).construct(point=("key", "side"))
+    runs = runs.assign_coords(key=list(texts), side=list(SIDES))
+    shape = (len(texts), len(SIDES))
+    is_refused = np.array([name not in machines for name in every]).reshape(shape)
     less, more = smallest(runs).values.T
     both_ran = np.isfinite(less) & np.isfinite(more)
     span = np.abs(np.subtract(more, less, where=both_ran, out=np.full(len(less), np.inf)))
-    shown = np.array([texts[key] for key in complete]).reshape(-1, len(SIDES))
-    return runs.assign(text=(("key", "side"), shown)).isel(key=np.argsort(-span, kind="stable"))
+    span[is_refused.any(axis=1)] = 0.0
+    shown = np.array(list(texts.values())).reshape(shape)
+    dims = ("key", "side")
+    runs = runs.assign(text=(dims, shown), is_refused=(dims, is_refused))
+    return runs.isel(key=np.argsort(-span, kind="stable"))
 
 
 def aim_of(
@@ -156,82 +208,87 @@ def aim_of(
     return Aim(goals, ranges, worst_of(parts[0], goals), np.array(limits))
 
 
-def proposed(
-    experiment: Experiment,
-    aim: Aim,
-    tried: xr.Dataset,
-    chosen: Sequence[Response],
-    change: float,
-) -> ChangedRuns | None:
+def proposed(search: ProposalSearch, tried: xr.Dataset) -> ChangedRuns | None:
     """Return the proposed change, as of `wm_drake.studies.proposal`.
 
-    The candidates are the single changes, the strongest ones also smaller, and the best one with
-    the best additions to it.
+    The candidates are the single changes, the strongest ones also smaller, the best one with the
+    best additions to it, and parts of those that would be better without a limit.
 
     Args:
-        experiment: Runs of the machine with all loads.
-        aim: As of `aim_of`.
+        search: What it is searched with.
         tried: As of `influences`.
-        chosen: Responses.
-        change: Change of a number in `tried`, as a share of it.
 
     Returns:
         None if no change is clearly better.
     """
-    if not aim.can_choose or not tried.sizes["key"]:
+    single = _singles(search, tried) if search.aim.can_choose else []
+    if not single:
         return None
-    single = _singles(experiment, aim, tried, chosen, change)
-    candidates = [*single, *_combined(experiment, aim, single, chosen)]
-    values = np.array([_worst(one, aim, chosen) for one in candidates])
-    number = aim.proposed(values, [len(one.changes) for one in candidates])
+    candidates = [*single, *_combined(search, single)]
+    candidates += _within_limits(search, candidates)
+    efforts = [search.effort(one.changes) for one in candidates]
+    number = search.aim.proposed(search.worst(candidates), efforts)
     return None if number is None else candidates[number]
 
 
-def _worst(one: ChangedRuns, aim: Aim, chosen: Sequence[Response]) -> FloatArray:
-    return worst_of(values_of(one.runs, chosen), aim.goals)
-
-
-def _singles(
-    experiment: Experiment,
-    aim: Aim,
-    tried: xr.Dataset,
-    chosen: Sequence[Response],
-    change: float,
-) -> list[ChangedRuns]:
+def _singles(search: ProposalSearch, tried: xr.Dataset) -> list[ChangedRuns]:
     """Return the changes of one number that reach most, each as large as is best, best first."""
-    worst = worst_of(values_of(tried, chosen), aim.goals)
+    aim, keys = search.aim, tried["key"].values.tolist()
+    worst = worst_of(values_of(tried, search.chosen), aim.goals)
     reached = np.nan_to_num(
         aim.reached(worst.reshape(-1, len(aim.goals))).reshape(worst.shape[:2]), nan=-np.inf
     )
-    ranked = np.argsort(-reached.max(axis=1), kind="stable")[:MOST_TRIED]
-    sizes: dict[str, list[ChangedRuns]] = {}
-    smaller: dict[str, tuple[str, str]] = {}
-    for k in ranked.tolist():
-        side = int(reached[k].argmax())
-        one = tried.isel(key=k, side=side)
-        key = one["key"].item()
-        sizes[key] = [ChangedRuns(one, {key: one.text.item()})]
-        for part in SMALLER:
-            factor = 1.0 + (2 * side - 1) * part * change
-            text = _text(experiment.machine.parameters, key, factor)
-            smaller[f"{key}={text}"] = key, text
-    machines = experiment.allowed({name: {key: text} for name, (key, text) in smaller.items()})
-    runs = experiment.at(list(machines), machines.values(), "smaller changes") if machines else None
-    for name in machines:
-        key, text = smaller[name]
-        assert runs is not None
-        sizes[key].append(ChangedRuns(runs.sel(point=name), {key: text}))
-    best = []
-    for of_key in sizes.values():
-        value = aim.value(np.array([_worst(one, aim, chosen) for one in of_key]))
-        best.append((float(value.max()), of_key[int(value.argmax())]))
-    return [one for _, one in sorted(best, key=lambda pair: -pair[0])]
+    ranked = np.argsort(-reached.max(axis=1, initial=-np.inf), kind="stable").tolist()
+    ranked = [k for k in ranked if not search.is_too_hard([keys[k]])][:MOST_TRIED]
+    sides = {k: int(reached[k].argmax()) for k in ranked if np.isfinite(reached[k]).any()}
+    ones = [tried.isel(key=k, side=side) for k, side in sides.items()]
+    every = [ChangedRuns(one, {one["key"].item(): one.text.item()}) for one in ones]
+    smaller = [search.scaled(one.changes, part) for one in every for part in SMALLER]
+    every += search.runs_of(smaller, "smaller changes")
+    best: dict[str, ChangedRuns] = {}
+    for number in np.argsort(-aim.value(search.worst(every)), kind="stable") if every else ():
+        best.setdefault("".join(every[number].changes), every[number])
+    return list(best.values())
 
 
-def reasons(
-    aim: Aim, tried: xr.Dataset, chosen: Sequence[Response], changed: ChangedRuns | None
-) -> list[str]:
+def _combined(search: ProposalSearch, singles: Sequence[ChangedRuns]) -> list[ChangedRuns]:
+    """Return the best single change with each addition, then of the best pair, ...
+
+    They end where no addition is better, or its effort is too large.
+
+    Args:
+        search: What they are searched with.
+        singles: Single changes, the best one first.
+    """
+    best, combined = singles[0], list[ChangedRuns]()
+    useful = {key: text for one in singles for key, text in one.changes.items()}
+    while True:
+        made = best.changes
+        more = [{**made, key: text} for key, text in useful.items() if key not in made]
+        allowed = [each for each in more if not search.is_too_hard(each)]
+        added = search.runs_of(allowed, "combinations")
+        if not added:
+            return combined
+        combined += added
+        first, *others = search.aim.value(search.worst([best, *added])).tolist()
+        if max(others) <= first:
+            return combined
+        best = added[int(np.argmax(others))]
+
+
+def _within_limits(search: ProposalSearch, candidates: Sequence[ChangedRuns]) -> list[ChangedRuns]:
+    """Return parts of the candidates beyond a limit that reach more than those within it."""
+    worst = search.worst(candidates)
+    value, reached = search.aim.value(worst), search.aim.reached(worst)
+    is_better = (value < 0.0) & (reached > value.max())
+    best = [k for k in np.argsort(-reached, kind="stable").tolist() if is_better[k]][:MOST_SCALED]
+    parts = [search.scaled(candidates[k].changes, part) for k in best for part in SCALES]
+    return search.runs_of(parts, "changes within the limits")
+
+
+def reasons(search: ProposalSearch, tried: xr.Dataset, changed: ChangedRuns | None) -> list[str]:
     """Return why the better side of each change that was tried is not proposed; "" if it is."""
+    aim, chosen = search.aim, search.chosen
     worst = worst_of(values_of(tried, chosen), aim.goals)
     gaps, machine = smallest(tried).values, aim.machine[list(aim.goals).index(GAP)]
     made = {} if changed is None else changed.changes
@@ -242,49 +299,20 @@ def reasons(
         beyond = int(np.argmax(rise - aim.limits))
         if key in made:
             texts.append("")
+        elif tried.is_refused[k].all():
+            texts.append("the machine or its step size does not allow it")
         elif not np.isfinite(rise).all():
             texts.append("a run fails")
         elif gaps[k, side] <= machine:
             texts.append("the gap does not grow")
+        elif search.is_too_hard([key]):
+            texts.append(f"its effort, {search.efforts[key]:g}, is above {search.most_effort:g}")
         elif rise[beyond] > np.broadcast_to(aim.limits, rise.shape)[beyond]:
             amount = CHANGE.text(rise[beyond])
             texts.append(f"{chosen[beyond].title} ({chosen[beyond].name}) changes by {amount}")
         else:
             texts.append("gains less" if made else "gains too little")
     return texts
-
-
-def _combined(
-    experiment: Experiment, aim: Aim, singles: Sequence[ChangedRuns], chosen: Sequence[Response]
-) -> list[ChangedRuns]:
-    """Return the best single change with each addition, then of the best pair, ...
-
-    They end where no addition is better.
-
-    Args:
-        experiment: Runs of the machine with all loads.
-        aim: What a change shall reach.
-        singles: Single changes, the best one first.
-        chosen: Responses.
-    """
-    best, combined = singles[0], list[ChangedRuns]()
-    useful = {key: text for one in singles for key, text in one.changes.items()}
-    for _ in range(MOST_COMBINED - 1):
-        made = best.changes
-        more = [{**made, key: text} for key, text in useful.items() if key not in made]
-        named = {"; ".join(f"{k}={t}" for k, t in each.items()): each for each in more}
-        machines = experiment.allowed(named)
-        if not machines:
-            break
-        data = experiment.at(list(machines), machines.values(), "combinations")
-        added = [ChangedRuns(data.sel(point=name), named[name]) for name in machines]
-        values = [worst_of(values_of(one.runs, chosen), aim.goals) for one in (best, *added)]
-        first, *others = aim.value(np.array(values)).tolist()
-        combined += added
-        if max(others) <= first:
-            break
-        best = added[int(np.argmax(others))]
-    return combined
 
 
 def goals_of(chosen: Sequence[Response]) -> dict[str, Better]:
@@ -386,10 +414,11 @@ def _unit_of(parameters: MachineParameters, key: str) -> Unit:
 
 
 def _ratio(parameters: MachineParameters, key: str, text: str) -> float:
-    """Return a changed number over that of the machine; 1 for a table, which has its percents."""
+    """Return a changed number over that of the machine; of a table, its percents."""
     value = value_at(parameters, key)
-    changed = value_at(with_value(parameters, key, text), key)
-    return 1.0 if isinstance(value, CurveTable) else changed / value
+    if isinstance(value, CurveTable):
+        return FACTOR.unit.number(text)
+    return float(value_at(with_value(parameters, key, text), key) / value)
 
 
 def words_of(key: str) -> str:

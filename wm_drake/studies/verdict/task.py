@@ -51,6 +51,7 @@ from wm_drake.studies.verdict.study import (
     SMALLEST_GAP,
     STATES,
     Judged,
+    ProposalSearch,
     VerdictQuestion,
     aim_of,
     changeable,
@@ -90,6 +91,7 @@ class VerdictTask(Task):
         self.responses = tuple(r for r in known if {r.group, r.name} & {*SHOWN_GROUPS})
         self.limits = _limits(options.limit, self.responses)
         self.keys = _changeable(options.only, full)
+        self.efforts = _efforts(options.effort, self.keys)
         measures = {*measures_of(full, self.responses), CONTACTS}
         measures |= {STOPS.name} if STOPS.applies(full) else set()
         self.measures = tuple(name for name in MEASURES if name in measures)
@@ -102,6 +104,8 @@ class VerdictTask(Task):
         more = [f"--clearance '{options.clearance}'"] if self.clearance else []
         more += [f"--limit {limit}" for limit in options.limit]
         more += [f"--only {key}" for key in options.only]
+        more += [f"--effort {text}" for text in options.effort]
+        more += [f"--most-effort {options.most_effort:g}"] if options.most_effort != 3.0 else []
         return command_text(f"wm-drake verdict {machine}", options, *more)
 
     def _laundry(self, machine: Machine) -> ToleranceTask:
@@ -118,7 +122,8 @@ class VerdictTask(Task):
         """Return what determines the runs."""
         options = self.options
         change = {"change": f"{options.change:g} %", "limits": self.limits, "only": options.only}
-        return {**self.laundry.identity, **change}
+        efforts = {"efforts": (self.efforts, options.most_effort)}
+        return {**self.laundry.identity, **change, **efforts}
 
     def run(self, executor: Executor) -> Answer:
         """Run, and return the answer."""
@@ -132,7 +137,9 @@ class VerdictTask(Task):
         samples = [self.laundry.trials(executor).samples()]
         tried = influences(experiment, self.keys, change)
         aim = aim_of(base, tried, self.responses, self.limits)
-        changed = proposed(experiment, aim, tried, self.responses, change)
+        efforts = self.efforts, self.options.most_effort
+        search = ProposalSearch(experiment, aim, self.responses, change, *efforts)
+        changed = proposed(search, tried)
         if changed is not None:
             better = build_machine(with_values(parameters, changed.changes))
             samples.append(self._laundry(better).trials(executor).samples())
@@ -148,7 +155,7 @@ class VerdictTask(Task):
         return Judged(
             question,
             states_of(base, changed),
-            tried.assign(why_not=("key", reasons(aim, tried, self.responses, changed))),
+            tried.assign(why_not=("key", reasons(search, tried, changed))),
             laundry_of(samples, self.clearance),
             laundry_masses(samples[0]),
         )
@@ -231,12 +238,32 @@ def _limits(entries: Sequence[str], chosen: Sequence[Response]) -> tuple[float, 
 def _changeable(parts: Sequence[str], parameters: MachineParameters) -> list[str]:
     """Return the key paths of what may change, below the given ones if there are any."""
     every = list(changeable(parameters))
-    kept = [k for k in every if not parts or any(f"{k}.".startswith(f"{p}.") for p in parts)]
-    for part in parts:
-        if not any(f"{key}.".startswith(f"{part}.") for key in every):
-            hint = nearest_names(part, every)
-            raise input_error(f"nothing that can change{hint}", where="--only", key=part)
-    return kept
+    below = {key for part in parts for key in _below(part, every, "--only")}
+    return [key for key in every if not parts or key in below]
+
+
+def _below(part: str, every: Sequence[str], option: str) -> list[str]:
+    """Return the key paths that begin with some parts."""
+    keys = [key for key in every if f"{key}.".startswith(f"{part}.")]
+    if not keys:
+        hint = nearest_names(part, every)
+        raise input_error(f"nothing that can change{hint}", where=option, key=part)
+    return keys
+
+
+def _efforts(entries: Sequence[str], keys: Sequence[str]) -> dict[str, float]:
+    """Return the effort of the change of each key path."""
+    efforts: dict[str, float] = {}
+    for part, text in pairs_of(entries, "--effort"):
+        try:
+            effort = plain_number(text)
+        except ValueError as error:
+            raise input_error(str(error), where="--effort", key=part) from None
+        if not effort >= 0.0:
+            raise input_error(f"is {effort:g}; allowed is >= 0", where="--effort", key=part)
+        for key in _below(part, keys, "--effort"):
+            efforts.setdefault(key, effort)
+    return {key: efforts.get(key, 1.0) for key in keys}
 
 
 def _length(text: str) -> float:
