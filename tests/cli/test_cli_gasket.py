@@ -78,6 +78,25 @@ def test_json_says_how_well_the_model_predicts(study_without_page):
     assert 0.9 < response["predicted_r2"] < response["adjusted_r2"] <= 1.0
 
 
+def test_central_composite_design_of_a_program_has_a_quadratic_model(wm_drake):
+    Path("p.yaml").write_text(PROFILE)
+    star = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+    star += [tuple(s if k == j else 0 for k in range(3)) for j in range(3) for s in (-1, 1)]
+    rows = [f"{k},1,1,{x},{y},{z}" for k, (x, y, z) in enumerate([*star, *3 * [(0, 0, 0)]], 1)]
+    head = "StdOrder,PtType,Blocks,C_L,K_Lx,K_Ly"
+    Path("own.csv").write_text("\n".join([head, *rows]))
+    factors = [word for name in ("C_L", "K_Lx", "K_Ly") for word in ("--factor", name)]
+    own = ("--design", "own.csv", *factors, "--profile", "p.yaml", "--load", "middle")
+    ended = wm_drake("study", "gasket", *own, "--response", "D", "--out", "out")
+    assert ended.code == 0, ended.err
+    assert "2 repeated trials run once" in ended.err
+    assert len(pd.read_csv("out/runs.csv")) == 15
+    assert set(pd.read_csv("out/coefficients.csv")["term"]) >= {"C_L^2", "C_L:K_Lx"}
+    given = wm_drake("study", "gasket", *own, "--model", "main+2fi", "--out", "other")
+    assert given.code == 2
+    assert "use --model main" in given.err
+
+
 @pytest.mark.slow
 def test_own_design_factor_file_and_one_worker_give_the_same(study_without_page, wm_drake):
     study_without_page()

@@ -23,6 +23,7 @@ from wm_drake.parameters.units import plain_number
 from wm_drake.studies.doe.coding import LEVELS, MODELS, Levels, columns, efficiency, level_matrix
 from wm_drake.studies.doe.exchange import d_optimal_levels
 from wm_drake.studies.doe.orthogonal import orthogonal_levels
+from wm_drake.studies.doe.polynomial import largest_polynomial
 
 DESIGNS = ("d-optimal", "orthogonal", "full")
 """Kinds of designs that can be made; other designs are read from a file."""
@@ -191,7 +192,8 @@ def design_of(kind: str, factors: tuple[str, ...], levels: FloatArray, model: st
     if design.efficiency() == 0.0:
         needed = columns(len(factors), model)
         is_enough = model != "main" and efficiency(design.levels, "main") > 0.0
-        hint = "add other trials" + (", or use --model main" if is_enough else "")
+        smaller = "main" if is_enough else largest_polynomial(factors, levels)
+        hint = "add other trials" + (f", or use --model {smaller}" if smaller else "")
         raise input_error(
             f"these {design.trials} trials do not determine the {needed} coefficients of {model}; "
             f"{hint}",
@@ -250,7 +252,10 @@ def _level_or_value(
             return level_of(factor, f"{cell.strip()} {unit}".strip())
     allowed = "-1, 0 and 1, or low, mid and high"
     if level_of:
-        allowed = f"low, mid, high, numbers up to {LARGEST_LEVEL:g}, and values with a unit"
+        allowed = (
+            f"low, mid, high, numbers up to {LARGEST_LEVEL:g}, and values with a unit, in the cell "
+            f"or the head, such as '{factor} [%]'"
+        )
     message = f"'{shortened(cell, 40)}' is not a level; allowed are {allowed}"
     raise input_error(message, where=where, key=factor)
 

@@ -144,17 +144,18 @@ def check_determined(design: PolynomialDesign) -> None:
             f"{what} for {design.coefficients} coefficients of {design.model.name} leave no degree "
             "of freedom, so nothing shows how well the model fits"
         )
-    smaller = [name for name in reversed(POLYNOMIALS) if _fits(design, name)]
-    hint = f"--model {smaller[0]}" if smaller else "fewer terms with --model"
+    smaller = largest_polynomial(design.factors, design.levels)
+    hint = f"--model {smaller}" if smaller else "fewer terms with --model"
     raise input_error(f"{message}; add other trials, or use {hint}", where=design.kind)
 
 
-def _fits(design: PolynomialDesign, model: str) -> bool:
-    """Return whether trials determine a named model and leave a degree of freedom."""
-    other = PolynomialDesign(
-        design.kind, design.factors, design.levels, polynomial(model, design.factors)
-    )
-    return design.trials > other.coefficients and not _undetermined(other)
+def largest_polynomial(factors: tuple[str, ...], levels: FloatArray) -> str:
+    """Return the largest named model that trials determine and test; "" if there is none."""
+    for name in reversed(POLYNOMIALS):
+        design = PolynomialDesign("", factors, levels, polynomial(name, factors))
+        if design.trials > design.coefficients and not _undetermined(design):
+            return name
+    return ""
 
 
 def _undetermined(design: PolynomialDesign) -> list[str]:

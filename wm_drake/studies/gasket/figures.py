@@ -282,7 +282,7 @@ def residuals_figure(screening: xr.Dataset, load: str, words: Words) -> fig.Figu
 
     def panel_of(of_label: xr.Dataset, name: str) -> fig.Panel:
         fitted, residual = (_thinned(_known(shown(of_label[n]))) for n in ("fitted", "residual"))
-        points = fig.Points(fitted, residual, size=3.0, opacity=0.4)
+        points = fig.Points(fitted, residual, size=7.0 if len(fitted) < 100 else 3.0, opacity=0.4)
         y = fig.Axis(label=words.response_axis(name), has_grid=True)
         return fig.Panel(marks=(fig.Rule(0.0, color=fig.QUIET), points), y=y)
 

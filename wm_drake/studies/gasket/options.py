@@ -32,8 +32,8 @@ class GasketOptions(Options):
         None,
         "Effects to estimate: main (main effects) or main+2fi (with two-factor interactions). Of a "
         "file also a polynomial: linear, linear+2fi, quadratic, or terms such as "
-        "'C_L, K_Lx, C_L:K_Lx, C_L^2'. Default: main+2fi; quadratic with other levels than -1, 0, "
-        "1.",
+        "'C_L, K_Lx, C_L:K_Lx, C_L^2'. Default: main+2fi; quadratic if the levels are not -1, 0, "
+        "1, or too few for it.",
     )
     seed: int = option(0, "Seed of the D-optimal design.", ge=0, le=2**32 - 1)
     factor: tuple[str, ...] = option(

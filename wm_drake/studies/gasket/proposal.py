@@ -112,8 +112,8 @@ def _grid(count: int) -> FloatArray:
 def text_at(machine: MachineParameters, factor: Varied, place: float) -> tuple[str, float]:
     """Return the value of a factor at a place, rounded to what a person would write, and its place.
 
-    The text is what `--set` and `--check` take. It has three digits, or more where three would be
-    beyond an end of the range.
+    The text is what `--set` and `--check` take, in the unit of machine files, whatever the units of
+    the reader. It has three digits, or more where three would be beyond an end of the range.
 
     Args:
         place: Place from -1 to 1.
@@ -126,7 +126,7 @@ def text_at(machine: MachineParameters, factor: Varied, place: float) -> tuple[s
             assert number.nominal
             text = SHARE.text(value / number.nominal)
             return text, factor.level_of(text)
-    unit, (low, _, high) = factor.first_unit.for_reader, factor.first_levels
+    unit, (low, _, high) = factor.first_unit, factor.first_levels
     shown = (significant(unit.from_si(value), digits) for digits in range(3, 17))
     texts = [f"{number} {unit.shown}".replace("−", "-") for number in shown]
     text = next((text for text in texts if low <= unit.number(text) <= high), texts[-1])

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from wm_drake.errors import check_known, input_error, nearest_names, problems_at
+from wm_drake.errors import InputError, check_known, input_error, nearest_names, problems_at
 from wm_drake.model.machine import Machine
 from wm_drake.parameters import PublishedResults, published_results
 from wm_drake.parameters.vary import entries_of_texts
@@ -198,9 +198,9 @@ def _change_text(factor: Varied, text: str) -> str:
     """Return the new value of a factor in words, beside the one of the machine."""
     if text.endswith("%"):
         return f"{text} of its table"
-    nominal = factor.numbers[0].nominal if factor.numbers else None
-    before = "" if nominal is None else f" in place of {factor.first_unit.reading(nominal)}"
-    return f"{text.replace('*', ' ')}{before}"
+    unit, nominal = factor.first_unit, factor.numbers[0].nominal if factor.numbers else None
+    before = "" if nominal is None else f" in place of {unit.reading(nominal)}"
+    return f"{unit.reading(unit.number(text))}{before}"
 
 
 def _predicted(runs: xr.Dataset, responses: xr.Dataset) -> dict[str, xr.DataArray]:
@@ -258,7 +258,11 @@ def _design(options: GasketOptions, factors: Varying) -> Design | PolynomialDesi
         Path(kind), names, lambda name, text: by_name[name].level_of(text, beyond=True)
     )
     if model in MODELS and has_three_levels(levels):
-        return design_of(Path(kind).name, names, levels, model)
+        try:
+            return design_of(Path(kind).name, names, levels, model)
+        except InputError:
+            if options.model:
+                raise
     if options.model in MODELS:
         message = f"{model} is of the levels -1, 0 and 1; allowed here are {', '.join(POLYNOMIALS)}"
         raise input_error(f"{message}, and terms such as {names[0]}^2", where="--model")
