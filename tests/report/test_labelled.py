@@ -136,3 +136,9 @@ def test_a_chart_takes_words_units_and_labels_from_the_data():
         ("sensor Yr", [2.0, 4.0]),
     ]
     assert (drawn.x.label, drawn.y.label) == ("time, s", "amplitude, mm")
+
+
+def test_a_number_without_its_quantity_does_not_enter_a_table():
+    published = dataset().assign(published=("load", [13.72, 9.1]))
+    with pytest.raises(TypeError, match="published: no Quantity says the unit"):
+        LabelledTable("gaps", published)

@@ -3,6 +3,7 @@
 import html
 import re
 
+import numpy as np
 import pandas as pd
 import pytest
 from every_page import KINDS, write_page
@@ -10,7 +11,7 @@ from pages import data_of, without_scripts
 
 from wm_drake.parameters import load_machine, quantities, shipped_machines
 from wm_drake.parameters.reading import CUSTOMARY
-from wm_drake.parameters.units import Unit
+from wm_drake.parameters.units import Unit, registry
 from wm_drake.report.quantity import Quantity
 from wm_drake.simulation.measures import MEASURES
 
@@ -73,6 +74,32 @@ def test_a_page_has_numbers_in_us_units_only(name, tmp_path):
     for path in (tmp_path / "out").glob("*.csv"):
         columns = pd.read_csv(path, nrows=1).columns
         assert [name for name in columns if name.endswith(SUFFIXES)] == [], path.name
+
+
+FACTORS = {unit: registry().Quantity(1.0, us).to(unit).magnitude for unit, us in CUSTOMARY.items()}
+ENDS = {Quantity("", Unit(u, u)).suffix: (Quantity("", Unit(v, v)).suffix, FACTORS[u])
+        for u, v in CUSTOMARY.items()}  # fmt: skip
+OF_ROWS = {q.reading.label: FACTORS[q.unit.si] for q in REPLACED}
+VALUED = [pytest.param(p.values[0], marks=p.marks) for p in KINDS_ if "spin" not in p.values[0]]
+
+
+@pytest.mark.parametrize("name", VALUED)
+def test_numbers_of_files_are_those_in_si(name, tmp_path):
+    for units in ("si", "us"):
+        (tmp_path / units).mkdir()
+        write_page(name, tmp_path / units, "--units", units)
+    paths = [path for path in (tmp_path / "si/out").glob("*.csv") if "loop_" not in path.name]
+    assert paths
+    for path in paths:
+        si, us = pd.read_csv(path), pd.read_csv(tmp_path / "us/out" / path.name)
+        of_rows = si["unit"].map(OF_ROWS).fillna(1.0).to_numpy() if "unit" in si else 1.0
+        for column in si.select_dtypes("number").columns.drop("wall_s", errors="ignore"):
+            end = max((e for e in ENDS if column.endswith(e)), key=len, default="")
+            end_us, factor = ENDS.get(end, ("", 1.0))
+            one, other = si[column], us[column.removesuffix(end) + end_us]
+            is_same = [np.allclose(one, f * other, 1e-6, 1e-12, equal_nan=True)
+                       for f in ((factor,) if end else (1.0, of_rows))]  # fmt: skip
+            assert any(is_same), f"{path.name}: {column}"
 
 
 def _without_source(table):

@@ -9,7 +9,7 @@ import pandas as pd
 import xarray as xr
 
 from wm_drake.report.formatting import plain
-from wm_drake.report.quantity import HIDDEN, quantity_of, shown, units_of
+from wm_drake.report.quantity import HIDDEN, has_quantity, quantity_of, shown, units_of
 from wm_drake.report.table import Table, table_of
 
 if TYPE_CHECKING:
@@ -27,7 +27,8 @@ class LabelledTable:
     """A dataset in SI, and how it is shown.
 
     Its dimensions with labels are the first columns, its variables the others. Each variable
-    carries its `Quantity`; one of texts needs none. If the unit differs from row to row, it has a
+    carries its `Quantity`, or has the name of a variable of a measure; one of texts or whole
+    numbers needs none. If the unit differs from row to row, it has a
     column. A row without any value is left out.
 
     Attributes:
@@ -54,6 +55,18 @@ class LabelledTable:
     on_page_only: Sequence[str] = ()
     is_in_terminal: bool = False
     is_in_json: bool = True
+
+    def __post_init__(self) -> None:
+        """Refuse numbers of which nothing says in which unit they are.
+
+        Raises:
+            TypeError: a variable of numbers has no quantity.
+        """
+        bare = [n for n, v in self.data.variables.items() if v.dtype.kind == "f" and v.size]
+        bare = [name for name in bare if not has_quantity(self.data[name])]
+        if bare:
+            message = f"table {self.name}: {', '.join(map(str, bare))}: no Quantity says the unit"
+            raise TypeError(message)
 
     def frame(self) -> pd.DataFrame:
         """Return the numbers in units for reading, with the unit in each name, for a file."""

@@ -171,6 +171,13 @@ def quantity_of(array: "xr.DataArray") -> Quantity:
     return _of_measure(str(array.name)) or Quantity(str(array.name).replace("_", " "))
 
 
+def has_quantity(array: "xr.DataArray") -> bool:
+    """Return whether a variable carries a quantity, or several, or is that of a measure."""
+    return (
+        bool(array.attrs.keys() & {"quantity", ALONG}) or _of_measure(str(array.name)) is not None
+    )
+
+
 def of_measure(name: str) -> Quantity:
     """Return the quantity of a variable of a measure by its name.
 

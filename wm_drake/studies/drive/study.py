@@ -44,6 +44,7 @@ CAUGHT_BELOW = Quantity("does not pass with, at the motor", TORQUE, 3)
 PASSES_FROM = Quantity("passes with, at the motor", TORQUE, 3)
 CAUGHT_SPEED = Quantity("stays at", SPEED.unit, 0)
 CAUGHT_TORQUE = Quantity("mean torque there, at the drum", TORQUE, 2)
+FACTOR = Quantity("mass factor")
 TORQUE_LIMIT = Quantity("torque limit at the motor", TORQUE, 3)
 END_SPEED = Quantity("speed at the end", SPEED.unit, 0)
 UNBALANCE = Quantity("unbalance, sum of mass times radius", MOMENT, 1)
@@ -163,7 +164,7 @@ def torque_map(
         },
         {
             "load": case.name,
-            "mass_factor": list(factors),
+            "mass_factor": FACTOR.variable("mass_factor", factors),
             "torque_limit": TORQUE_LIMIT.variable("torque_limit", torques),
         },
     )

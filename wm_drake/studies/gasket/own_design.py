@@ -226,7 +226,8 @@ def _trials_table(screening: xr.Dataset) -> LabelledTable:
     """Return levels, leverage and responses of each trial, with its fitted values."""
     design: PolynomialDesign = screening.design
     levels = {
-        name: ("trial", design.levels[:, column]) for column, name in enumerate(design.factors)
+        name: Quantity(name).variable("trial", design.levels[:, column])
+        for column, name in enumerate(design.factors)
     }
     data = xr.Dataset(
         {
