@@ -54,7 +54,8 @@ export class Studies {
     const shown = asked.find(({mark}) => this.isOf(mark)) ?? asked[0];
     const isOld = Boolean(shown) && !this.isOf(shown.mark);
     byId('next').classList.toggle('old', isOld);
-    byId('next').replaceChildren(...(shown ? [isOld ? `${shown.machine} with other numbers, ${shown.started}: ` : '',
+    const other = shown?.machine === this.state().machine ? ' with other numbers' : '';
+    byId('next').replaceChildren(...(shown ? [isOld ? `${shown.machine}${other}, ${shown.started}: ` : '',
       isUnderWay(shown) ? `${shown.state} …` : `${shown.answer || shown.state} `, shown.report ? reportLink(shown, shown.id) : ''] : []));
   }
 
