@@ -189,3 +189,21 @@ def test_a_machine_with_a_stop_runs_as_with_spin(opened, tmp_path):
     largest = np.abs(run.record.displacement.values).max(axis=0)
     found = np.abs(repeated).max(axis=0)
     np.testing.assert_allclose(found, largest, rtol=parameters.accuracy)
+
+
+TWIN = """
+extends: reference
+name: twin
+springs:
+  second: {type: suspension, tub_frame: spring_left_tub, housing_frame: spring_left_housing}
+"""
+
+
+@pytest.mark.slow
+def test_springs_that_can_replace_each_other_share_the_weight(opened, tmp_path):
+    (tmp_path / "twin.yaml").write_text(TWIN, encoding="utf-8")
+    parameters = wm.load_machine(tmp_path / "twin.yaml")
+    page, machine = opened(parameters)
+    ((run, twin),) = runs_of(machine.machine, [wm.case_of(parameters, "middle")])
+    check_equal(page.run("middle"), run, twin)
+    assert "bodies.motor.mass" in page.data["model"]["places"]

@@ -1,6 +1,13 @@
 """Symmetric 3x3 matrices as six numbers (xx, yy, zz, xy, xz, yz), vectors, linear equations."""
 
 from wm_drake.compiler.compilation import law
+from wm_drake.compiler.elementary import sqrt
+
+SWEEPS = 12
+"""Sweeps of Jacobi's rotations; six suffice for six equations."""
+
+NEGLIGIBLE = 1e-6
+"""Singular value over the largest one below which forces count as dependent on others."""
 
 
 @law
@@ -106,3 +113,61 @@ def solve(a, b, n):
             b[i] = b[i] - a[n * i + j] * b[j]
         b[i] = b[i] / a[n * i + i]
     return True
+
+
+@law
+def solve_least(a, b, n, axes):
+    """Solve n linear equations as well as possible, with the smallest solution that does.
+
+    Args:
+        a: Coefficients by rows, symmetric, without negative eigenvalues; overwritten.
+        b: Right side; the solution is written into it.
+        axes: (n n,) to work in.
+    """
+    diagonalise(a, axes, n)
+    largest = 0.0
+    for k in range(n):
+        largest = max(largest, a[n * k + k])
+    for k in range(n):
+        along = 0.0
+        for i in range(n):
+            along = along + axes[n * i + k] * b[i]
+        known = a[n * k + k] > NEGLIGIBLE * NEGLIGIBLE * largest
+        a[n * k + k] = along / a[n * k + k] if known else 0.0
+    for i in range(n):
+        b[i] = 0.0
+        for k in range(n):
+            b[i] = b[i] + axes[n * i + k] * a[n * k + k]
+
+
+@law
+def diagonalise(a, axes, n):
+    """Turn a symmetric matrix into its eigenvalues, by Jacobi's rotations.
+
+    Args:
+        a: (n n,) by rows; the eigenvalues are written on its diagonal.
+        axes: (n n,) eigenvectors, one in each column, written.
+    """
+    for k in range(n * n):
+        axes[k] = 1.0 if k % (n + 1) == 0 else 0.0
+    for _ in range(SWEEPS):
+        for i in range(n - 1):
+            for j in range(i + 1, n):
+                if a[n * i + j] != 0.0:
+                    ratio = (a[n * j + j] - a[n * i + i]) / (2.0 * a[n * i + j])
+                    size = abs(ratio) + sqrt(1.0 + ratio * ratio)
+                    tangent = (1.0 if ratio >= 0.0 else -1.0) / size
+                    cosine = 1.0 / sqrt(1.0 + tangent * tangent)
+                    for k in range(n):
+                        turn(a, n * k + i, n * k + j, cosine, tangent * cosine)
+                        turn(axes, n * k + i, n * k + j, cosine, tangent * cosine)
+                    for k in range(n):
+                        turn(a, n * i + k, n * j + k, cosine, tangent * cosine)
+
+
+@law
+def turn(a, i, j, cosine, sine):
+    """Turn the numbers i and j of an array by an angle."""
+    first, second = a[i], a[j]
+    a[i] = cosine * first - sine * second
+    a[j] = sine * first + cosine * second

@@ -27,8 +27,6 @@ from wm_drake.export.page_contents import Contents
 from wm_drake.export.page_plan import (
     BODY_SIZE,
     GAP_SIZE,
-    PUSHES,
-    SOLVED,
     SUMS,
     Constants,
     Counts,
@@ -242,7 +240,7 @@ def _counts(contents: Contents, chosen: _Chosen) -> Any:
 
 def _places(contents: Contents, count: Any) -> Any:
     begins = contents.layout.states.begins
-    solved, dampers = max(TUBES, count.springs), len(contents.layout.tubes)
+    dampers = len(contents.layout.tubes)
     sizes = {
         "time": 1,
         "unbalances": UNBALANCE_SIZE * count.unbalances,
@@ -254,8 +252,8 @@ def _places(contents: Contents, count: Any) -> Any:
         "rest": 6,
         "trial": begins.size,
         "wrenches": WRENCH_SIZE * (count.mounts + 1),
-        "slopes": solved * solved,
-        "step": solved,
+        "slopes": TUBES * TUBES,
+        "step": TUBES,
         "rate": begins.size,
         "inputs": max(begins.inputs, 1),
         "stage": begins.size,
@@ -279,9 +277,8 @@ def _plan(contents: Contents, at: Any, of: Any, count: Any) -> Any:
     setup, layout = contents.setup, contents.layout
     others = [element.kind.acts_at_rest for element in setup.elements.others.values()]
     resting = layout.mounts._replace(others=layout.mounts.others if any(others) else None)
-    solved = sum(kind % PUSHES == SOLVED for kind in contents.spring_kinds())
     sags = any(spring.is_given for spring in setup.springs.values())
-    settles = not setup.telescopes and not setup.bearing and solved <= WRENCH_SIZE
+    settles = not setup.telescopes and not setup.bearing
     return Plan(
         at,
         of,

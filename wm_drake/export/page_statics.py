@@ -11,7 +11,7 @@ from numba import njit
 
 from wm_drake.compiler.compilation import for_one_run, law
 from wm_drake.compiler.elementary import sqrt
-from wm_drake.compiler.matrices import solve
+from wm_drake.compiler.matrices import solve_least
 from wm_drake.compiler.vectors import add, cross, dot, scale, subtract
 from wm_drake.elements.cabinet import FEET_COUNT, FOOT, FULL_DAMPING, PADS, read_pads
 from wm_drake.elements.feet import FEET, load_on_feet, read_feet
@@ -187,8 +187,8 @@ def _resting_count(plan: Any) -> int:
 def _preloads(plan: Any, set_taut: Any) -> Any:
     """Return the function (v, wrench) that finds the preloads which balance the machine as drawn.
 
-    They solve the normal equations of the least squares of force and moment; wrench is that on the
-    tub without them.
+    They are the smallest that solve the least squares of force and moment, as in
+    `wm_drake.model.equilibrium.preloaded`; wrench is that on the tub without them.
     """
     at, preload = plan.at, SPRING.offsets["preload"]
     solved = [k for k, kind in enumerate(plan.springs) if kind % PUSHES == SOLVED]
@@ -198,19 +198,21 @@ def _preloads(plan: Any, set_taut: Any) -> Any:
 
     @njit(**OPTIONS)
     def preload_springs(v, wrench):
-        p, normal = numbers_at(v, at.packed), numbers_at(v, at.slopes)
-        right = numbers_at(v, at.step)
+        p, products = numbers_at(v, at.packed), numbers_at(v, at.slopes)
+        right, axes = numbers_at(v, at.step), numbers_at(v, at.jacobian)
+        for k in range(6):
+            right[k] = -wrench[k]
+            for j in range(6):
+                products[6 * k + j] = 0.0
+                for i in range(count):
+                    pull = pull_of(p, begins[i])
+                    products[6 * k + j] = products[6 * k + j] + pull[k] * pull[j]
+        solve_least(products, right, 6, axes)
         for i in range(count):
-            pull = pull_of(p, begins[i])
-            right[i] = -product(pull, wrench)
-            for j in range(count):
-                normal[count * i + j] = product(pull, pull_of(p, begins[j]))
-        if not solve(normal, right, count):
-            return NOT_BALANCED
-        for i in range(count):
-            p[begins[i] + preload] = right[i]
+            force = product(pull_of(p, begins[i]), right)
+            p[begins[i] + preload] = force
             set_taut(v, numbers[i])
-            if not (right[i] > 0.0 or pushes[i]):
+            if not (force > 0.0 or pushes[i]):
                 return SLACK
         return 0.0
 

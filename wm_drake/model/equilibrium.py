@@ -7,6 +7,7 @@ from pydrake.math import RollPitchYaw
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context
 
+from wm_drake.compiler.matrices import NEGLIGIBLE
 from wm_drake.errors import InputError, Problem, input_error
 from wm_drake.model.placed_elements import AppliedForce, PlacedElements
 from wm_drake.model.state_layout import Indices, StateLayout
@@ -87,7 +88,8 @@ def preloaded(elements: PlacedElements, force: FloatArray) -> PlacedElements:
     """Return the elements with the spring preloads that balance the empty machine as drawn (T = W).
 
     The balance is a least-squares one of the force [N] and the moment about To [N m]: fewer than
-    six springs cannot balance both. What remains moves the machine to its rest pose. Given
+    six springs cannot balance both. What remains moves the machine to its rest pose. Springs that
+    can replace each other, such as four vertical ones, take the smallest sum of squares. Given
     preloads stay; the others balance what these leave. If all are given, the machine sags.
 
     Args:
@@ -104,7 +106,7 @@ def preloaded(elements: PlacedElements, force: FloatArray) -> PlacedElements:
     lines = np.stack([spring.p_WH for spring in springs.values()]) - hooks
     pulls = lines / np.linalg.norm(lines, axis=1, keepdims=True)
     wrenches = np.column_stack([np.cross(hooks, pulls), pulls]).T
-    solution = np.linalg.lstsq(wrenches, -force, rcond=None)[0]
+    solution = np.linalg.lstsq(wrenches, -force, rcond=NEGLIGIBLE)[0]
     preloads = dict(zip(springs, map(float, solution), strict=True))
     slack = [name for name in springs if preloads[name] <= 0.0 and not springs[name].pushes]
     if slack:
