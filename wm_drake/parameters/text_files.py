@@ -117,6 +117,8 @@ def read_any_text(path: Path, *, key: str = "") -> str:
         if not _NO_TEXT.search(text):
             return text
     message = "is not text in UTF-8, in UTF-16 with a byte order mark, or in code page 1252"
+    if content.startswith((b"PK", b"\xd0\xcf\x11\xe0")):
+        message = "is a workbook or an archive, no text; save the sheet as CSV (UTF-8)"
     raise input_error(message, where=str(path), key=key)
 
 

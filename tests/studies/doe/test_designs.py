@@ -12,9 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wm_drake.errors import InputError
+from wm_drake.errors import InputError, InputNotice
 from wm_drake.studies.doe.coding import efficiency, level_matrix
-from wm_drake.studies.doe.design import make_design, read_design
+from wm_drake.studies.doe.design import make_design, read_design, read_levels
 from wm_drake.studies.doe.exchange import d_optimal_levels
 from wm_drake.studies.doe.orthogonal import orthogonal_levels
 
@@ -171,7 +171,7 @@ MINITAB = "StdOrder,RunOrder,PtType,Blocks, A ,B\n" + "".join(
     f"{n},{10 - n},1,1,{a},{b}\n" for n, (a, b) in enumerate([*ROWS, (0, 0)], 1)
 )
 JMP = "Pattern\ta\tb\tY\n" + "".join(
-    f"{SIGNS[a + 1]}{SIGNS[b + 1]}\t{a}\t{b}\t\n" for a, b in ROWS
+    f"{SIGNS[a + 1]}{SIGNS[b + 1]}\t{a}\t{b}\t.\n" for a, b in ROWS
 ).replace("\t-1", "\t\N{MINUS SIGN}1")
 OF_PROGRAMS = {
     "Excel": PLAIN.replace(",", ";").replace("-1", "-1,0").encode("utf-8-sig"),
@@ -180,6 +180,8 @@ OF_PROGRAMS = {
     "Excel, Unicode": PLAIN.replace(",", "\t").encode("utf-16"),
     "Minitab": MINITAB.encode(),
     "JMP": JMP.encode(),
+    "R": "".join(f'"{n or ""}",{a},{b}\n' for n, (a, b) in enumerate([("a", "b"), *ROWS])).encode(),
+    "remarks": ('"# by A, today",\n' + PLAIN.replace("-", "\N{EN DASH}")).encode("utf-16"),
     "words": "".join(
         ["a,b\n", *(f"{LEVEL_WORDS[a + 1]},{LEVEL_WORDS[b + 1]}\n" for a, b in ROWS)]
     ).encode(),
@@ -197,6 +199,39 @@ def test_tables_of_programs_are_read(tmp_path, program):
     else:
         path.write_bytes(OF_PROGRAMS[program])
     levels = read_design(path, ("a", "b"), "main").levels
+    assert list(map(tuple, levels.tolist())) == ROWS
+
+
+def value_in_mm(_, text):
+    return float(text.removesuffix(" mm"))
+
+
+def test_a_decimal_comma_is_one_unless_it_may_separate_thousands(tmp_path):
+    path = tmp_path / "design.csv"
+    path.write_text("a [mm];b\n0,500;-1\n1,250;1\n")
+    assert read_levels(path, ("a", "b"), value_in_mm).tolist() == [[0.5, -1.0], [1.25, 1.0]]
+    path.write_text("a [mm];b\n1,500;-1\n1,250;1\n")
+    with pytest.raises(ValueError, match="1,500"):
+        read_levels(path, ("a", "b"), value_in_mm)
+
+
+def test_numbers_that_are_neither_levels_nor_have_a_unit_are_refused(tmp_path):
+    path = tmp_path / "design.csv"
+    for numbers in ("1,2,3", "0,1,2", "0.2,0.3,0.4"):
+        path.write_text("\n".join(["a", *numbers.split(",")]))
+        with pytest.raises(InputError, match="a: has numbers from .* need a unit"):
+            read_levels(path, ("a",), value_in_mm)
+
+
+def test_the_first_sheet_with_cells_is_read_and_named(tmp_path):
+    pytest.importorskip("openpyxl")
+    path = tmp_path / "design.xlsx"
+    with pd.ExcelWriter(path) as book:
+        pd.DataFrame().to_excel(book, sheet_name="empty", index=False)
+        pd.DataFrame(ROWS, columns=["a", "b"]).to_excel(book, sheet_name="design", startrow=2)
+        pd.DataFrame({"who": ["A"]}).to_excel(book, sheet_name="notes")
+    with pytest.warns(InputNotice, match="sheet 'design' is read, not 'notes'; move another"):
+        levels = read_design(path, ("a", "b"), "main").levels
     assert list(map(tuple, levels.tolist())) == ROWS
 
 
@@ -218,6 +253,10 @@ FAULTY_FILES = {
     "word": ("a,b\n0,lov\n", "csv:2: b: 'lov' is not a level"),
     "a response": ("a,b,Dx\n0,0,3.1\n", "remove Dx"),
     "a factor twice": ("a,b,B\n0,0,0\n", "needs the columns a,b"),
+    "cells beyond the head": ("a,b\n-1,0,1,0\n", "csv:2: has 4 values but the header has 2"),
+    "title": ("Design of A\na,b\n0,0\n", "begin remarks above it with #"),
+    "unknown unit": ("a [xyz],b\n0,0\n", "'a [xyz]' has no known unit"),
+    "renamed workbook": ("PK\x03\x04\0", "save the sheet as CSV"),
     "nothing": ("a,b\n", "do not determine the 5 coefficients"),
     "too few": ("a,b\n0,0\n1,1\n-1,-1\n", "these 3 trials do not determine the 5 coefficients"),
     "one level missing": ("a,b\n0,0\n1,0\n0,1\n1,1\n0,-1\n1,-1\n", "do not determine"),

@@ -2,14 +2,16 @@
 
 import csv
 import re
+import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from wm_drake.errors import input_error, shortened
+from wm_drake.errors import InputNotice, Problem, input_error, shortened
 from wm_drake.parameters.recorded.signal import Signal, split_title
 from wm_drake.parameters.text_files import check_regular, read_any_text
 from wm_drake.parameters.types import FloatArray
@@ -72,7 +74,7 @@ def text_signals(path: Path) -> Iterator[Signal]:
         units, body = body[0].cells, body[1:]
     width = len(head.cells)
     for row in body:
-        _check_width(path, row, head.cells)
+        check_width(path, row, head.cells)
     lines = np.array([row.line for row in body], dtype=int)
     for place, title in enumerate(head.cells):
         column = [row.cells[place] if place < len(row.cells) else "" for row in body]
@@ -97,11 +99,11 @@ def table_rows(path: Path) -> list[TextRow]:
         InputError: it is no table, or a workbook that cannot be read.
     """
     if path.suffix.lower() in (".xlsx", ".xlsm"):
-        return list(_sheet_rows(path))
+        return _sheet_rows(path)
     kept = [
         (at, line)
         for at, line in enumerate(read_any_text(path).splitlines(), 1)
-        if line.strip(' \t,;"') and not line.lstrip().startswith("#")
+        if line.strip(' \t,;"') and not line.lstrip(' \t"').startswith("#")
     ]
     if not kept:
         return []
@@ -124,8 +126,8 @@ def table_rows(path: Path) -> list[TextRow]:
         raise input_error(f"cannot be read as CSV ({error})", where=where) from None
 
 
-def _sheet_rows(path: Path) -> Iterator[TextRow]:
-    """Yield the rows of the first sheet of a workbook that are not empty."""
+def _sheet_rows(path: Path) -> list[TextRow]:
+    """Return the rows with cells of the first sheet of a workbook that has any."""
     check_regular(path)
     where, way_out = str(path), "save the sheet as CSV (UTF-8)"
     try:
@@ -134,16 +136,28 @@ def _sheet_rows(path: Path) -> Iterator[TextRow]:
         message = f"is a workbook: pip install 'wm-drake[excel]', or {way_out}"
         raise input_error(message, where=where) from None
     try:
-        sheet = load_workbook(path, read_only=True, data_only=True).worksheets[0]
-        for number, values in enumerate(sheet.iter_rows(values_only=True), 1):
-            cells = ["" if value is None else str(value).strip() for value in values]
-            if any(cells) and not cells[0].startswith("#"):
-                yield TextRow(number, cells)
+        book = load_workbook(path, read_only=True, data_only=True)
+        tables = [(sheet.title, _filled_rows(sheet)) for sheet in book.worksheets]
+        begun = [(title, row, rows) for title, rows in tables if (row := next(rows, None))]
+        found = [row for _, first, rows in begun[:1] for row in (first, *rows)]
     except Exception as error:  # whatever its XML contains
         reason = shortened(str(error), 100) or type(error).__name__
         raise input_error(
             f"is no workbook that can be read ({reason}); {way_out}", where=where
         ) from None
+    if len(begun) > 1:
+        first, *others = (f"'{title}'" for title, *_ in begun)
+        message = f"sheet {first} is read, not {', '.join(others)}; move another one to the front"
+        warnings.warn(str(Problem(where, "", message)), InputNotice, stacklevel=2)
+    return found
+
+
+def _filled_rows(sheet: Any) -> Iterator[TextRow]:
+    """Yield the rows of a sheet that have cells and do not begin with #."""
+    for number, values in enumerate(sheet.iter_rows(values_only=True), 1):
+        cells = ["" if value is None else str(value).strip() for value in values]
+        if any(cells) and not next(filter(None, cells)).startswith("#"):
+            yield TextRow(number, cells)
 
 
 def _has_blanks(lines: Sequence[str]) -> bool:
@@ -151,7 +165,7 @@ def _has_blanks(lines: Sequence[str]) -> bool:
     return len(lines) > 1 and 1 < len(lines[0].split()) == len(lines[1].split())
 
 
-def _check_width(path: Path, row: TextRow, head: Sequence[str]) -> None:
+def check_width(path: Path, row: TextRow, head: Sequence[str]) -> None:
     """Check that a row has the columns of the header; empty ones at an end may lack."""
     named = len(head) if head[-1] else len(head) - 1
     filled = row.cells if len(row.cells) <= len(head) else row.cells[: len(head)]

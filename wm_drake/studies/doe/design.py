@@ -3,7 +3,7 @@
 import re
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,7 @@ from wm_drake.errors import (
     shortened,
 )
 from wm_drake.parameters.recorded.signal import split_title
-from wm_drake.parameters.recorded.text import TextRow, table_rows
+from wm_drake.parameters.recorded.text import TextRow, check_width, table_rows
 from wm_drake.parameters.types import FloatArray
 from wm_drake.parameters.units import plain_number
 from wm_drake.studies.doe.coding import LEVELS, MODELS, Levels, columns, efficiency, level_matrix
@@ -155,6 +155,12 @@ OF_PROGRAMS = {
 }
 """Columns that programs for designs add, in small letters and without signs; they are ignored."""
 
+_EMPTY = ("", ".", "*")
+"""Cells without a value, as of a response that is not measured yet, in Excel, JMP and Minitab."""
+
+_DECIMAL_COMMA = re.compile(r"^([+-]?\d+),(?=\d+(?:\D|$))")
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+(?!\d)")
+
 WORDS = {
     **dict.fromkeys(("low", "-"), -1.0),
     **dict.fromkeys(("mid", "middle", "centre", "center", "medium"), 0.0),
@@ -216,8 +222,9 @@ def read_levels(
 
     The file has one column per factor, in any order, with levels: numbers, or low, mid and high; or
     with values: with a unit in each cell, or in the head, such as `K_Lx [N/mm]`. Columns of
-    `OF_PROGRAMS`, empty ones, and those with the name of a factor and more beside its own column,
-    such as `C_L_Ns_per_mm`, are ignored. A trial that is repeated runs once.
+    `OF_PROGRAMS`, those that are empty or without a name, and those with the name of a factor and
+    more beside its own column, such as `C_L_Ns_per_mm`, are ignored. A trial that is repeated runs
+    once.
 
     Args:
         level_of: Function of a factor and a value as text that returns its level; without it only
@@ -230,14 +237,36 @@ def read_levels(
         InputError: the file has other columns, or a cell is neither a level nor a value.
     """
     head, *rows = table_rows(path) or [TextRow(1, [])]
+    rows = _with_plain_numbers(rows)
     places = _factor_columns(path, head.cells, rows, factors)
+    for row in rows:
+        check_width(path, row, head.cells)
     levels = np.zeros((len(rows), len(factors)))
     for number, row in enumerate(rows):
         for column, (place, unit) in enumerate(places):
             cell = row.cells[place] if place < len(row.cells) else ""
             where = f"{path}:{row.line}"
             levels[number, column] = _level_or_value(cell, unit, where, factors[column], level_of)
+    for (place, unit), factor, column in zip(places, factors, levels.T, strict=True):
+        is_coded = not unit and np.isfinite([_level(row.cells[place]) for row in rows]).all()
+        if is_coded and len(rows) and column.min() >= 0.0 and not has_three_levels(column):
+            raise input_error(
+                f"has numbers from {column.min():g} to {column.max():g}, none below 0; levels are "
+                "from -1 to 1, and values need a unit, in the cell or in the head",
+                where=str(path),
+                key=factor,
+            )
     return _without_repeats(path, levels)
+
+
+def _with_plain_numbers(rows: Sequence[TextRow]) -> list[TextRow]:
+    """Return rows with plain minus signs, and points for commas that cannot separate thousands."""
+    signs = str.maketrans(dict.fromkeys("\N{MINUS SIGN}\N{EN DASH}", "-"))
+    plain = [[cell.translate(signs) for cell in row.cells] for row in rows]
+    cells = [cell for row in plain for cell in row if _DECIMAL_COMMA.match(cell)]
+    if not all(map(_THOUSANDS.match, cells)):
+        plain = [[_DECIMAL_COMMA.sub(r"\1.", cell) for cell in row] for row in plain]
+    return [replace(row, cells=cells) for row, cells in zip(rows, plain, strict=True)]
 
 
 def _level_or_value(
@@ -247,9 +276,9 @@ def _level_or_value(
     level = _level(cell)
     if not unit and (level in LEVELS or (level_of and abs(level) <= LARGEST_LEVEL)):
         return level
-    if level_of is not None and cell.strip() and (unit or np.isnan(level)):
+    if level_of is not None and re.match(r"[+-]?\.?\d", cell) and (unit or np.isnan(level)):
         with problems_at(where, factor):
-            return level_of(factor, f"{cell.strip()} {unit}".strip())
+            return level_of(factor, f"{cell} {unit}".strip())
     allowed = "-1, 0 and 1, or low, mid and high"
     if level_of:
         allowed = (
@@ -261,8 +290,8 @@ def _level_or_value(
 
 
 def _level(cell: str) -> float:
-    """Return the level of a cell, with a comma or a point, and any minus; NaN if it is none."""
-    text = cell.strip().lower().replace("\N{MINUS SIGN}", "-").replace(",", ".")
+    """Return the level of a cell, with a comma or a point; NaN if it is none."""
+    text = cell.lower().replace(",", ".")
     try:
         return WORDS[text] if text in WORDS else plain_number(text)
     except ValueError:
@@ -289,16 +318,23 @@ def _factor_columns(
             by_name.setdefault(factor, []).append((place, ""))
         elif unit and plain.get(before.casefold()):
             of_unit.setdefault(plain[before.casefold()], []).append((place, unit))
-        elif short in OF_PROGRAMS or name.startswith(more):
+        elif not name or short in OF_PROGRAMS or name.startswith(more):
             continue
-        elif any(row.cells[place : place + 1] not in ([], [""]) for row in rows):
+        elif any(cell not in _EMPTY for row in rows for cell in row.cells[place : place + 1]):
             others.append(name)
     by_name = {**of_unit, **by_name}
-    if others or sorted(by_name) != sorted(factors) or any(len(v) > 1 for v in by_name.values()):
+    lacking = [factor for factor in factors if factor not in by_name]
+    if others or lacking or any(len(places) > 1 for places in by_name.values()):
         message = f"needs the columns {','.join(factors)} (and may have {TRIAL})"
         message += f", has {','.join(map(str.strip, head))}"
-        if others:
-            message += f"; remove {', '.join(others)}: no factor, and no column of a known program"
+        unread = [title for title in head for name in lacking if title.startswith(f"{name} ")]
+        if unread:
+            message += f"; '{unread[0]}' has no known unit: write one such as N*s/mm, or none"
+        elif not by_name:
+            message += "; the first line must have the names: begin remarks above it with #"
+        elif others:
+            what = "rename or remove" if lacking else "remove"
+            message += f"; {what} {', '.join(others)}: no factor, and no column of a known program"
         raise input_error(message, where=str(path))
     return [by_name[factor][0] for factor in factors]
 
