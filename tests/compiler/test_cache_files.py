@@ -84,10 +84,14 @@ def test_damaged_file_is_compiled_anew(load, tmp_path, suffix):
 
 def test_cache_that_cannot_be_written_is_left_out(run, tmp_path):
     (tmp_path / "file").write_text("", encoding="utf-8")
-    result, notice = run(tmp_path / "file")
-    assert result == ["-6.0", "0"]
-    (line,) = notice
-    assert line.startswith("compiled code is not kept (")
+    for home, hits, words in (
+        ("file", "0", "compiled code is not kept ("),
+        ("home", "0", "compiled code is kept in "),
+        ("home", "1", "compiled code is kept in "),
+    ):
+        result, (line,) = run(tmp_path / "file", HOME=str(tmp_path / home))
+        assert result == ["-6.0", hits]
+        assert line.startswith(words)
 
 
 def test_disk_that_is_full_leaves_the_cache_out(run, tmp_path):

@@ -17,23 +17,25 @@ TOKEN, SECONDS = "token", 0.3
 
 @pytest.fixture
 def served(monkeypatch):
-    """Yield the port of a guarded server, and the bodies that reached what it guards."""
+    """Yield the port of a guarded server, the bodies that reached what it guards, and the server."""
     monkeypatch.setattr(guard, "HEAD_TIMEOUT", SECONDS)
     monkeypatch.setattr(guard, "BODY_TIMEOUT", SECONDS)
     bodies = []
 
     async def application(scope, receive, send):
         bodies.append((await receive())["body"])
+        await asyncio.sleep(60.0 if bodies == [b"long"] else 0.0)
         await PlainTextResponse("done")(scope, receive, send)
 
     listening = socket.create_server(("127.0.0.1", 0))
     port = listening.getsockname()[1]
     app = Guard(application, TOKEN, port)
-    config = uvicorn.Config(app, http=TimedConnection, log_level="error", lifespan="off")
+    options = {"http": TimedConnection, "log_level": "error", "lifespan": "off"}
+    config = uvicorn.Config(app, timeout_graceful_shutdown=1, **options)
     server = uvicorn.Server(config)
     thread = threading.Thread(target=lambda: asyncio.run(server.serve([listening])))
     thread.start()
-    yield port, bodies
+    yield port, bodies, server
     server.should_exit = True
     thread.join()
 
@@ -52,7 +54,7 @@ def received(client):
 
 
 def test_half_open_requests_are_closed(served):
-    port, bodies = served
+    port, bodies, _ = served
     begin = time.monotonic()
     sent = [b"", b"GET / HT", head(port, 5)[:-2], head(port, 5) + b"{}", head(port, 2) + b"{}GET /"]
     clients = [socket.create_connection(("127.0.0.1", port)) for _ in sent]
@@ -67,7 +69,7 @@ def test_half_open_requests_are_closed(served):
 
 
 def test_body_that_was_cut_short_is_not_carried_out(served):
-    port, bodies = served
+    port, bodies, _ = served
     with socket.create_connection(("127.0.0.1", port)) as client:
         client.sendall(head(port, 102) + b"{}")
     with socket.create_connection(("127.0.0.1", port)) as client:
@@ -75,3 +77,14 @@ def test_body_that_was_cut_short_is_not_carried_out(served):
         while not bodies:
             time.sleep(0.01)
     assert bodies == [b"{ }"]
+
+
+def test_a_request_that_is_answered_when_the_studio_ends_leaves_no_traceback(served, capfd):
+    port, bodies, server = served
+    with socket.create_connection(("127.0.0.1", port)) as client:
+        client.sendall(head(port, 4) + b"long")
+        while not bodies:
+            time.sleep(0.01)
+        server.should_exit = True
+        assert received(client).startswith(b"HTTP/1.1 503")
+    assert "Traceback" not in capfd.readouterr().err

@@ -1,5 +1,6 @@
 """Command `wm-drake studio`: a page on this computer that runs a machine while a slider moves."""
 
+import logging
 import secrets
 import socket
 import webbrowser
@@ -71,6 +72,8 @@ def studio(
             http=TimedConnection,
             timeout_graceful_shutdown=3,
         )
+        log = logging.getLogger("uvicorn.error")  # what Ctrl-C leaves unfinished is no error
+        log.addFilter(lambda line: "graceful shutdown exceeded" not in line.msg)
         uvicorn.Server(config).run(sockets=[listening])
 
 

@@ -63,12 +63,15 @@ def _cache_folders() -> tuple[str, str]:
     reason = "the user has no home folder" if folder is None else _fault_of(folder)
     if not reason:
         return str(folder), ""
-    if folder is not None and folder.is_dir():
-        if of_user is None or _fault_of(of_user):
-            temporary = tempfile.mkdtemp(prefix="wm_drake-")
-            atexit.register(shutil.rmtree, temporary, ignore_errors=True)
-            return temporary, str(folder)
-        return str(of_user), str(folder)
+    read_only = str(folder) if folder is not None and folder.is_dir() else ""
+    if of_user is not None and not _fault_of(of_user):
+        if not read_only:
+            say_once(f"compiled code is kept in {of_user}, not in {chosen} ({reason})")
+        return str(of_user), read_only
+    if read_only:
+        temporary = tempfile.mkdtemp(prefix="wm_drake-")
+        atexit.register(shutil.rmtree, temporary, ignore_errors=True)
+        return temporary, read_only
     say_once(f"compiled code is not kept ({reason}); set NUMBA_CACHE_DIR to a folder for it")
     return "", ""
 

@@ -15,11 +15,11 @@ import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from wm_drake.errors import input_error, reason_of
+from wm_drake.errors import InputError, input_error, reason_of
 from wm_drake.report.provenance import command_line, now, source_revision, version
 from wm_drake.written_files import try_folder, unwritable
 
@@ -211,6 +211,10 @@ def one_folder(out: Path, run: CommandRun, kept: str = "") -> Iterator[Path]:
         if error.errno not in _NOT_WRITTEN:
             raise
         raise unwritable(out, error, kept) from None
+    except InputError as error:  # a file of several MB, such as a record, has a message of its own
+        raise InputError(
+            replace(p, where=p.where.replace(str(partial), str(out))) for p in error.problems
+        ) from None
     finally:
         shutil.rmtree(partial, ignore_errors=True)
         os.close(lock)

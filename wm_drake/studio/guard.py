@@ -67,7 +67,10 @@ class Guard:
             return
         path = scope["path"][1 + len(self._token) :] or "/"
         inner = {**scope, "path": path, "raw_path": path.encode(), "root_path": ""}
-        await self.app(inner, _replayed(body, receive), _with_headers(send))
+        try:
+            await self.app(inner, _replayed(body, receive), _with_headers(send))
+        except asyncio.CancelledError:  # the server ends; uvicorn would print a traceback
+            await _refuse((503, "the studio has ended"), scope, receive, send)
 
     def _refusal(self, scope: Scope) -> tuple[int, str] | None:
         """Return status and reason if a request is not let in."""

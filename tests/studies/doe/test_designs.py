@@ -219,7 +219,7 @@ def test_numbers_that_are_neither_levels_nor_have_a_unit_are_refused(tmp_path):
     path = tmp_path / "design.csv"
     for numbers in ("1,2,3", "0,1,2", "0.2,0.3,0.4"):
         path.write_text("\n".join(["a", *numbers.split(",")]))
-        with pytest.raises(InputError, match="a: has numbers from .* need a unit"):
+        with pytest.raises(InputError, match=r"a: has numbers from .* need a unit"):
             read_levels(path, ("a",), value_in_mm)
 
 

@@ -247,11 +247,11 @@ def read_levels(
             cell = row.cells[place] if place < len(row.cells) else ""
             where = f"{path}:{row.line}"
             levels[number, column] = _level_or_value(cell, unit, where, factors[column], level_of)
-    for (place, unit), factor, column in zip(places, factors, levels.T, strict=True):
+    for (place, unit), factor, used in zip(places, factors, levels.T, strict=True):
         is_coded = not unit and np.isfinite([_level(row.cells[place]) for row in rows]).all()
-        if is_coded and len(rows) and column.min() >= 0.0 and not has_three_levels(column):
+        if is_coded and len(rows) and used.min() >= 0.0 and not has_three_levels(used):
             raise input_error(
-                f"has numbers from {column.min():g} to {column.max():g}, none below 0; levels are "
+                f"has numbers from {used.min():g} to {used.max():g}, none below 0; levels are "
                 "from -1 to 1, and values need a unit, in the cell or in the head",
                 where=str(path),
                 key=factor,
