@@ -3,6 +3,7 @@
 import io
 import re
 import shutil
+import sqlite3
 import zipfile
 from pathlib import Path
 
@@ -70,6 +71,23 @@ def test_files_that_files_name_are_in_the_archive(wm_drake, words):
     shutil.rmtree(folder.parent)
     ended = wm_drake("rerun", "a.zip")
     assert ended.code == 0, ended.err + ended.out
+
+
+def test_a_rerun_that_was_killed_goes_on(wm_drake, archive):
+    assert wm_drake("rerun", archive, "--out", "again").code == 0
+    for path in Path("again").iterdir():
+        if path.name != "ledger.sqlite":
+            path.unlink()
+    with sqlite3.connect("again/ledger.sqlite") as ledger:
+        ledger.execute("DELETE FROM header WHERE name = 'finished'")
+        (count,) = ledger.execute("SELECT count(*) FROM results").fetchone()
+        ledger.execute("DELETE FROM results WHERE rowid = (SELECT max(rowid) FROM results)")
+    ledger.close()
+    ended = wm_drake("rerun", archive, "--out", "again")
+    assert ended.code == 0, ended.err
+    with sqlite3.connect("again/ledger.sqlite") as ledger:
+        assert ledger.execute("SELECT count(*) FROM results").fetchone() == (count,)
+    ledger.close()
 
 
 def test_what_differs_is_named(wm_drake, archive):

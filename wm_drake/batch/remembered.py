@@ -24,8 +24,8 @@ from wm_drake.simulation.steps import checked_step
 _ROOMS_AFTER = ("cli", "batch/ledger.py", "report", "rigs", "studies")
 """Parts of the package that do not influence the result of a run."""
 
-_EXCLUDED = {"name", "about", "measured", "published", "sources", "loads", "profile"}
-"""Fields of a machine that do not influence a run, or that the case replaces by its own."""
+_EXCLUDED = {"name", "about", "measured", "published", "sources", "loads", "profile", "model"}
+"""Fields of a machine that do not influence a run, or that have a part of the key of their own."""
 
 
 @functools.cache
@@ -80,6 +80,8 @@ def run_keys(
         changed = case.parameters or parameters
         if changed is not last:  # loads of one machine follow each other
             last, numbers = changed, changed.model_dump_json(exclude=_EXCLUDED)
+            if changed.model != parameters.model:
+                numbers += changed.model
         yield key_of(
             **common, numbers=numbers, load=case.load, profile=case.profile, gasket=case.gasket
         )

@@ -1,6 +1,5 @@
 """Command `wm-drake rerun`: run the study of an archive again, and compare."""
 
-import tempfile
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -9,6 +8,7 @@ import typer
 
 from wm_drake.report.provenance import source_revision, version
 from wm_drake.report.terminal import say
+from wm_drake.written_files import temporary_folder
 
 
 def rerun(
@@ -27,8 +27,8 @@ def rerun(
     from wm_drake.studies.archive import differences, libraries, read_archive, study_of
     from wm_drake.studies.run import execute, order_of
 
-    with tempfile.TemporaryDirectory() as folder:
-        archived, about, tables = read_archive(archive, Path(folder))
+    with temporary_folder() as folder:
+        archived, about, tables = read_archive(archive, folder)
         study = study_of(archived.study, str(archive))
         say(f"{archived.command}  ({about['date']}, revision {about['revision']})")
         here = {"wm_drake": version(), "revision": source_revision(), **libraries()}
@@ -44,12 +44,14 @@ def rerun(
             if name in archived.chosen or value != defaults.get(name)
         }
         given = {**options, **archived.run, "out": out, "overwrite": overwrite}
+        if study.has_runs:
+            given["resume"] = True  # what an earlier, interrupted command has left
         if machines:
             is_one = study.all_options.model_fields["machine"].annotation is str
             given["machine"] = machines[0] if is_one else machines
         order = replace(order_of(study, given, archived.command), parameters=archived.machines)
         result, *_ = execute(order)
-        names = {str(Path(folder) / name): text for name, text in about["files"].items()}
+        names = {str(folder / name): text for name, text in about["files"].items()}
     lines = list(differences(tables, result.tables(), names))
     for line in lines:
         typer.echo(line)

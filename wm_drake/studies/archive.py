@@ -239,6 +239,8 @@ def read_archive(
                 about["run"],
             )
     except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
+        if isinstance(error, OSError) and error.filename is None:  # a full disk
+            raise
         reason = reason_of(error) if isinstance(error, OSError) else "is no archive of a study"
         raise input_error(reason, where=str(path)) from None
     return study, about, tables

@@ -350,12 +350,13 @@ def _written(result: "Answer", facts: Facts, out: Path | None, run: CommandRun) 
 
 
 def machine_text(parameters: "MachineParameters") -> str:
-    """Return name and hash of the numbers of a machine, for the identity of a study."""
+    """Return name and hash of the numbers and bodies of a machine, for the identity of a study."""
     from wm_drake.batch.ledger import key_of
+    from wm_drake.batch.remembered import model_version
 
-    words = {"name", "about", "sources", "measured", "published"}
+    words = {"name", "about", "sources", "measured", "published", "model"}
     numbers = parameters.model_dump_json(exclude=words)
-    return f"{parameters.name} {key_of(numbers=numbers)[:8]}"
+    return f"{parameters.name} {key_of(numbers=numbers, model=model_version(parameters))[:8]}"
 
 
 def _identity(

@@ -139,7 +139,7 @@ def _sheet_rows(path: Path) -> list[TextRow]:
         book = load_workbook(path, read_only=True, data_only=True)
         tables = [(sheet.title, _filled_rows(sheet)) for sheet in book.worksheets]
         begun = [(title, row, rows) for title, rows in tables if (row := next(rows, None))]
-        found = [row for _, first, rows in begun[:1] for row in (first, *rows)]
+        filled = [row for _, first, rows in begun[:1] for row in (first, *rows)]
     except Exception as error:  # whatever its XML contains
         reason = shortened(str(error), 100) or type(error).__name__
         raise input_error(
@@ -149,7 +149,7 @@ def _sheet_rows(path: Path) -> list[TextRow]:
         first, *others = (f"'{title}'" for title, *_ in begun)
         message = f"sheet {first} is read, not {', '.join(others)}; move another one to the front"
         warnings.warn(str(Problem(where, "", message)), InputNotice, stacklevel=2)
-    return found
+    return filled
 
 
 def _filled_rows(sheet: Any) -> Iterator[TextRow]:

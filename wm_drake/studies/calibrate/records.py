@@ -198,7 +198,7 @@ class RecordModel(BlockModel):
 
     @cached_property
     def _content(self) -> str:
-        """Return the hash of all that determines the values at a point."""
+        """Return the hash of all that determines the values at a point, beside the machine."""
         machine = self.experiment.machine.parameters
         return key_of(
             fitted=self.by,

@@ -79,7 +79,7 @@ class CalibrateRecordsTask(Task):
         """Return what determines the fit beside the machine."""
         options = self.options
         return {
-            "records": [str(path) for path in options.records],
+            "records": [path.name for path in options.records],
             "unknowns": self.free.unknowns,
             "test": self.tests[0].test.model_dump_json(),
             "fitted": f"{options.by}, seed {options.seed}",
