@@ -150,17 +150,24 @@ INTO_TEMPORARY = {
 """Modules that write by themselves; those of reports into the folder of `result_folder`."""
 
 
+WRITERS = {"write_text", "write_bytes", "to_csv", "to_netcdf", "savefig", "savetxt", "savez"}
+
+
 def test_all_other_modules_write_by_one_home():
     writers = set()
     for path in PACKAGE.rglob("*.py"):
         text = path.read_text(encoding="utf-8")
         nodes = (
-            ast.walk(ast.parse(text)) if re.search(r"open\(|\.write_|\.to_|savefig", text) else ()
+            ast.walk(ast.parse(text))
+            if re.search(r"open\(|\.write_|\.to_|save|ZipFile", text)
+            else ()
         )
         for node in (node for node in nodes if isinstance(node, ast.Call)):
             name = getattr(node.func, "attr", getattr(node.func, "id", ""))
             modes = [a.value for a in node.args if isinstance(a, ast.Constant)]
-            opens = name == "open" and any(re.fullmatch("[wax]b?", str(mode)) for mode in modes)
-            if opens or name in ("write_text", "write_bytes", "to_csv", "to_netcdf", "savefig"):
+            opens = name in ("open", "ZipFile") and any(
+                re.fullmatch("[wax]b?", str(mode)) for mode in modes
+            )
+            if opens or name in WRITERS:
                 writers.add(path.relative_to(PACKAGE).with_suffix("").as_posix())
     assert writers <= INTO_TEMPORARY
