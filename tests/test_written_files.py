@@ -140,7 +140,7 @@ def test_a_read_only_file_system_is_named(tmp_path):
 
 
 INTO_TEMPORARY = {
-    "compiler/cache_files", "compiler/kept", "simulation/first_call",  # compiled code
+    "compiler/cache_files", "compiler/claims", "compiler/kept", "simulation/first_call",  # compiled code
     "export/fmu", "model/sdf_files",  # a temporary folder
     "written_files", "studies/result_folder",  # the two homes
     "studies/archive",  # a text in memory
