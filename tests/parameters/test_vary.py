@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy.stats
 from simple_machines import with_gasket_tables
 
 from wm_drake.elements.layouts import packed_stiffness
@@ -21,7 +22,7 @@ from wm_drake.parameters.units import PureNumber, Share, Unit
 from wm_drake.parameters.variation import Change, change_of, number_at, range_of
 from wm_drake.parameters.vary import entries_of_texts
 from wm_drake.parameters.vary_file import gasket_entries
-from wm_drake.studies.calibrate.parameter_map import parameter_map_of
+from wm_drake.studies.calibrate.parameter_map import parameter_map_of, read_parameter_map
 from wm_drake.studies.tolerance.variables import joint_of
 from wm_drake.studies.vary import varying_of
 
@@ -363,6 +364,29 @@ def test_study_that_lacks_a_value_says_which_line_to_add(machine, study, name):
     assert caught.value.problems[0].key == name
     lines = dict(line.split(": ") for line in message.split("'")[1::2])
     views[study](VaryFile.model_validate({"vary": {name: ONE_FILE[name] | lines}}))
+
+
+@pytest.mark.parametrize(
+    ("more", "frozen"),
+    [
+        ({"distribution": "uniform"}, scipy.stats.uniform(0.8, 0.5)),
+        ({"distribution": "triangular", "mode": "90 %"}, scipy.stats.triang(0.2, 0.8, 0.5)),
+    ],
+)
+def test_a_fit_takes_mean_and_deviation_of_a_distribution(machine, more, frozen):
+    entry = {"keys": SPRING, "low": "80 %", "high": "130 %", **more}
+    file = VaryFile.model_validate({"vary": {"share": entry}})
+    (unknown,) = parameter_map_of(machine, file).unknowns
+    assert unknown.prior == pytest.approx((frozen.mean(), frozen.std()))
+
+
+def test_an_entry_of_a_vary_file_is_named_with_its_line(machine, tmp_path):
+    path = tmp_path / "mine.yaml"
+    text = f"about: mine\nvary:\n  {SPRING}: 90 %..110 %\n  {FRICTION}:\n    high: 60 N\n"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        read_parameter_map(machine, path, load_vary(path))
+    assert [p.where for p in caught.value.problems] == [f"{path}:3", f"{path}:4"]
 
 
 OLD_FORMS = {

@@ -522,17 +522,24 @@ def _place(path: Path, key: str) -> str:
 def _line_of(tree: CommentedMap, key: str) -> tuple[int, int]:
     """Return how many parts of a key path a file contains, and the line of the last of them."""
     node: Any = tree
+    parts = key.split(".")
     depth, line = 0, 1
-    for part in key.split("."):
-        if isinstance(node, CommentedMap) and part in node:
+    while depth < len(parts):
+        if isinstance(node, CommentedMap):
+            ends = range(len(parts), depth, -1)  # names in a vary file are key paths themselves
+            names = {".".join(parts[depth:end]): end for end in ends}
+            part = next((name for name in names if name in node), None)
+            if part is None:
+                break
             line = node.lc.key(part)[0] + 1 if part in (node.lc.data or {}) else line
-            node = node[part]
-        elif isinstance(node, CommentedSeq) and is_index(part) and int(part) < len(node):
-            line = node.lc.item(int(part))[0] + 1
-            node = node[int(part)]
+            node, depth = node[part], names[part]
+        elif isinstance(node, CommentedSeq) and is_index(index := parts[depth]):
+            if int(index) >= len(node):
+                break
+            line = node.lc.item(int(index))[0] + 1
+            node, depth = node[int(index)], depth + 1
         else:
             break
-        depth += 1
     return depth, line
 
 

@@ -14,7 +14,7 @@ from wm_drake.parameters.machine import MachineParameters
 from wm_drake.parameters.sums import Sum, Summand, measured, sums_of
 from wm_drake.parameters.units import Share, Unit, dimension, with_base
 from wm_drake.parameters.variation import Change, Number, change_of, common_form, number_at
-from wm_drake.parameters.vary import LAUNDRY, Entry
+from wm_drake.parameters.vary import LAUNDRY, NEEDED, Entry
 from wm_drake.parameters.vary_file import Known
 
 Given = TypeVar("Given")
@@ -29,6 +29,9 @@ TABLES = ("linear", "scaled")
 "linear": a number takes the place of the table, the nominal stiffness for 100 %, as in [B].
 "scaled": the forces of the table are scaled, so that the curve keeps its shape.
 """
+
+OF_CORNERS = {"uniform": 3.0**-0.5, "triangular": 0.5}
+"""Deviation of a distribution over that of the values that it needs, all alike likely."""
 
 ROUNDING = 1e-9
 """Part of a range by which a value may be beyond an end, since its unit was converted."""
@@ -94,6 +97,18 @@ class Varied:
             message = f"{study} needs {' and '.join(missing)}; add {lines}"
             raise input_error(message, key=self.name)
         return [self.at[name] for name in names]
+
+    def prior(self, *, study: str) -> tuple[float, float]:
+        """Return mean and standard deviation of its distribution; `study` as for `needed`.
+
+        Raises:
+            InputError: it has none.
+        """
+        if self.entry.kind not in OF_CORNERS:
+            mean, deviation = self.needed("mean", "deviation", study=study)
+            return mean, deviation
+        corners = [self.at[name] for name in NEEDED[self.entry.kind]]
+        return float(np.mean(corners)), float(np.std(corners)) * OF_CORNERS[self.entry.kind]
 
     def at_level(self, level: float) -> float:
         """Return the value at a level, between two levels, or beyond -1 and 1 along their line."""

@@ -190,6 +190,8 @@ def _short(number: float) -> str:
 def parameter_map_of(machine: Machine, file: VaryFile) -> ParameterMap:
     """Return the parameter map of a machine.
 
+    Priors are normal; that of another distribution has its mean and deviation.
+
     Raises:
         InputError: the machine does not have a key, a factor has the wrong dimension or the wrong
             number of values, or a number has no bounds or no prior.
@@ -213,11 +215,8 @@ def read_parameter_map(machine: Machine, path: Path, file: VaryFile) -> Paramete
 
 
 def _unknown(varied: Varied) -> Unknown:
-    kind = varied.entry.kind
-    if kind not in ("", "normal"):
-        message = f"has a {kind} distribution; a fit needs normal ones, a mean and a deviation"
-        raise input_error(message, key=varied.name)
-    lower, upper, mean, deviation = varied.needed("low", "high", "mean", "deviation", study="a fit")
+    lower, upper = varied.needed("low", "high", study="a fit")
+    mean, deviation = varied.prior(study="a fit")
     if not lower <= mean <= upper:
         raise input_error("the expected value is outside the bounds", key=varied.name)
     start = float(np.clip(varied.at.get("start", mean), lower, upper))
