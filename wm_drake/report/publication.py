@@ -87,8 +87,12 @@ def _write_data(table: pd.DataFrame, path: Path) -> None:
 
 
 def file_name(title: str) -> str:
-    """Return a text as name of a file: lower-case letters, digits and underscores."""
-    words = re.sub(r"[^a-z0-9]+", "_", title.lower()).strip("_")
+    """Return a text as name of a file: lower-case letters, digits and underscores.
+
+    Its first sentence says what is drawn, the others what comes out, so that a name stays the same.
+    """
+    (words, *_) = re.split(r"[.;]\s", title.lower())
+    words = re.sub(r"[^a-z0-9]+", "_", words).strip("_")
     if len(words) > LONGEST_NAME:  # end with a whole word
         words = words[: LONGEST_NAME + 1].rpartition("_")[0] or words[:LONGEST_NAME]
     return words or "picture"
