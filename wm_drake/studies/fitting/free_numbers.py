@@ -133,7 +133,8 @@ def free_number(parameters: MachineParameters, name: str, entry: Entry) -> tuple
     if "low" not in at or "high" not in at:
         if value is None or value <= 0.0:
             why = "is in the SDF only" if value is None else "is not positive"
-            message = f"{why}, so its range must be given; write NAME=LOW..HIGH"
+            example = f"{first.key}=(1, 4) {first.unit.shown}".rstrip()
+            message = f"{why}, so its range must be given; write for example '{example}'"
             raise input_error(message, key=first.key)
         at = {"low": value / SPAN, "high": value * SPAN} | at
     for number in numbers:  # the search may go to either end

@@ -134,7 +134,9 @@ def knowledge_of(options: NextOptions, machine: Machine) -> Knowledge:
     if options.calibrated is None:
         return of_file(machine, options.vary or UNMEASURED)
     if options.vary is None:
-        message = "needs the vary file of the calibration; add --vary FILE"
+        written = options.calibrated / "calibrated_vary.yaml"
+        file = written if written.is_file() else "FILE"
+        message = f"needs the vary file of the calibration; add --vary {file}"
         raise input_error(message, where="--calibrated")
     return of_calibration_folder(machine, options.vary, options.calibrated)
 
