@@ -108,6 +108,15 @@ def test_profile_from_csv(tmp_path, head):
     assert np.array(profile.speed) / RPM == pytest.approx([0.0, 0.0, 110.0, -60.5])
 
 
+@pytest.mark.parametrize("head", ["", "\ufeff", "sep=;\r\n"])
+def test_profile_of_a_spreadsheet(tmp_path, head):
+    text = f"{head}Time [s];speed [rpm]\r\n0;0\r\n140,0;0\r\n1,5e2;-60,5\r\n;\r\n"
+    for content in (text, text.replace(";", "\t")):
+        profile = from_text(tmp_path, content, "profile.csv")
+        assert profile.time == (0.0, 140.0, 150.0)
+        assert np.array(profile.speed) / RPM == pytest.approx([0.0, 0.0, -60.5])
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -118,7 +127,7 @@ def test_profile_from_csv(tmp_path, head):
         ("time,speed\n0,0\n1,1\n", "needs the columns time_s,speed_rpm, has time,speed"),
         ("speed_rpm,time_s\n0,0\n1,1\n", "needs the columns"),
         ("time_s,speed_rpm,torque\n0,0,0\n1,1,1\n", "needs the columns"),
-        ("time_s;speed_rpm\n0;0\n1;1\n", "needs the columns"),
+        ("time_s;speed_rpm\n0;0\n1;1,5,0\n", "row 2 of the data: '1,5,0' is not a finite"),
         ("time_s,speed_rpm\n0,0\n1,fast\n", "row 2 of the data: .* is not a finite"),
         ("time_s,speed_rpm\n0,0\n1,\n", "row 2 of the data: .* is not a finite"),
         ("time_s,speed_rpm\n0,0\n1\n", "row 2 of the data: .* is not a finite"),

@@ -1,7 +1,12 @@
-"""CSV files: a # starts a comment, and the first line names the columns."""
+"""CSV files: a # starts a comment, and the first line names the columns.
+
+Columns are separated by commas, or by semicolons or tabs as spreadsheets write them; the decimal
+sign may be a comma then.
+"""
 
 import io
 import itertools
+import re
 import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +21,7 @@ from wm_drake.parameters.units import LARGEST_NUMBER, comma_hint
 if TYPE_CHECKING:  # slow to import: CSV files
     import pandas as pd
 
-_SIGNS = "; columns are separated by commas, and the decimal sign is a point"
+_SIGNS = "; columns that commas separate have decimal points"
 
 
 def read_csv(
@@ -40,14 +45,14 @@ def read_csv(
 
     text = read_any_text(Path(path), key=key)
     try:
-        written = list(_table(text, nrows=0).columns)
+        written = [str(name).strip() for name in _table(text, nrows=0).columns]
+        heads = [
+            [str.casefold(name) for name in names] for names in (written, map(_with_unit, written))
+        ]
         allowed = (columns, [*columns, optional])
-        heads = (written, list(map(_with_unit, written)))
-        head = next((names for names in heads if names in allowed), None)
+        head = next((names for names in allowed if list(map(str.casefold, names)) in heads), None)
         if head is None:
-            has = ",".join(map(str, written))
-            signs = _SIGNS if ";" in has or "\t" in has else ""
-            message = f"needs the columns {','.join(columns)}, has {has}{signs}"
+            message = f"needs the columns {','.join(columns)}, has {','.join(written)}"
             raise input_error(message, where=str(path), key=key)
         with warnings.catch_warnings():
             # pandas cuts a row that is too long and only warns
@@ -121,18 +126,35 @@ MOST_COLUMNS = 1000
 def _table(text: str, **options: Any) -> "pd.DataFrame":
     import pandas as pd  # slow to import: CSV files
 
-    head = next((line for line in text.splitlines() if line.partition("#")[0].strip()), "")
-    if head.count(",") >= MOST_COLUMNS:
-        raise ValueError(f"{head.count(',') + 1} columns; allowed are up to {MOST_COLUMNS}")
+    head = _head(text)
+    sign = re.fullmatch(r'"?sep=([,;\t])"?\s*', head, re.IGNORECASE)  # first line of spreadsheets
+    if sign:
+        text = text.replace(head, "", 1)
+        head = _head(text)
+    separator = sign[1] if sign else max(",;\t", key=head.count)
+    if head.count(separator) >= MOST_COLUMNS:
+        raise ValueError(f"{head.count(separator) + 1} columns; allowed are up to {MOST_COLUMNS}")
     table = pd.read_csv(
         io.StringIO(text),
+        sep=separator,
         comment="#",
         skipinitialspace=True,
         dtype=str,
         keep_default_na=False,
         **options,
     )
-    return table.apply(lambda column: column.str.strip()) if len(table) else table
+    if not len(table):
+        return table
+    table = table.apply(lambda column: column.str.strip())
+    table = table[table.ne("").any(axis="columns")]  # spreadsheets write empty rows, too
+    if separator == ",":
+        return table
+    return table.replace(r"^([+-]?\d+),(\d+(e[+-]?\d+)?)$", r"\1.\2", regex=True)
+
+
+def _head(text: str) -> str:
+    """Return the first line that is neither blank nor a comment."""
+    return next((line for line in text.splitlines() if line.partition("#")[0].strip()), "")
 
 
 def _with_unit(name: str) -> str:
