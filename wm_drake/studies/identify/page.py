@@ -22,6 +22,7 @@ from wm_drake.studies.rig.study import ENERGY, FREQUENCY
 
 PHASE = Quantity("phase", Unit("rad", "rad"))
 SAMPLES = Quantity("samples", decimals=0)
+CONDITION = Quantity("condition number")
 
 METHOD = (
     "The RMSE is that of [A] Eq. (1) and [C] Eq. (5), over all samples of all files. The offset "
@@ -138,7 +139,7 @@ def _whole(law: FittedLaw, load: Quantity) -> xr.Dataset:
             "lack_of_fit": LACK.variable((), judgement.missed),
             "noise": LACK.variable((), judgement.noise),
             "hints": ((), " ".join(judgement.hints)),
-            "condition": ((), fit.condition),
+            "condition": CONDITION.variable((), fit.condition),
             "evaluations": ((), fit.log.evaluations),
         }
     )
