@@ -21,7 +21,7 @@ from wm_drake.parameters.units import LARGEST_NUMBER, comma_hint
 if TYPE_CHECKING:  # slow to import: CSV files
     import pandas as pd
 
-_SIGNS = "; columns that commas separate have decimal points"
+_SIGNS = "; where commas separate the columns, the decimal sign is a point"
 
 
 def read_csv(
