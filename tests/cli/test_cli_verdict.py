@@ -112,6 +112,15 @@ def test_a_proposal_stays_within_the_effort_of_the_user(verdict):
     assert why[friction] == "its effort, 4, is above 1"
 
 
+def test_a_machine_of_which_a_run_fails_has_no_verdict_and_no_proposal(verdict):
+    heavy = ("--set", "loads.back.unbalances.0.mass=30 kg", "--clearance", "5 mm")
+    ended = verdict("reference", *heavy, "--only", "spring_types", "--out", "out")
+    assert ended.code == 1
+    assert "No verdict: the run of load back failed" in ended.out
+    assert "a run of the machine as it is fails" in ended.out
+    assert "–" not in re.sub(r"\s+", " ", ended.out).partition("What decides")[2]
+
+
 class Refusing(Experiment):
     """Experiment with a machine that refuses stiff springs."""
 

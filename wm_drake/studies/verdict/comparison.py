@@ -88,7 +88,7 @@ def answer(judged: Mapping[str, Judged], gaps: xr.Dataset, laundry: xr.Dataset) 
         what = f"keep less than {mm(clearance)}"
     texts = []
     for at, name in enumerate(names):
-        gap = mm(least[at]) if np.isfinite(least[at]) else "no gap, a run failed"
+        gap = mm(least[at])
         one, samples = laundry.isel(state=at), judged[name].laundry.sizes["sample"]
         texts.append(
             f"{name}: smallest gap {gap}, {int(one['count'])} of {samples} runs with random "

@@ -40,6 +40,8 @@ HOW_OTHERS_DIFFER = (
 
 LAUNDRY = "random laundry"
 
+MACHINE_FAILS = "No change is proposed: a run of the machine as it is fails."
+
 GAPS, DECIDES, CHANGES = "Smallest gaps", "What decides the gap", "What to change"
 """Headings of parts."""
 
@@ -108,7 +110,9 @@ def _pair(run: xr.Dataset) -> str:
 
 
 def mm(value: float) -> str:
-    """Return a length as text, without line breaks. [m]"""
+    """Return a length as text, without line breaks; of a failed run, that it failed. [m]"""
+    if not np.isfinite(value):
+        return "a failed run"
     return SMALLEST_GAP.text(value).replace(" ", "\u00a0")
 
 
@@ -117,14 +121,16 @@ def _short(judged: Judged) -> Part:
     question, states, tried, laundry, _ = judged
     made = proposal(question, states)
     rows = [("How likely", laundry_text(question, laundry.isel(state=0)))]
-    if question.clearance:
-        margin = smallest(states)[0].item() - question.clearance
+    gap = smallest(states)[0].item()
+    if question.clearance and np.isfinite(gap):
+        margin = gap - question.clearance
         kept = "more" if margin > 0.0 else "less"
         text = f"{mm(abs(margin))} {kept} than the clearance, {mm(question.clearance)}"
         rows.insert(0, ("Margin", text))
     if tried.sizes["key"]:
         rows.append(("What decides", _influences_text(tried.isel(key=slice(MOST_NAMED)))))
-    rows.append(("What to change", proposal_text(made)))
+    text = proposal_text(made) if np.isfinite(gap) else MACHINE_FAILS
+    rows.append(("What to change", text))
     if made.is_confirmed:
         words = {response.name: response.title for response in question.responses}
         rows.append(("What it costs", costs_text(made, words)))
@@ -143,7 +149,8 @@ def _change_part(judged: Judged) -> Part:
     """Return the part of the proposal: why, and the responses before and after."""
     question, states, tried, laundry, _ = judged
     words = {response.name: response.title for response in question.responses}
-    why = why_text(question, tried)
+    has_run = np.isfinite(smallest(states)[0].item())
+    why = why_text(question, tried) if has_run else MACHINE_FAILS
     part = proposal_part(proposal(question, states), why, words)
     numbers = numbers_of(question, states, word_of(question, states, laundry))
     tables = (*part.shown, LabelledTable("numbers", numbers))
@@ -357,7 +364,7 @@ def influences_shown(
     heading = "Changes that were tried, and why they are not proposed"
     caption = (
         f"Smallest gap of all loads with {change} less and more, and why the better side is not "
-        "proposed; empty: part of the proposal. --limit and --only set what a change may cost and "
-        "what may change."
+        "proposed; empty: part of the proposal. --limit, --effort and --only set what a change may "
+        "cost and what may change."
     )
     return plot, LabelledTable("influences", data, heading, caption)
