@@ -71,11 +71,11 @@ def shipped_and_built(name: str):
     return build_checked(name, shipped_machine(name))
 
 
-def build_checked_once(file, parameters):
+def build_checked_once(file, parameters, **options):
     """Build a machine as `build_checked` does, a shipped one that nothing changed only once."""
     if file in shipped_machines() and parameters == shipped_machine(file):
         return shipped_and_built(file)
-    return build_checked(file, parameters)
+    return build_checked(file, parameters, **options)
 
 
 def files(folder: Path) -> dict[str, tuple[int, int]]:

@@ -422,10 +422,8 @@ def _executor(order: Order, run: CommandRun) -> Iterator[Executor]:
                 yield Executor(ledger, chosen.workers, client, chosen.out, _engine(chosen))
             finally:
                 if chosen.out is not None and len(ledger):
-                    kept = (
-                        f"{len(ledger)} finished runs are kept in {ledger.path}; continue with "
-                        "--resume"
-                    )
+                    go_on = "repeat the command" if chosen.resume else "continue with --resume"
+                    kept = f"{len(ledger)} finished runs are kept in {ledger.path}; {go_on}"
     except KeyboardInterrupt:
         raise StudyInterrupted(f"interrupted; {kept}") from None
 
