@@ -104,6 +104,11 @@ def test_every_colour_scale_is_even_and_can_be_turned(name):
     assert [shade(0.0, name), shade(1.0, name)] == [scale.colors()[0], scale.colors()[-1]]
 
 
+def test_a_file_is_named_by_what_is_drawn_not_by_what_comes_out():
+    names = [file_name(f"Gaps, load back{end}") for end in ("", "; least 3.1 mm", ". Least: 4 mm.")]
+    assert names == 3 * ["gaps_load_back"]
+
+
 def test_files_and_picture_show_the_same_data(tmp_path):
     figure = every_mark()
     with collected() as figures:
