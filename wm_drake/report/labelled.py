@@ -28,8 +28,8 @@ class LabelledTable:
 
     Its dimensions with labels are the first columns, its variables the others. Each variable
     carries its `Quantity`, or has the name of a variable of a measure; one of texts or whole
-    numbers needs none. If the unit differs from row to row, it has a
-    column. A row without any value is left out.
+    numbers needs none. If the unit differs from row to row, it has a column. A row without any
+    value is left out.
 
     Attributes:
         name: Name of the file, without suffix, and of the key in JSON.
