@@ -20,6 +20,7 @@ import numpy as np
 from wm_drake.compiler.compilation import CACHE_FOLDER, READ_ONLY_FOLDER
 from wm_drake.compiler.lanes import WIDTH
 from wm_drake.engines.compiled.linear import is_followed
+from wm_drake.engines.compiled.midpoint import TUBES
 from wm_drake.engines.compiled.packing import initial_state, pack
 from wm_drake.engines.compiled.run import advance_of, one_run
 from wm_drake.engines.compiled.samples import trajectory_of
@@ -28,6 +29,7 @@ from wm_drake.engines.schedule import schedule_of
 from wm_drake.model.build import build_machine
 from wm_drake.model.machine import Setup
 from wm_drake.parameters import Load, MachineParameters, SpinProfile
+from wm_drake.simulation.band import pass_band
 from wm_drake.simulation.cases import Case
 from wm_drake.simulation.displacements import amplitudes, filtered
 from wm_drake.simulation.measures import measure
@@ -72,13 +74,14 @@ def _end(second: "subprocess.Popen[bytes]", started: Path) -> None:
 
 
 def compile_meanwhile(parameters: MachineParameters, *, batch: bool) -> None:
-    """Compile what judges the step and filters samples, then integration or readers of samples.
+    """Compile what needs no set-up, then the integration or what reads samples.
 
     Arguments as for `compile_in_two_processes`.
     """
     period = parameters.output_period
     is_followed(np.zeros((WIDTH, 1, 1)), np.zeros(1, dtype=int), 1.0)
-    amplitudes(filtered(np.zeros((round(10.0 / period), 1)), period, (0.5, 20.0)))
+    at_rest = np.zeros((round(STANDSTILL.duration / period), 1))
+    amplitudes(filtered(at_rest, period, pass_band(parameters.profile, period)))
     setup = build_machine(parameters).set_up()
     (compile_integration if batch else compile_readers)(setup)
 
@@ -96,13 +99,14 @@ def compile_readers(setup: Setup) -> None:
 
 def compile_integration(setup: Setup) -> None:
     """Compile the loop of the integrator that the machine most likely takes."""
-    period, tubes = setup.parameters.output_period, len(setup.telescopes)
-    stepping = Stepping("midpoint" if tubes else "multistep", period, np.zeros((tubes, 14, 14)))
+    period, count = setup.parameters.output_period, len(setup.telescopes)
+    tubes = np.zeros((count, 2 * TUBES, 2 * TUBES))
+    stepping = Stepping("midpoint" if count else "multistep", period, tubes)
     how = stepping.integrator, stepping.relaxation
     schedule, layout, lanes = one_run(setup, STANDSTILL, period, period, *how)
     advance_of(schedule, stepping.one_derivative(schedule), layout, lanes)(0, 0)
 
 
 if __name__ == "__main__":
-    machine, follows = pickle.load(sys.stdin.buffer)
-    compile_meanwhile(machine, batch=follows)
+    machine, is_batch = pickle.load(sys.stdin.buffer)
+    compile_meanwhile(machine, batch=is_batch)
