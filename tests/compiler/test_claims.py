@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-import time
 
 import pytest
 
@@ -30,17 +29,22 @@ def holder(tmp_path):
         process.kill()
 
 
-def seconds_to_claim(folder, name):
-    begin = time.monotonic()
-    with claims.claimed(folder, name):
-        return time.monotonic() - begin
+@pytest.fixture
+def pauses(monkeypatch):
+    """Return the pauses in which a claim has waited; the third one is the last."""
+    made = []
+    monkeypatch.setattr(claims.time, "sleep", made.append)
+    monkeypatch.setattr(claims.time, "monotonic", lambda: len(made) * claims.LONGEST_WAIT / 3)
+    return made
 
 
-def test_a_claim_waits_for_the_process_that_holds_it(holder, tmp_path, monkeypatch):
-    monkeypatch.setattr(claims, "LONGEST_WAIT", 0.2)
-    assert seconds_to_claim(tmp_path, "law") >= 0.2  # a stopped process does not hold others up
-    assert seconds_to_claim(tmp_path, "other law") < 0.2
+def test_a_claim_waits_for_the_process_that_holds_it(holder, tmp_path, pauses):
+    with claims.claimed(tmp_path, "other law"), claims.claimed(tmp_path / "missing", "law"):
+        assert not pauses
+    with claims.claimed(tmp_path, "law"):  # a stopped process does not hold others up
+        assert len(pauses) == 3
+    pauses.clear()
     holder.kill()
-    holder.wait()
-    assert seconds_to_claim(tmp_path, "law") < 0.2
-    assert seconds_to_claim(tmp_path / "missing", "law") < 0.2
+    holder.communicate()
+    with claims.claimed(tmp_path, "law"):
+        assert not pauses
