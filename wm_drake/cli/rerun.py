@@ -38,7 +38,7 @@ def rerun(
                 say(f"{name}: {there.get(name, 'not known')} in the archive, {here[name]} here")
         machines = list(archived.machines)
         defaults = study.all_options.model_construct().model_dump(mode="json")
-        options = {
+        options = {  # a default that is given may be refused beside other options
             name: value
             for name, value in archived.options.items()
             if name in archived.chosen or value != defaults.get(name)

@@ -37,6 +37,7 @@ NAMING = (".yaml", ".yml", ".sdf", ".gltf")
 """Suffixes of files that may name others: what they extend, tables, meshes."""
 
 _WORD = re.compile(r"[^\s\"'<>\[\]{},]+|\"[^\"\n]+\"|'[^'\n]+'")
+"""What may be the name of a file in a text: a word, or a text in quotes."""
 
 FILES_OF_MACHINE = ("model", "measured", "published")
 """Fields of a machine that are files."""

@@ -7,6 +7,9 @@ from pydantic import field_validator
 
 from wm_drake.studies.study import PROFILE, SEED, Options, Study, imported, option
 
+MOST_EFFORT = 3.0
+"""Largest effort of a proposal if the user gives none: three changes, as more are hard to make."""
+
 
 class VerdictOptions(Options):
     """Options of the verdict."""
@@ -58,7 +61,7 @@ class VerdictOptions(Options):
         "KEY=NUMBER",
     )
     most_effort: float = option(
-        3.0, "Largest effort of a proposal, the sum of its changes.", "NUMBER", gt=0.0
+        MOST_EFFORT, "Largest effort of a proposal, the sum of its changes.", "NUMBER", gt=0.0
     )
     profile: Path | None = PROFILE
     seed: int = SEED

@@ -43,7 +43,7 @@ from wm_drake.studies.tolerance.options import ToleranceOptions
 from wm_drake.studies.tolerance.study import CONTACTS, laundry_masses
 from wm_drake.studies.tolerance.task import ToleranceTask
 from wm_drake.studies.verdict.comparison import comparison_answer
-from wm_drake.studies.verdict.options import VerdictOptions
+from wm_drake.studies.verdict.options import MOST_EFFORT, VerdictOptions
 from wm_drake.studies.verdict.page import verdict_answer
 from wm_drake.studies.verdict.study import (
     COUNTERWEIGHT,
@@ -105,7 +105,8 @@ class VerdictTask(Task):
         more += [f"--limit {limit}" for limit in options.limit]
         more += [f"--only {key}" for key in options.only]
         more += [f"--effort {text}" for text in options.effort]
-        more += [f"--most-effort {options.most_effort:g}"] if options.most_effort != 3.0 else []
+        if options.most_effort != MOST_EFFORT:
+            more.append(f"--most-effort {options.most_effort:g}")
         return command_text(f"wm-drake verdict {machine}", options, *more)
 
     def _laundry(self, machine: Machine) -> ToleranceTask:
