@@ -45,20 +45,18 @@ from wm_drake.studies.tolerance.task import ToleranceTask
 from wm_drake.studies.verdict.comparison import comparison_answer
 from wm_drake.studies.verdict.options import MOST_EFFORT, VerdictOptions
 from wm_drake.studies.verdict.page import verdict_answer
+from wm_drake.studies.verdict.search import ProposalSearch, proposed, reasons
 from wm_drake.studies.verdict.study import (
     COUNTERWEIGHT,
     FACTOR,
     SMALLEST_GAP,
     STATES,
     Judged,
-    ProposalSearch,
     VerdictQuestion,
     aim_of,
     changeable,
     influences,
     laundry_of,
-    proposed,
-    reasons,
     states_of,
 )
 
@@ -139,7 +137,7 @@ class VerdictTask(Task):
         tried = influences(experiment, self.keys, change)
         aim = aim_of(base, tried, self.responses, self.limits)
         efforts = self.efforts, self.options.most_effort
-        search = ProposalSearch(experiment, aim, self.responses, change, *efforts)
+        search = ProposalSearch(experiment, aim, self.responses, *efforts)
         changed = proposed(search, tried)
         if changed is not None:
             better = build_machine(with_values(parameters, changed.changes))
